@@ -1,0 +1,1 @@
+"""Find where a finite element model and a vibration recording differ, and name the missing physics."""

@@ -1,0 +1,35 @@
+"""The second-order system M q'' + V q' + K q = f (thesis eq. 1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..arrays import readonly
+from ..errors import ShapeError
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Mass, viscous damping and stiffness over labelled degrees of freedom.
+
+    Attributes
+    ----------
+    M, V, K : sparse (n, n)
+        Mass [kg], damping [N s/m], stiffness [N/m]; symmetric. K may be complex where the
+        structure has hysteretic damping.
+    dofs : (n, 2) int
+        Point id and component 1-6 of each row.
+    """
+
+    M: sp.csr_array
+    V: sp.csr_array
+    K: sp.csr_array
+    dofs: np.ndarray
+
+    def __post_init__(self) -> None:
+        n = len(self.dofs)
+        for name in "MVK":
+            if getattr(self, name).shape != (n, n):
+                raise ShapeError(f"{name} is {getattr(self, name).shape}, {n} dofs need {(n, n)}")
+        object.__setattr__(self, "dofs", readonly(np.asarray(self.dofs, dtype=np.int64)))

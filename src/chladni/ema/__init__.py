@@ -1,0 +1,1 @@
+"""Experimental modal analysis: recordings, identification, correlation, pre-test planning."""

@@ -1,0 +1,30 @@
+"""Exceptions: misuse and failed self-checks raise; a fit that did not converge is a status.
+
+Every message is one sentence for the user: it names the file, the line, the offender and the
+alternatives. The command line prints it and exits with 2 (:class:`ChladniError`) or 3
+(:class:`AccuracyError`: ran, but the result is not to be trusted).
+"""
+
+
+class ChladniError(Exception):
+    """Root of every exception raised on purpose by this package."""
+
+
+class ShapeError(ChladniError, ValueError):
+    """Arrays or label lists that do not fit together."""
+
+
+class LabelError(ChladniError, LookupError):
+    """A degree of freedom, part, grid or parameter that does not exist."""
+
+
+class FileError(ChladniError, ValueError):
+    """A deck, recording or case file that cannot be used as it stands."""
+
+
+class ModelError(ChladniError, ValueError):
+    """A model without physical sense: zero thickness, a part that hangs on nothing."""
+
+
+class AccuracyError(ChladniError, ArithmeticError):
+    """A computed result failed the check its own theory provides."""

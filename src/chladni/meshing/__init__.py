@@ -1,0 +1,1 @@
+"""Mesh tooling: decks, thickness mapping, curvature, quality."""

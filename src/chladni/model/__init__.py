@@ -1,0 +1,1 @@
+"""What the structure is: geometry, parts, connections, properties; knows nothing of matrices."""

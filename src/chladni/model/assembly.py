@@ -1,0 +1,266 @@
+"""The structure as words and numbers: points, elements by family, joints, masses, supports (SI).
+
+Everything is an array over one family, because a body-in-white has a hundred thousand shells.
+Nodes are *rows* of ``points`` (0-based), never ids; ``ids`` turns rows into the user's numbers.
+All vectors and places are in the basic frame; ``axes`` holds the frame in which the dofs of a
+point are counted (Nastran's CD), as rows of unit vectors, or None where all are basic.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from ..errors import LabelError, ModelError
+from .properties import Part
+
+
+def _none(*shape: int) -> np.ndarray:
+    return np.zeros((0, *shape))
+
+
+def _no_rows(*shape: int) -> np.ndarray:
+    return np.zeros((0, *shape), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Shells:
+    """Four- and three-node shells; a triangle repeats its third node.
+
+    Attributes
+    ----------
+    ids : (n,) int
+    nodes : (n, 4) int        rows of points
+    part : (n,) int           position in ``Assembly.parts``
+    thickness : (n, 4)        at the corners [m]
+    axis : (n, 3)             direction whose projection is material axis 1
+    offset : (n,)             of the mid-surface along the element normal [m]
+    """
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    nodes: np.ndarray = field(default_factory=lambda: _no_rows(4))
+    part: np.ndarray = field(default_factory=_no_rows)
+    thickness: np.ndarray = field(default_factory=lambda: _none(4))
+    axis: np.ndarray = field(default_factory=lambda: _none(3))
+    offset: np.ndarray = field(default_factory=_none)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def triangle(self) -> np.ndarray:
+        """(n,) bool, True where the shell has three nodes."""
+        return self.nodes[:, 2] == self.nodes[:, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Solids of one kind: 8 (hexahedron), 6 (wedge) or 4 (tetrahedron) nodes a row."""
+
+    ids: np.ndarray
+    nodes: np.ndarray
+    part: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """Two-node bars, beams and rods.
+
+    Attributes
+    ----------
+    ids, part : (n,) int
+    nodes : (n, 2) int
+    up : (n, 3)           orientation vector v of plane 1 (zero for rods)
+    offset : (n, 2, 3)    of the ends from their nodes [m]
+    pins : (n, 2, 6) bool element dofs released at each end
+    """
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    nodes: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    part: np.ndarray = field(default_factory=_no_rows)
+    up: np.ndarray = field(default_factory=lambda: _none(3))
+    offset: np.ndarray = field(default_factory=lambda: _none(2, 3))
+    pins: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 6), bool))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class Scalars:
+    """Scalar springs, dampers or masses between two dofs, value (c_a q_a - c_b q_b).
+
+    Attributes
+    ----------
+    ids : (n,) int
+    nodes : (n, 2) int        rows of points; -1: ground
+    component : (n, 2) int    1-6
+    value : (n,)              [N/m], [N s/m] or [kg]
+    damping : (n,)            loss factor (springs)
+    """
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    nodes: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    component: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    value: np.ndarray = field(default_factory=_none)
+    damping: np.ndarray = field(default_factory=_none)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class Bushes:
+    """Six-component springs with dampers (CBUSH) in a frame of their own.
+
+    Attributes
+    ----------
+    ids : (n,) int
+    nodes : (n, 2) int          rows of points; second -1: ground
+    frame : (n, 3, 3)           rows are the unit vectors of the element frame
+    place : (n, 3)              where the spring sits (rigid arms lead there from both nodes) [m]
+    stiffness, viscous, loss : (n, 6)   [N/m, N m/rad], [N s/m], [-]
+    """
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    nodes: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    frame: np.ndarray = field(default_factory=lambda: _none(3, 3))
+    place: np.ndarray = field(default_factory=lambda: _none(3))
+    stiffness: np.ndarray = field(default_factory=lambda: _none(6))
+    viscous: np.ndarray = field(default_factory=lambda: _none(6))
+    loss: np.ndarray = field(default_factory=lambda: _none(6))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """Concentrated masses: a 6 x 6 matrix at each node in the basic frame (offset included) [SI]."""
+
+    ids: np.ndarray = field(default_factory=_no_rows)
+    node: np.ndarray = field(default_factory=_no_rows)
+    matrix: np.ndarray = field(default_factory=lambda: _none(6, 6))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """RBE2, RBAR and kin: dependent dofs follow the independent point as a rigid body.
+
+    ``independent`` is one row with all six dofs; ``components[k]`` are the dofs (1-6) of
+    ``dependent[k]`` that follow.
+    """
+
+    id: int
+    independent: int
+    dependent: tuple[int, ...]
+    components: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Average:
+    """RBE3: the reference point moves as the weighted mean of the others.
+
+    ``terms`` are (row, components, weight); ``moved`` optional (row, component) pairs that take the
+    dependency instead of the reference's (Nastran's UM).
+    """
+
+    id: int
+    reference: int
+    components: tuple[int, ...]
+    terms: tuple[tuple[int, tuple[int, ...], float], ...]
+    moved: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """Multi-point constraint Σ a_k q_k = 0; the first term is the dependent one."""
+
+    id: int
+    nodes: tuple[int, ...]
+    components: tuple[int, ...]
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """All of the structure.
+
+    Attributes
+    ----------
+    ids : (n,) int            ids of the points as the user numbers them, increasing
+    points : (n, 3)           places in the basic frame [m]
+    parts : tuple of Part
+    axes : (n, 3, 3) or None  displacement frames, rows are unit vectors
+    scalar_points : (n,) bool True where a point has one dof only (SPOINT)
+    supports : (k, 2) int     (row of points, component 1-6) held at zero
+    coupled_mass : bool       consistent mass (True) or lumped (False), where the element has both
+    structural_damping : float  loss factor of the whole (PARAM,G)
+    label : dict              material ids, coordinate systems: whatever names a file needs back
+    """
+
+    ids: np.ndarray
+    points: np.ndarray
+    parts: tuple[Part, ...]
+    shells: Shells = field(default_factory=Shells)
+    solids: tuple[Solids, ...] = ()
+    beams: Beams = field(default_factory=Beams)
+    springs: Scalars = field(default_factory=Scalars)
+    dampers: Scalars = field(default_factory=Scalars)
+    scalar_masses: Scalars = field(default_factory=Scalars)
+    bushes: Bushes = field(default_factory=Bushes)
+    masses: Masses = field(default_factory=Masses)
+    rigid: tuple[RigidBody | Average | Equation, ...] = ()
+    supports: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    axes: np.ndarray | None = None
+    scalar_points: np.ndarray | None = None
+    coupled_mass: bool = True
+    structural_damping: float = 0.0
+    auto_spc: bool = True
+
+    def rows(self, ids: np.ndarray | list[int] | tuple[int, ...]) -> np.ndarray:
+        """Rows of the points with these ids.
+
+        Raises
+        ------
+        LabelError
+            If a grid does not exist; the sentence names it.
+        """
+        ids = np.asarray(ids, dtype=np.int64)
+        at = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
+        if np.any(missing := self.ids[at] != ids):
+            raise LabelError(
+                f"no grid {ids[missing][:3].tolist()}; the deck has {len(self.ids)} grids, "
+                f"{self.ids[0]} to {self.ids[-1]}"
+            )
+        return at
+
+    def part(self, name: str | int) -> int:
+        """Position of the part with this name or property id.
+
+        Raises
+        ------
+        LabelError
+            If there is none, or more than one.
+        """
+        found = [k for k, p in enumerate(self.parts) if name in (p.name, p.id, str(p.id))]
+        if len(found) != 1:
+            known = ", ".join(f"{p.name} ({p.id})" for p in self.parts)
+            raise LabelError(f"{len(found) or 'no'} part {name!r}; there are {known}")
+        return found[0]
+
+    def with_parts(self, parts: tuple[Part, ...]) -> Self:
+        """The same structure with other properties."""
+        if len(parts) != len(self.parts):
+            raise ModelError(f"{len(parts)} parts given, the assembly has {len(self.parts)}")
+        return replace(self, parts=parts)
+
+    def thickness(self) -> np.ndarray:
+        """Mean thickness of every shell (n,) [m]."""
+        return np.asarray(self.shells.thickness.mean(axis=1))

@@ -1,0 +1,146 @@
+"""Materials, sections and parts: the numbers a part of the structure is made of (SI)."""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """E [Pa], nu [-], rho [kg/m³], structural damping (loss factor) [-].
+
+    G is E / 2(1+nu) unless given otherwise.
+    """
+
+    E: float
+    nu: float
+    rho: float = 0.0
+    damping: float = 0.0
+    G: float | None = None
+    id: int = 0
+
+    @property
+    def shear_modulus(self) -> float:
+        """G [Pa]."""
+        return self.E / (2 * (1 + self.nu)) if self.G is None else self.G
+
+    def plane_stress(self) -> np.ndarray:
+        """Q (3, 3) of σ = Q ε with ε = (εx εy γxy) [Pa]."""
+        E, nu = self.E, self.nu
+        Q = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.0]])
+        Q[2, 2] = self.shear_modulus
+        return Q
+
+    def transverse(self) -> np.ndarray:
+        """Transverse shear moduli (2, 2) [Pa]."""
+        return self.shear_modulus * np.eye(2)
+
+
+@dataclass(frozen=True)
+class Orthotropic:
+    """Plane orthotropic sheet (MAT8): axes 1, 2 of the element's material frame (SI)."""
+
+    E1: float
+    E2: float
+    nu12: float
+    G12: float
+    G1z: float = 0.0  # 0: infinitely stiff in transverse shear, as Nastran has it
+    G2z: float = 0.0
+    rho: float = 0.0
+    damping: float = 0.0
+    id: int = 0
+
+    def plane_stress(self) -> np.ndarray:
+        """Q (3, 3) in the material frame [Pa] (Jones, Mechanics of Composite Materials, 2.61)."""
+        nu21 = self.nu12 * self.E2 / self.E1
+        scale = 1 / (1 - self.nu12 * nu21)
+        Q12 = self.nu12 * self.E2
+        return scale * np.array(
+            [[self.E1, Q12, 0], [Q12, self.E2, 0], [0, 0, self.G12 / scale]], dtype=float
+        )
+
+    def transverse(self) -> np.ndarray:
+        """Transverse shear moduli (2, 2) [Pa]; a zero entry means no shear flexibility."""
+        return np.diag([self.G1z, self.G2z])
+
+
+@dataclass(frozen=True, eq=False)
+class Anisotropic:
+    """A sheet given by its plane stiffness itself (MAT2 or a smeared laminate)."""
+
+    Q: np.ndarray  # (3, 3) [Pa]
+    G: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # (2, 2) [Pa]
+    rho: float = 0.0
+    damping: float = 0.0
+    id: int = 0
+
+    def plane_stress(self) -> np.ndarray:
+        """Q (3, 3) [Pa]."""
+        return self.Q
+
+    def transverse(self) -> np.ndarray:
+        """Transverse shear moduli (2, 2) [Pa]; zero means no shear flexibility."""
+        return self.G
+
+
+Material = Isotropic | Orthotropic | Anisotropic
+
+
+@dataclass(frozen=True)
+class ShellSection:
+    """Shell section (PSHELL): A = t Q_m, D = t³/12 r_b Q_b, B = t² Q_c, S = t k_s G (SI)."""
+
+    thickness: float
+    membrane: Material | None
+    bending: Material | None
+    shear: Material | None = None  # None: the bending material's; see rigid_shear
+    coupling: Material | None = None
+    bending_ratio: float = 1.0  # 12 I / t³
+    shear_ratio: float = 5 / 6  # t_s / t
+    nonstructural: float = 0.0  # [kg/m²]
+    rigid_shear: bool = False  # MID3 blank: no transverse shear flexibility
+    damping: float = 0.0  # loss factor of the whole section, where the deck gives one
+
+
+@dataclass(frozen=True)
+class SolidSection:
+    """Solid section (PSOLID); ``full`` is plain 2x2x2 integration without bubble functions."""
+
+    material: Material
+    full: bool = False
+
+
+@dataclass(frozen=True)
+class BeamSection:
+    """Uniform beam or bar section (PBAR, PBEAM, PROD): areas and moments in the element frame (SI).
+
+    ``shear`` are the shear area factors (K1, K2); 0 means no shear flexibility.
+    ``lumped_torsion``: the lumped mass carries rho (I1 + I2) L / 2 an end, as CBEAM has it.
+    """
+
+    material: Material
+    area: float
+    I1: float = 0.0
+    I2: float = 0.0
+    I12: float = 0.0
+    J: float = 0.0
+    shear: tuple[float, float] = (0.0, 0.0)
+    nonstructural: float = 0.0  # [kg/m]
+    kind: str = "bar"  # bar, beam, rod
+
+
+Section = ShellSection | SolidSection | BeamSection
+
+
+@dataclass(frozen=True)
+class Part:
+    """What an engineer calls a part: one property of the deck, with its name."""
+
+    id: int
+    name: str
+    section: Section
+
+    def with_section(self, **changes: object) -> Self:
+        """The same part with other section values."""
+        return replace(self, section=replace(self.section, **changes))

@@ -1,0 +1,59 @@
+"""Unit systems of decks: everything is converted to SI once, where the deck is read."""
+
+from dataclasses import dataclass
+
+from .errors import FileError
+
+
+@dataclass(frozen=True)
+class Units:
+    """A consistent system: one unit of length, mass and time, in SI.
+
+    >>> UNITS["mm-t-s"].stress
+    1000000.0
+    """
+
+    name: str
+    length: float  # [m]
+    mass: float  # [kg]
+    time: float = 1.0  # [s]
+
+    @property
+    def force(self) -> float:
+        """[N]."""
+        return self.mass * self.length / self.time**2
+
+    @property
+    def stress(self) -> float:
+        """[Pa]."""
+        return self.mass / (self.length * self.time**2)
+
+    @property
+    def density(self) -> float:
+        """[kg/m³]."""
+        return self.mass / self.length**3
+
+
+UNITS = {
+    unit.name: unit
+    for unit in (
+        Units("SI", 1.0, 1.0),
+        Units("mm-t-s", 1e-3, 1e3),
+        Units("mm-kg-ms", 1e-3, 1.0, 1e-3),
+        Units("mm-kg-s", 1e-3, 1.0),
+        Units("in-lb-s", 0.0254, 4.4482216152605 / 0.0254),  # pound-force; mass in lbf s²/in
+    )
+}
+
+
+def units(name: str) -> Units:
+    """The unit system of this name.
+
+    Raises
+    ------
+    FileError
+        If there is none of this name; the sentence lists those there are.
+    """
+    if name not in UNITS:
+        raise FileError(f"no unit system {name!r}; there are {', '.join(UNITS)}")
+    return UNITS[name]

@@ -1,0 +1,1 @@
+"""Finite element model updating: calibration, evidence, diagnosis."""
