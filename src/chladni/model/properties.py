@@ -116,7 +116,9 @@ class BeamSection:
     """Uniform beam or bar section (PBAR, PBEAM, PROD): areas and moments in the element frame (SI).
 
     ``shear`` are the shear area factors (K1, K2); 0 means no shear flexibility.
-    ``lumped_torsion``: the lumped mass carries rho (I1 + I2) L / 2 an end, as CBEAM has it.
+    The reference line is the shear centre; ``neutral`` is where the neutral axis passes and
+    ``nonstructural_at`` where the non-structural mass sits, both (y, z) from it (PBEAM's N1, N2
+    and M1, M2). The lumped mass of a ``beam`` carries rho (I1 + I2) L / 2 an end.
     """
 
     material: Material
@@ -128,6 +130,9 @@ class BeamSection:
     shear: tuple[float, float] = (0.0, 0.0)
     nonstructural: float = 0.0  # [kg/m]
     kind: str = "bar"  # bar, beam, rod
+    neutral: tuple[float, float] = (0.0, 0.0)  # [m]
+    nonstructural_at: tuple[float, float] = (0.0, 0.0)  # [m]
+    nonstructural_inertia: float = 0.0  # about its own centre [kg m]
 
 
 Section = ShellSection | SolidSection | BeamSection
