@@ -64,8 +64,9 @@ def frames(ends: np.ndarray, up: np.ndarray, ids: np.ndarray) -> tuple[np.ndarra
 
 def _rigidities(sections: list[BeamSection]) -> dict[str, np.ndarray]:
     """EA, GJ (m,), EI (m, 2, 2), shear compliance c (m, 2) and neutral axis N (m, 2)."""
-    E = np.array([s.material.E for s in sections])
-    G = np.array([s.material.shear_modulus for s in sections])
+    materials = [s.material for s in sections if isinstance(s.material, Isotropic)]
+    E = np.array([m.E for m in materials])
+    G = np.array([m.shear_modulus for m in materials])
     A = np.array([s.area for s in sections])
     I = np.array([[[s.I1, s.I12], [s.I12, s.I2]] for s in sections])
     bends = np.array([s.kind != "rod" for s in sections])

@@ -1,0 +1,193 @@
+"""Weighted means (RBE3): the reference point moves as the best rigid motion of the others.
+
+x = argmin Σ w_k (u_k - S_k x)² = A⁻¹ Σ S_kᵀ w_k u_k with A = Σ S_kᵀ w_k S_k, where S_k x is what a
+rigid motion x of the reference point does to dof k. Forces at the reference are so spread over the
+others with their moments. Weights of rotations are multiplied by the squared mean distance of the
+points from the reference, as NX and MSC Nastran do it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.assembly import Assembly, Average
+from .constraint import Rows
+from .spring import direction
+
+
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """All connected dofs of all RBE3: element, row of points, component, weight (t,)."""
+
+    element: np.ndarray
+    node: np.ndarray
+    component: np.ndarray
+    weight: np.ndarray
+
+
+def average_rows(assembly: Assembly, at: np.ndarray) -> Rows:
+    """The dependencies of the RBE3 at these positions of ``Assembly.rigid``."""
+    means = [e for e in (assembly.rigid[k] for k in at) if isinstance(e, Average)]
+    if not means:
+        return Rows.none()
+    terms = _terms(means)
+    x = motion(assembly, means, terms)  # (t, 6) along the axes of the reference
+    wanted = np.zeros((len(means), 6), dtype=bool)
+    for k, mean in enumerate(means):
+        wanted[k, np.array(mean.components) - 1] = True
+    number = np.cumsum(wanted.ravel()).reshape(wanted.shape) - 1
+    t, c = np.nonzero(wanted[terms.element])
+    element, component = np.nonzero(wanted)
+    reference = np.array([m.reference for m in means])
+    rows = Rows(
+        6 * reference[element] + component,
+        at[element],
+        number[terms.element[t], c],
+        6 * terms.node[t] + terms.component[t] - 1,
+        x[t, c],
+    )
+    moved = {int(k): mean for k, mean in zip(at, means, strict=True) if mean.moved}
+    return _moved(rows, moved) if moved else rows
+
+
+def _terms(means: list[Average]) -> _Terms:
+    flat = [
+        (k, node, component)
+        for k, mean in enumerate(means)
+        for node, components, _ in mean.terms
+        for component in components
+    ]
+    weight = [w for mean in means for _, components, w in mean.terms for _ in components]
+    element, node, component = np.array(flat, dtype=np.int64).reshape(-1, 3).T
+    return _Terms(element, node, component, np.array(weight, dtype=float))
+
+
+def lever(along: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """S (m, 6): d · (u + θ × r) = (d, r × d) · (u, θ) for translations, d · θ for rotations.
+
+    Parameters
+    ----------
+    along : (m, 6)   unit vectors of the dofs, translation and rotation halves
+    arm : (m, 3)     r from the moving point to the dof's [m]
+    """
+    S = along.copy()
+    S[:, 3:] += np.cross(arm, along[:, :3])
+    return S
+
+
+def motion(assembly: Assembly, means: list[Average], terms: _Terms) -> np.ndarray:
+    """A⁻¹ S_kᵀ w_k (t, 6): motion of the reference, in its own axes, per unit of each dof."""
+    reference = np.array([m.reference for m in means])
+    arm = assembly.points[terms.node] - assembly.points[reference[terms.element]]
+    L = _lengths(terms, arm, len(means))
+    S = lever(direction(assembly, terms.node, terms.component), arm)
+    w = terms.weight * np.where(terms.component > 3, L[terms.element] ** 2, 1.0)
+    S[:, 3:] /= L[terms.element, None]  # so that A is of one unit
+    A = np.zeros((len(means), 6, 6))
+    np.add.at(A, terms.element, w[:, None, None] * S[:, :, None] * S[:, None, :])
+    axes = np.eye(3)[None] if assembly.axes is None else assembly.axes[reference]
+    axes = np.broadcast_to(axes, (len(means), 3, 3))
+    inverse = _inverse(A, means, axes)
+    x = w[:, None] * np.einsum("tij,tj->ti", inverse[terms.element], S)
+    x[:, 3:] /= L[terms.element, None]
+    turned = np.einsum("tij,tkj->tki", axes[terms.element], x.reshape(-1, 2, 3))
+    return np.asarray(turned.reshape(-1, 6))
+
+
+def _lengths(terms: _Terms, arm: np.ndarray, n: int) -> np.ndarray:
+    """Mean distance of the distinct points from the reference (n,), 1 where it is zero [m]."""
+    _, first = np.unique(np.stack([terms.element, terms.node]), axis=1, return_index=True)
+    distance = np.linalg.norm(arm[first], axis=1)
+    count = np.bincount(terms.element[first], minlength=n)
+    total = np.bincount(terms.element[first], distance, minlength=n)
+    L = total / np.maximum(count, 1)
+    return np.where(L > 1e-12, L, 1.0)
+
+
+def _inverse(A: np.ndarray, means: list[Average], axes: np.ndarray) -> np.ndarray:
+    """A⁻¹, or A⁺ where the points leave a motion open that the reference does not ask for.
+
+    Raises
+    ------
+    ModelError
+        If they leave one open that it does ask for, as three points in a line do.
+    """
+    inverse = np.linalg.pinv(A, rcond=1e-10, hermitian=True)
+    open_ = np.abs(inverse @ A - np.eye(6)).reshape(-1, 2, 3, 6).max(axis=(2, 3)) > 1e-6
+    for k in np.flatnonzero(open_.any(axis=1)):
+        turn = np.kron(np.eye(2), axes[k])
+        gap = np.abs(turn @ (inverse[k] @ A[k] - np.eye(6))).max(axis=1)
+        if lost := [c for c in means[k].components if gap[c - 1] > 1e-6]:
+            raise ModelError(
+                f"RBE3 {means[k].id}: its {len(means[k].terms)} points do not determine components"
+                f" {lost} of the reference; add points out of line, or rotations 456"
+            )
+    return np.asarray(inverse)
+
+
+def _moved(rows: Rows, moved: dict[int, Average]) -> Rows:
+    """The same dependencies solved for other dofs (Nastran's UM set)."""
+    plain = ~np.isin(rows.owner, list(moved))
+    entry = plain[rows.row]
+    number = np.cumsum(plain) - 1
+    parts = [
+        Rows(
+            rows.dof[plain],
+            rows.owner[plain],
+            number[rows.row[entry]],
+            rows.on[entry],
+            rows.factor[entry],
+        )
+    ]
+    return Rows.joined(parts + [_exchanged(rows, k, mean) for k, mean in moved.items()])
+
+
+def _exchanged(rows: Rows, owner: int, mean: Average) -> Rows:
+    """[1, -G] u = 0 of one RBE3 solved for its UM dofs."""
+    mine = np.flatnonzero(rows.owner == owner)
+    entry = np.isin(rows.row, mine)
+    all_dofs, at = np.unique(np.concatenate([rows.dof[mine], rows.on[entry]]), return_inverse=True)
+    A = np.zeros((len(mine), len(all_dofs)))
+    A[np.arange(len(mine)), at[: len(mine)]] = 1
+    np.subtract.at(A, (rows.row[entry] - mine[0], at[len(mine) :]), rows.factor[entry])
+    dof = np.array([6 * node + component - 1 for node, component in mean.moved])
+    m = np.isin(all_dofs, dof)
+    if len(dof) != len(mine) or m.sum() != len(dof):
+        raise ModelError(
+            f"RBE3 {mean.id}: UM names {len(dof)} dofs, {m.sum()} of them in the element; "
+            f"the reference has {len(mine)} components"
+        )
+    if np.linalg.matrix_rank(A[:, m]) < len(dof):
+        raise ModelError(f"RBE3 {mean.id} cannot be solved for its UM dofs")
+    G = -np.linalg.solve(A[:, m], A[:, ~m])
+    row, column = np.nonzero(G)
+    return Rows(all_dofs[m], np.full(len(dof), owner), row, all_dofs[~m][column], G[row, column])
+
+
+def average_weights(r: np.ndarray, R: float) -> tuple[np.ndarray, np.ndarray]:
+    """w(r/R) = (1 - r²/R²)² inside R, 0 outside, and dw/dR [1/m]: smooth in R.
+
+    With it the radius of a spider is a continuous parameter: weights fade to zero, with zero
+    slope, where points enter or leave.
+
+    >>> average_weights(np.array([0.0, 1.0, 3.0]), 2.0)
+    (array([1.    , 0.5625, 0.    ]), array([0.    , 0.375 , 0.    ]))
+    """
+    s = np.minimum(np.asarray(r, dtype=float) / R, 1.0)
+    return (1 - s**2) ** 2, 4 * (1 - s**2) * s**2 / R
+
+
+def average_derivative(
+    S: np.ndarray, w: np.ndarray, dw: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """G = A⁻¹ Sᵀ W and dG = A⁻¹ Sᵀ dW (1 - S G), with A = Sᵀ W S.
+
+    Parameters
+    ----------
+    S : (t, 6)       what a rigid motion of the reference does to each dof (``lever``)
+    w, dw : (t,)     weights and their derivative by a parameter, such as a radius
+    """
+    inverse = np.linalg.inv(S.T @ (w[:, None] * S))
+    G = inverse @ S.T * w
+    return G, (inverse @ S.T * dw) @ (np.eye(len(w)) - S @ G)

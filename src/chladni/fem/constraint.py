@@ -1,0 +1,43 @@
+"""Linear dependencies u_m = G u as flat arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Dependent dofs and what they depend on; dofs are 6 * row of points + component - 1.
+
+    Attributes
+    ----------
+    dof, owner : (m,) int     dependent dof and the position of its element in ``Assembly.rigid``
+    row, on : (e,) int        entries: which of the m rows, and the dof it leans on
+    factor : (e,)             [-], [m] or [1/m]
+    """
+
+    dof: np.ndarray
+    owner: np.ndarray
+    row: np.ndarray
+    on: np.ndarray
+    factor: np.ndarray
+
+    @classmethod
+    def none(cls) -> Self:
+        """No dependency at all."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(nothing, nothing, nothing, nothing, np.zeros(0))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """All rows of several sets."""
+        first = np.cumsum([0] + [len(p.dof) for p in parts])
+        return cls(
+            np.concatenate([p.dof for p in parts]),
+            np.concatenate([p.owner for p in parts]),
+            np.concatenate([p.row + k for p, k in zip(parts, first[:-1], strict=True)]),
+            np.concatenate([p.on for p in parts]),
+            np.concatenate([p.factor for p in parts]),
+        )
