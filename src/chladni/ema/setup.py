@@ -1,0 +1,171 @@
+"""What was measured, where and with what: recordings and the set-up of the test (SI)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from ..arrays import readonly
+from ..dynamics.frf import FRF
+from ..errors import LabelError, ShapeError
+
+Role = Literal["output", "input"]
+
+
+@dataclass(frozen=True, eq=False)
+class Poles:
+    """Identified frequencies without an FRF: what a table of a report holds.
+
+    Attributes
+    ----------
+    frequency : (r,)    undamped natural frequency [Hz]
+    frequency_sd : (r,) its standard deviation [Hz], nan where unknown
+    damping : (r,)      fraction of critical, nan where unknown
+    mode : (r,) int     number the user gave it
+    state : tuple of str  the state of the object each line belongs to ("" where there is one)
+    """
+
+    frequency: np.ndarray
+    frequency_sd: np.ndarray
+    damping: np.ndarray
+    mode: np.ndarray
+    state: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        due = (len(self.state),)
+        for name in ("frequency", "frequency_sd", "damping", "mode"):
+            if getattr(self, name).shape != due:
+                raise ShapeError(f"{name} is {getattr(self, name).shape}, the states say {due}")
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states in the order of the table."""
+        return tuple(dict.fromkeys(self.state))
+
+    def of(self, state: str) -> "Poles":
+        """The lines of one state."""
+        if state not in self.state:
+            raise LabelError(f"no state {state!r}; there are {', '.join(self.states)}")
+        here = np.array([s == state for s in self.state])
+        return Poles(
+            self.frequency[here],
+            self.frequency_sd[here],
+            self.damping[here],
+            self.mode[here],
+            tuple(s for s in self.state if s == state),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A record that is no FRF: time history, spectrum, power spectral density.
+
+    ``kind`` is the universal file's word (time, auto spectrum, cross spectrum, psd, ...);
+    ``input`` is "" where the record has no reference; ``unit`` is the label the file gives.
+    """
+
+    kind: str
+    output: str
+    input: str
+    x: np.ndarray  # (n,) [s] or [Hz]
+    values: np.ndarray  # (n,)
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Mode shapes as a file holds them (dataset 55): any scale, real or complex.
+
+    Attributes
+    ----------
+    frequency, damping : (r,)  [Hz], fraction of critical
+    values : (n, r)
+    dofs : tuple of n labels
+    """
+
+    frequency: np.ndarray
+    damping: np.ndarray
+    values: np.ndarray
+    dofs: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        due = (len(self.dofs), len(self.frequency))
+        if self.values.shape != due:
+            raise ShapeError(f"shapes are {self.values.shape}, labels and frequencies say {due}")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One file of a test, or one article or level of it.
+
+    Attributes
+    ----------
+    name : str                   file (and article, level) it comes from
+    frf : FRF or None
+    poles : Poles or None        where no FRF exists
+    shapes : Shapes or None      mode shapes the file holds
+    nodes : {node: (3,)}         places [m]
+    axes : {node: (3, 3)}        rows: unit vectors of the node's own measuring axes, where turned
+    elements : tuple of tuples   nodes of each trace line or element
+    functions : tuple            time histories, spectra
+    level : float or None        excitation [N], or [m/s²] for base excitation
+    article : str                which of several nominally equal objects
+    notes : tuple of str         what was found odd and how it was read
+    """
+
+    name: str
+    frf: FRF | None = None
+    poles: Poles | None = None
+    shapes: Shapes | None = None
+    nodes: Mapping[int, np.ndarray] = field(default_factory=dict)
+    axes: Mapping[int, np.ndarray] = field(default_factory=dict)
+    elements: tuple[tuple[int, ...], ...] = ()
+    functions: tuple[Function, ...] = ()
+    level: float | None = None
+    article: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A measured dof as the user describes it: where it sits, which way it points, what it weighs.
+
+    Either ``grid`` or ``place`` is given; ``direction`` None means the normal of the surface.
+    """
+
+    label: str
+    grid: int | None = None
+    place: np.ndarray | None = None  # (3,) [m]
+    direction: np.ndarray | None = None  # (3,) unit vector
+    role: Role = "output"
+    mass: float = 0.0  # [kg]
+    position_sd: float = 0.0  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class TestSetup:
+    """The test as it was set up: sensors, exciters, hangers, the weighing."""
+
+    __test__ = False  # not a test class, whatever its name says
+
+    outputs: tuple[Sensor, ...] = ()
+    inputs: tuple[Sensor, ...] = ()
+    hangers: tuple[int, ...] = ()  # grids
+    mass: float | None = None  # weighed [kg]
+    mass_sd: float = 0.0  # [kg]
+
+    def sensor(self, label: str, role: Role = "output") -> Sensor:
+        """The sensor (or exciter) of this label.
+
+        Raises
+        ------
+        LabelError
+            If there is none; the sentence lists those there are.
+        """
+        among = self.outputs if role == "output" else self.inputs
+        for sensor in among:
+            if sensor.label == label:
+                return sensor
+        raise LabelError(f"no {role} {label!r}; there are {[s.label for s in among][:6]} ...")
