@@ -1,0 +1,171 @@
+"""A shaded picture of a surface inside matplotlib axes: by VTK where it works, else by painting.
+
+Both draw the same parallel projection, so everything else (scale bar, labels, arrows, markers) is
+laid over the axes in metres of the picture plane and is the same with either.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+
+from .camera import Camera
+from .probe import prepare
+from .surface import Surface
+
+GREY = (0.80, 0.82, 0.85)
+_AMBIENT, _DIFFUSE = 0.55, 0.50
+
+
+@dataclass(frozen=True, eq=False)
+class Paint:
+    """How a surface is coloured.
+
+    Attributes
+    ----------
+    values : (n,) per point, (m,) per face or None   what the colours mean
+    limits : (low, high)                             values at the ends of the colour map
+    cmap : str
+    edges : bool                                     whether element edges are drawn
+    ghost : (k, 2, 3) or None                        segments of an undeformed outline [m]
+    """
+
+    values: np.ndarray | None = None
+    limits: tuple[float, float] = (0.0, 1.0)
+    cmap: str = "viridis"
+    edges: bool = True
+    ghost: np.ndarray | None = None
+
+
+def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
+    """Put the picture into the axes, whose data units become metres of the picture plane."""
+    u0, u1, v0, v1 = camera.window
+    ax.set(xlim=(u0, u1), ylim=(v0, v1), aspect="equal")
+    ax.set_axis_off()
+    if prepare():
+        width = ax.get_window_extent().width
+        ax.imshow(_photo(seen, camera, paint, int(2 * width)), extent=camera.window, zorder=1)
+    else:
+        _painted(ax, seen, camera, paint)
+    ax.set(xlim=(u0, u1), ylim=(v0, v1))
+
+
+def _photo(seen: Surface, camera: Camera, paint: Paint, width: int) -> np.ndarray:
+    """(height, width, 4) image by VTK."""
+    import pyvista as pv
+
+    width = max(64, min(width, 3200))
+    height = max(64, round(width / camera.aspect))
+    plotter = pv.Plotter(off_screen=True, window_size=[width, height], lighting="none")
+    plotter.add_light(pv.Light(position=tuple(_lamp(camera)), light_type="scene light"))
+    if len(seen.faces):
+        plotter.add_mesh(_polydata(seen), **_look(seen, paint, width))
+    if len(seen.lines):
+        plotter.add_mesh(_segments(seen.points[seen.lines]), color="#333333", line_width=4)
+    if paint.ghost is not None and len(paint.ghost):
+        plotter.add_mesh(_segments(paint.ghost), color="#8a8f98", line_width=2, lighting=False)
+    _aim(plotter, seen, camera)
+    image = plotter.screenshot(None, return_img=True, transparent_background=True)
+    plotter.close()
+    return np.asarray(image)
+
+
+def _aim(plotter: Any, seen: Surface, camera: Camera) -> None:
+    u0, u1, v0, v1 = camera.window
+    used = seen.points[seen.used]
+    depth = camera.depth(used)
+    focus = (u0 + u1) / 2 * camera.right + (v0 + v1) / 2 * camera.up
+    reach = float(np.ptp(depth)) + (u1 - u0) + (v1 - v0)
+    focus = focus + float(depth.mean()) * camera.toward
+    plotter.camera.focal_point = focus
+    plotter.camera.position = focus + 2 * reach * camera.toward
+    plotter.camera.up = camera.up
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = (v1 - v0) / 2
+    plotter.camera.clipping_range = (0.5 * reach, 4 * reach)
+
+
+def _polydata(seen: Surface) -> Any:
+    import pyvista as pv
+
+    triangle = seen.faces[:, 2] == seen.faces[:, 3]
+    size = np.where(triangle, 3, 4)
+    rows = np.column_stack([size, seen.faces])
+    keep = np.ones(rows.shape, bool)
+    keep[triangle, 4] = False
+    return pv.PolyData(np.array(seen.points), faces=rows[keep])
+
+
+def _look(seen: Surface, paint: Paint, width: int) -> dict[str, Any]:
+    look: dict[str, Any] = {
+        "ambient": _AMBIENT,
+        "diffuse": _DIFFUSE,
+        "show_edges": paint.edges,
+        "edge_color": "#20242a",
+        "edge_opacity": 0.25,
+        "line_width": max(1.0, width / 1500),
+        "show_scalar_bar": False,
+    }
+    if paint.values is None:
+        return {**look, "color": GREY}
+    on_points = len(paint.values) == len(seen.points)
+    return {
+        **look,
+        "scalars": np.asarray(paint.values, dtype=float),
+        "preference": "point" if on_points else "cell",
+        "clim": paint.limits,
+        "cmap": paint.cmap,
+        "nan_color": GREY,
+        "interpolate_before_map": True,
+    }
+
+
+def _segments(ends: np.ndarray) -> Any:
+    import pyvista as pv
+
+    k = 2 * np.arange(len(ends))
+    lines = np.column_stack([np.full(len(ends), 2), k, k + 1]).ravel()
+    return pv.PolyData(np.array(ends).reshape(-1, 3), lines=lines)
+
+
+def _lamp(camera: Camera) -> np.ndarray:
+    """Direction of the light: over the left shoulder."""
+    lamp = camera.toward + 0.45 * camera.up - 0.35 * camera.right
+    return np.asarray(lamp / np.linalg.norm(lamp))
+
+
+def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
+    """Painter's algorithm: the farthest face first, Lambert shading, no library needed."""
+    if len(seen.faces):
+        corners = seen.points[seen.faces]
+        order = np.argsort(camera.depth(corners.mean(axis=1)))
+        shade = _AMBIENT + _DIFFUSE * np.abs(seen.normals() @ _lamp(camera))
+        colour = np.clip(_colours(seen, paint)[:, :3] * shade[:, None], 0, 1)[order]
+        line = 0.82 * colour if paint.edges else colour
+        polygons = camera.project(corners.reshape(-1, 3)).reshape(-1, 4, 2)[order]
+        ax.add_collection(
+            PolyCollection(polygons, facecolors=colour, edgecolors=line, linewidths=0.3, zorder=1)  # type: ignore[arg-type]
+        )
+    for ends, tint, wide in (
+        (seen.points[seen.lines], "#333333", 1.6),
+        (paint.ghost, "#8a8f98", 0.7),
+    ):
+        if ends is not None and len(ends):
+            flat = camera.project(np.asarray(ends).reshape(-1, 3)).reshape(-1, 2, 2)
+            ax.add_collection(LineCollection(list(flat), colors=tint, linewidths=wide, zorder=2))
+
+
+def _colours(seen: Surface, paint: Paint) -> np.ndarray:
+    """(m, 4) colour of each face."""
+    if paint.values is None:
+        return np.tile((*GREY, 1.0), (len(seen.faces), 1))
+    values = np.asarray(paint.values, dtype=float)
+    if len(values) == len(seen.points):
+        values = values[seen.faces].mean(axis=1)
+    low, high = paint.limits
+    rgba = colormaps[paint.cmap]((values - low) / max(high - low, 1e-300))
+    rgba[~np.isfinite(values)] = (*GREY, 1.0)
+    return np.asarray(rgba)

@@ -1,0 +1,71 @@
+"""How figures look and are saved: colours that survive grey print, no global state, no display."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from ..output import atomic
+
+TEST, BEFORE, AFTER = "#111111", "#d55e00", "#0072b2"  # Okabe and Ito 2008
+RED = (0.80, 0.08, 0.13)
+TITLE: dict[str, Any] = {"fontsize": 11, "fontweight": "bold"}
+LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
+
+
+def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
+    """Write a PNG (or SVG, PDF by the suffix), by way of a temporary name."""
+    FigureCanvasAgg(figure)
+    with matplotlib.rc_context({"svg.fonttype": "path"}):
+        return atomic(path, lambda part: figure.savefig(part, dpi=dpi, facecolor="white"))
+
+
+def pixels(figure: Figure, dpi: int = 100) -> np.ndarray:
+    """(height, width, 3) bytes of a figure."""
+    figure.set_facecolor("white")
+    figure.set_dpi(dpi)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def save_gif(images: list[np.ndarray], path: Path | str, seconds: float = 1.2) -> Path:
+    """Write a looping GIF with one palette for all frames, so that colours do not flicker."""
+    from PIL import Image
+
+    palette = Image.fromarray(np.concatenate(images[:: max(1, len(images) // 4)])).quantize(256)
+    frames = [
+        Image.fromarray(i).quantize(palette=palette, dither=Image.Dither.NONE) for i in images
+    ]
+    data = io.BytesIO()
+    pause = max(20, round(1e3 * seconds / len(frames)))
+    frames[0].save(
+        data, "GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0, optimize=False
+    )
+    return atomic(path, lambda part: part.write_bytes(data.getvalue()))
+
+
+def colour_bar(figure: Figure, ax: Axes, cmap: str, limits: tuple[float, float], text: str) -> None:
+    """A bar beside the axes."""
+    box = ax.get_position()
+    side = figure.add_axes((box.x1 + 0.015, box.y0 + 0.1 * box.height, 0.022, 0.8 * box.height))
+    mapped = ScalarMappable(Normalize(*limits), colormaps[cmap])
+    figure.colorbar(mapped, cax=side).set_label(text, fontsize=9)
+    side.tick_params(labelsize=8)
+
+
+def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str) -> None:
+    """Text that can be read on any ground."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.2, foreground="white")]
+    style: dict[str, Any] = {"fontsize": 7.5, "color": colour, "ha": "center", "va": "center"}
+    ax.text(*place, text, **style, path_effects=halo, zorder=7, clip_on=False)

@@ -1,0 +1,255 @@
+"""Curves and matrices of a vibration test, as matplotlib figures without global state.
+
+Each function writes one picture (PNG, SVG or PDF by the suffix) and returns its path. Test is black,
+the model before is orange and dashed, the model after is blue: distinct in grey and to any eye.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..errors import ShapeError
+from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
+
+Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # name: frequency [Hz] (n,), complex H (n,)
+Bands = Sequence[tuple[float, float]]
+_STYLES: dict[str, dict[str, Any]] = {
+    "test": {"color": TEST, "lw": 1.5, "zorder": 3},
+    "before": {"color": BEFORE, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 2},
+    "after": {"color": AFTER, "lw": 1.4, "zorder": 4},
+}
+_MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
+
+
+def frf(
+    path: Path | str,
+    curves: Curves,
+    title: str = "",
+    unit: str = "",
+    fitted: Bands = (),
+    excluded: Bands = (),
+) -> Path:
+    """Log magnitude over phase of one channel; "test", "before", "after" have colours of their own.
+
+    ``fitted`` bands are shaded blue, ``excluded`` ones grey [Hz].
+    """
+    figure = Figure(figsize=(8.2, 4.6), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.1))
+    _curves(upper, lower, curves)
+    for ax in (upper, lower):
+        _bands(ax, fitted, AFTER, 0.06)
+        _bands(ax, excluded, "#555555", 0.16)
+        ax.grid(which="both", lw=0.3, alpha=0.5)
+    upper.set(yscale="log", ylabel=f"|H| [{unit}]" if unit else "|H|")
+    lower.set(xlabel="frequency [Hz]", ylabel="phase [deg]", ylim=(-185, 185))
+    lower.set_yticks([-180, -90, 0, 90, 180])
+    upper.set_title(title, loc="left", **TITLE)
+    upper.legend(loc="upper right", ncols=min(3, len(curves)), **LEGEND)
+    return save(figure, path)
+
+
+def frf_grid(
+    path: Path | str,
+    channels: Mapping[str, Curves],
+    unit: str = "",
+    fitted: Bands = (),
+    excluded: Bands = (),
+    columns: int = 2,
+) -> Path:
+    """Magnitudes of many channels, one small picture each."""
+    columns = min(columns, len(channels))
+    rows = -(-len(channels) // columns)
+    figure = Figure(figsize=(4.6 * columns, 2.2 * rows + 0.5), layout="constrained")
+    axes = np.ravel(figure.subplots(rows, columns, sharex=True, squeeze=False))
+    for ax, (name, curves) in zip(axes, channels.items(), strict=False):
+        _curves(ax, None, curves)
+        _bands(ax, fitted, AFTER, 0.06)
+        _bands(ax, excluded, "#555555", 0.16)
+        ax.set_yscale("log")
+        ax.set_title(name, fontsize=9, loc="left")
+        ax.tick_params(labelsize=7)
+        ax.grid(lw=0.3, alpha=0.5)
+    for ax in axes[len(channels) :]:
+        ax.set_visible(False)
+    names = axes[0].get_legend_handles_labels()
+    figure.legend(*names, loc="outside upper right", ncols=3, **LEGEND)
+    figure.supxlabel("frequency [Hz]", fontsize=9)
+    figure.supylabel(f"|H| [{unit}]" if unit else "|H|", fontsize=9)
+    return save(figure, path)
+
+
+def nyquist(path: Path | str, curves: Curves, title: str = "", unit: str = "") -> Path:
+    """Imaginary over real part: a mode is a circle."""
+    figure = Figure(figsize=(5.2, 5.0), layout="constrained")
+    ax = figure.subplots()
+    for k, (name, (_, H)) in enumerate(curves.items()):
+        ax.plot(np.real(H), np.imag(H), label=name, **_style(name, k))
+    ax.axhline(0, color="#999999", lw=0.6)
+    ax.axvline(0, color="#999999", lw=0.6)
+    ax.set(xlabel=f"Re H {unit}", ylabel=f"Im H {unit}", aspect="equal")
+    ax.set_title(title, loc="left", **TITLE)
+    ax.legend(**LEGEND)
+    return save(figure, path)
+
+
+def frequency_ladder(
+    path: Path | str, test: np.ndarray, before: np.ndarray, after: np.ndarray | None = None
+) -> Path:
+    """Deviation (f_model / f_test - 1) of each paired mode in per cent, as bars.
+
+    Parameters
+    ----------
+    test, before, after : (r,)   paired frequencies [Hz]; not-a-number where there is no partner
+    """
+    test = np.asarray(test, dtype=float)
+    figure = Figure(figsize=(max(5.0, 0.55 * len(test) + 1.6), 3.4), layout="constrained")
+    ax, at = figure.subplots(), np.arange(len(test))
+    series = [("before", before, BEFORE)] + ([("after", after, AFTER)] if after is not None else [])
+    wide = 0.8 / len(series)
+    for k, (name, model, colour) in enumerate(series):
+        offset = (k - (len(series) - 1) / 2) * wide
+        ax.bar(
+            at + offset, 100 * (np.asarray(model, float) / test - 1), wide, color=colour, label=name
+        )
+    ax.axhline(0, color=TEST, lw=0.9)
+    ax.set_xticks(at, [f"{f:.4g}" for f in test], rotation=60, fontsize=8)
+    ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
+    ax.grid(axis="y", lw=0.3, alpha=0.6)
+    ax.legend(ncols=2, **LEGEND)
+    return save(figure, path)
+
+
+def mac_matrix(
+    path: Path | str, mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str = ""
+) -> Path:
+    """MAC (r, c) in [0, 1] as shaded squares with their values."""
+    if mac.shape != (len(rows), len(columns)):
+        raise ShapeError(f"MAC is {mac.shape}, the labels say {(len(rows), len(columns))}")
+    size = 0.42 * max(len(rows), len(columns)) + 1.9
+    figure = Figure(figsize=(size + 0.6, size), layout="constrained")
+    ax = figure.subplots()
+    shown = ax.imshow(mac, cmap="Blues", vmin=0, vmax=1, aspect="equal")
+    for (i, j), value in np.ndenumerate(mac):
+        if value >= 0.05:
+            colour = "white" if value > 0.6 else "#333333"
+            ax.text(j, i, f"{100 * value:.0f}", ha="center", va="center", fontsize=7, color=colour)
+    ax.set_xticks(range(len(columns)), columns, rotation=60, fontsize=8)
+    ax.set_yticks(range(len(rows)), rows, fontsize=8)
+    ax.set_title(title, loc="left", **TITLE)
+    figure.colorbar(shown, ax=ax, shrink=0.7, label="MAC")
+    return save(figure, path)
+
+
+def stabilisation(
+    path: Path | str,
+    poles: Sequence[tuple[int, np.ndarray, np.ndarray]],
+    chosen: np.ndarray,
+    indicator: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Path:
+    """Poles over model order, the ones kept as vertical lines, an indicator curve behind.
+
+    Parameters
+    ----------
+    poles : (order, frequencies [Hz], stable as bool)   one entry per order
+    chosen : (r,)             frequencies kept [Hz]
+    indicator : (f, value)    e.g. the sum of magnitudes or the mode indicator, drawn on a log scale
+    """
+    figure = Figure(figsize=(8.2, 4.2), layout="constrained")
+    ax = figure.subplots()
+    if indicator is not None:
+        behind = ax.twinx()
+        behind.semilogy(*indicator, color="#9aa3ad", lw=0.9, zorder=1)
+        behind.set_ylabel("indicator", fontsize=8, color="#6b7480")
+    for order, frequency, stable in poles:
+        stable = np.asarray(stable, bool)
+        for mask, mark, colour in ((~stable, "x", "#b9b9b9"), (stable, "o", AFTER)):
+            at = np.asarray(frequency)[mask]
+            ax.plot(at, np.full(len(at), order), mark, ms=3, color=colour, mew=0.8, zorder=3)
+    for f in chosen:
+        ax.axvline(f, color=BEFORE, lw=0.8, alpha=0.8, zorder=2)
+    ax.set(xlabel="frequency [Hz]", ylabel="model order")
+    ax.set_title("o stable   x not stable   | kept", loc="left", fontsize=9)
+    return save(figure, path)
+
+
+def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | None = None) -> Path:
+    """Log evidence of every hypothesis relative to the best one, longest bar worst."""
+    ranked = sorted(evidence.items(), key=lambda item: -item[1])
+    names = [name for name, _ in ranked]
+    below = np.array([ranked[0][1] - value for _, value in ranked])
+    figure = Figure(figsize=(7.6, 0.3 * len(names) + 1.2), layout="constrained")
+    ax = figure.subplots()
+    winner = best or names[0]
+    colours = [AFTER if name == winner else "#aab4bf" for name in names]
+    ax.barh(names, below, color=colours, height=0.66)
+    for k, value in enumerate(below):
+        ax.annotate(f" {-value:.4g}" if value else " best", (value, k), va="center", fontsize=8)
+    ax.set_xscale("symlog", linthresh=5)
+    ax.invert_yaxis()
+    ax.set_xlabel("log evidence below the best (longer is less likely)")
+    ax.set_xlim(0, max(10.0, 4 * float(below.max())))
+    ax.spines[["top", "right"]].set_visible(False)
+    return save(figure, path)
+
+
+def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None = None) -> Path:
+    """Deviation Q from the nominal model down, step by step, with what repeats alone would give."""
+    figure = Figure(figsize=(max(4.6, 1.5 * len(steps)), 3.2), layout="constrained")
+    ax, names, Q = figure.subplots(), list(steps), np.array(list(steps.values()))
+    colours = [BEFORE, *["#aab4bf"] * max(0, len(Q) - 2), AFTER][: len(Q)]
+    ax.bar(names, Q, color=colours, width=0.62)
+    for k in range(1, len(Q)):
+        ax.plot([k - 1.31, k + 0.31], [Q[k - 1]] * 2, color="#888888", lw=0.7, ls=":")
+    for k, value in enumerate(Q):
+        gain = f"\n{100 * (value / Q[0] - 1):+.0f} %" if k and Q[0] else ""
+        ax.annotate(f"{value:.4g}{gain}", (k, value), ha="center", va="bottom", fontsize=8)
+    if floor is not None and np.isfinite(floor):
+        ax.axhline(floor, color=TEST, lw=0.9, ls="--")
+        ax.annotate("noise floor", (len(Q) - 0.5, floor), ha="right", va="bottom", fontsize=8)
+    ax.set(ylabel="Q", ylim=(0, 1.22 * float(np.nanmax(Q)) or 1.0))
+    ax.spines[["top", "right"]].set_visible(False)
+    return save(figure, path)
+
+
+def deviation_map(
+    path: Path | str, Q: np.ndarray, channels: Sequence[str], bands: Sequence[str], title: str = ""
+) -> Path:
+    """Deviation per channel (rows) and band (columns)."""
+    figure = Figure(
+        figsize=(0.7 * len(bands) + 2.4, 0.24 * len(channels) + 1.4), layout="constrained"
+    )
+    ax = figure.subplots()
+    shown = ax.imshow(Q, cmap="magma_r", aspect="auto", vmin=0)
+    ax.set_xticks(range(len(bands)), bands, rotation=45, fontsize=8)
+    ax.set_yticks(range(len(channels)), channels, fontsize=7)
+    ax.set_title(title, loc="left", **TITLE)
+    figure.colorbar(shown, ax=ax, label="Q")
+    return save(figure, path)
+
+
+def _curves(upper: Axes, lower: Axes | None, curves: Curves) -> None:
+    for k, (name, (frequency, H)) in enumerate(curves.items()):
+        style = _style(name, k)
+        upper.plot(frequency, np.abs(H), label=name, **style)
+        if lower is not None:
+            lower.plot(frequency, _broken(np.degrees(np.angle(H))), **style)
+
+
+def _style(name: str, k: int) -> dict[str, Any]:
+    return _STYLES.get(name) or {"color": _MORE[k % len(_MORE)], "lw": 1.2}
+
+
+def _broken(phase: np.ndarray) -> np.ndarray:
+    """Phase with gaps where it wraps, so that no vertical lines are drawn."""
+    shown = np.array(phase, dtype=float)
+    shown[1:][np.abs(np.diff(phase)) > 270] = np.nan
+    return shown
+
+
+def _bands(ax: Axes, bands: Bands, colour: str, alpha: float) -> None:
+    for low, high in bands:
+        ax.axvspan(low, high, color=colour, alpha=alpha, lw=0, zorder=0)

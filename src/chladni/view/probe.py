@@ -1,0 +1,117 @@
+"""Which off-screen window VTK can open here: asked once, in a child, because it may crash.
+
+Where neither EGL nor OSMesa is installed VTK ends the process with a segmentation fault instead of
+raising, so the question is put to a child process and the answer is kept in the user's cache.
+The environment variable ``CHLADNI_GRAPHICS`` overrides it: ``egl``, ``osmesa`` or ``matplotlib``.
+"""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from ctypes.util import find_library
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ..errors import FileError
+from ..output import write_json
+
+WINDOWS = {"osmesa": "vtkOSOpenGLRenderWindow", "egl": "vtkEGLRenderWindow"}
+ADVICE = (
+    "pictures are drawn with matplotlib; for smoothly shaded ones install a graphics library "
+    "(Debian, Ubuntu: apt-get install libosmesa6, or libegl1 libgl1-mesa-dri)"
+)
+_CHILD = """
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
+plotter.add_mesh(pyvista.Sphere(), color="red")
+image = plotter.screenshot(None, return_img=True)
+raise SystemExit(0 if image.std() > 1 else 1)
+"""
+
+
+@cache
+def window() -> str | None:
+    """Name of the VTK window class to use, or None where pictures fall to matplotlib."""
+    if wish := os.environ.get("CHLADNI_GRAPHICS", "").lower():
+        if wish not in (*WINDOWS, "matplotlib"):
+            raise FileError(
+                f"CHLADNI_GRAPHICS is {wish!r}; there are {', '.join(WINDOWS)}, matplotlib"
+            )
+        return WINDOWS.get(wish)
+    store = cache_folder() / "graphics.json"
+    known, key = _read(store), _machine()
+    if key not in known:
+        try:
+            known = {key: next(filter(opens, WINDOWS.values()), None)}
+        except subprocess.TimeoutExpired:
+            return None  # a busy machine is no reason to remember "nothing works"
+        _keep(store, known)
+    return known[key]
+
+
+def opens(window_class: str, seconds: float = 60.0) -> bool:
+    """Whether a child process with this window class draws a sphere and lives."""
+    environment = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": window_class}
+    environment.pop("DISPLAY", None)
+    command = [sys.executable, "-c", _CHILD]
+    done = subprocess.run(command, env=environment, capture_output=True, timeout=seconds)
+    return done.returncode == 0
+
+
+def prepare() -> bool:
+    """Point VTK at the window class that works; False where matplotlib must do."""
+    found = window()
+    if found is None:
+        return False
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", found)
+    return True
+
+
+def cache_folder() -> Path:
+    """The user's cache folder, or one in the temporary folder if that cannot be made."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for folder in (base / "chladni", Path(tempfile.gettempdir()) / f"chladni-{_user()}"):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="chladni-"))
+
+
+def _user() -> int:
+    return os.getuid() if hasattr(os, "getuid") else 0
+
+
+def _machine() -> str:
+    """What the answer depends on; a library installed later changes it, so it is asked again."""
+    libraries = [find_library(name) or "-" for name in ("OSMesa", "EGL", "GL")]
+    versions = [platform.python_version(), _version("vtk"), _version("pyvista")]
+    return " ".join([platform.node(), *versions, *libraries])
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"
+
+
+def _read(store: Path) -> dict[str, str | None]:
+    try:
+        found = json.loads(store.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _keep(store: Path, known: dict[str, str | None]) -> None:
+    try:
+        write_json(store, known)
+    except OSError:
+        return  # asked again next time

@@ -1,0 +1,263 @@
+"""Off-screen pictures of structures: modes, maps, sensors, places. No display, no window.
+
+Every function takes plain arrays (a :class:`~chladni.view.surface.Surface`), writes one PNG or GIF
+and returns its path. Lengths are in metres, the scale bar says so in the unit that reads best.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..errors import ShapeError
+from . import paper
+from .camera import Camera, best_view
+from .canvas import Paint, draw
+from .surface import Surface
+
+_SWING = 0.07  # largest displacement drawn, as a part of the structure's size
+_MANY = 6000  # above so many faces element edges would only blacken the picture
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A sensor or a shaker: place [m], unit direction, text."""
+
+    point: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    label: str = ""
+
+
+def mode_shape(
+    path: Path | str, seen: Surface, shape: np.ndarray, frequency: float, name: str = "mode"
+) -> Path:
+    """Deformed surface coloured by displacement, with its undeformed outline.
+
+    Parameters
+    ----------
+    shape : (n, 3)   displacement of every point, any scale; complex is turned to its largest phase
+    frequency :      [Hz]
+    """
+    figure, ax = _sheet(camera := _roomy(seen))
+    _swung(ax, seen, _real(shape), camera)
+    ax.set_title(f"{name}: {frequency:.4g} Hz", **paper.TITLE)
+    _scale_bar(ax, camera)
+    return paper.save(figure, path)
+
+
+def montage(
+    path: Path | str,
+    seen: Surface,
+    shapes: np.ndarray,
+    frequency: np.ndarray,
+    first: int = 1,
+    columns: int = 4,
+) -> Path:
+    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from ``first``."""
+    camera, r = _roomy(seen), shapes.shape[2]
+    columns = min(columns, r)
+    rows = -(-r // columns)
+    tile = 12.0 / columns
+    figure = Figure(figsize=(12.0, rows * (tile / max(camera.aspect, 0.7) + 0.32)))
+    for k in range(r):
+        ax = figure.add_axes(_cell(k, rows, columns))
+        _swung(ax, seen, _real(shapes[:, :, k]), camera)
+        ax.set_title(f"{first + k}    {frequency[k]:.4g} Hz", fontsize=10)
+    return paper.save(figure, path, dpi=140)
+
+
+def mode_gif(
+    path: Path | str,
+    seen: Surface,
+    shape: np.ndarray,
+    frequency: float,
+    name: str = "mode",
+    frames: int = 20,
+) -> Path:
+    """One period Re(φ e^{iωt}) that loops without a jump."""
+    camera, phi = _roomy(seen), _real(shape) if not np.iscomplexobj(shape) else shape
+    images = []
+    for angle in 2 * np.pi * np.arange(frames) / frames:
+        figure, ax = _sheet(camera, width=5.0)
+        _swung(ax, seen, np.real(phi * np.exp(1j * angle)), camera, peak=_peak(phi))
+        ax.set_title(f"{name}: {frequency:.4g} Hz", **paper.TITLE)
+        images.append(paper.pixels(figure))
+    return paper.save_gif(images, path)
+
+
+def scalar_map(
+    path: Path | str,
+    seen: Surface,
+    values: np.ndarray,
+    name: str,
+    unit: str = "",
+    cmap: str = "viridis",
+    limits: tuple[float, float] | None = None,
+    where: tuple[np.ndarray, float] | None = None,
+) -> Path:
+    """Colours by a value per face (m,) or per point (n,), with a colour bar.
+
+    A thickness, an energy, a difference; not-a-number is grey. ``where`` adds a circle (point,
+    radius) [m].
+    """
+    values = _fitting(seen, values)
+    finite = values[np.isfinite(values)]
+    low, high = limits or ((finite.min(), finite.max()) if finite.size else (0.0, 1.0))
+    if low == high:
+        low, high = low - 0.5 * abs(low) - 1e-12, high + 0.5 * abs(high) + 1e-12
+    figure, ax = _sheet(camera := best_view(seen), bar=True)
+    draw(ax, seen, camera, Paint(values, (low, high), cmap, len(seen.faces) < _MANY))
+    if where is not None:
+        _circle(ax, camera, *where)
+    paper.colour_bar(figure, ax, cmap, (low, high), f"{name} [{unit}]" if unit else name)
+    _scale_bar(ax, camera)
+    return paper.save(figure, path)
+
+
+def thickness_map(path: Path | str, seen: Surface, thickness: np.ndarray) -> Path:
+    """Thickness [m] of every face, shown in millimetres."""
+    return scalar_map(path, seen, 1e3 * np.asarray(thickness), "thickness", "mm", "cividis")
+
+
+def sensors(
+    path: Path | str, seen: Surface, outputs: Sequence[Marker], inputs: Sequence[Marker] = ()
+) -> Path:
+    """Where sensors (blue) and shakers (red) sit and which way they point."""
+    figure, ax = _sheet(camera := best_view(seen))
+    draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
+    reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
+    for markers, colour, name in (
+        (outputs, paper.AFTER, "sensor"),
+        (inputs, paper.BEFORE, "shaker"),
+    ):
+        _arrows(ax, camera, markers, colour, reach, name)
+    if outputs or inputs:
+        ax.legend(loc="upper right", bbox_to_anchor=(1.0, -0.01), ncols=2, **paper.LEGEND)
+    _scale_bar(ax, camera)
+    return paper.save(figure, path)
+
+
+def location(
+    path: Path | str, seen: Surface, point: np.ndarray, radius: float = 0.0, text: str = ""
+) -> Path:
+    """A place on the structure: a cross, the circle of its uncertainty, a sentence."""
+    figure, ax = _sheet(camera := best_view(seen))
+    draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
+    _circle(ax, camera, np.asarray(point), radius)
+    if text:
+        ax.set_title(text, **paper.TITLE, wrap=True)
+    _scale_bar(ax, camera)
+    return paper.save(figure, path)
+
+
+def _sheet(camera: Camera, width: float = 7.0, bar: bool = False) -> tuple[Figure, Axes]:
+    """A figure of the camera's proportions with room for a title (and a colour bar)."""
+    left, right = 0.02, 0.84 if bar else 0.98
+    picture = width * (right - left)
+    height = min(picture / camera.aspect, 1.3 * width)
+    figure = Figure(figsize=(width, height + 0.75))
+    total = height + 0.75
+    ax = figure.add_axes((left, 0.35 / total, right - left, height / total))
+    return figure, ax
+
+
+def _cell(k: int, rows: int, columns: int) -> tuple[float, float, float, float]:
+    i, j = divmod(k, columns)
+    return (j / columns, 1 - (i + 0.97) / rows, 1 / columns, 0.85 / rows)
+
+
+def _roomy(seen: Surface) -> Camera:
+    """The best view with room for the swing of a mode."""
+    camera, points = best_view(seen), seen.points[seen.used]
+    swing = _SWING * seen.size
+    reach = [swing * d * s for d in (camera.right, camera.up) for s in (0.5, -0.5)]
+    return camera.framing(np.concatenate([points + r for r in reach]), margin=0.02)
+
+
+def _swung(
+    ax: Axes, seen: Surface, shape: np.ndarray, camera: Camera, peak: float | None = None
+) -> None:
+    """A surface displaced by a shape whose largest value becomes a set part of its size."""
+    peak = _peak(shape) if peak is None else peak
+    moved = seen.moved(_SWING * seen.size / peak * shape)
+    colours = Paint(
+        np.linalg.norm(shape, axis=1) / peak,
+        (0.0, 1.0),
+        "viridis",
+        len(seen.faces) < _MANY,
+        seen.points[seen.outline()],
+    )
+    draw(ax, moved, camera, colours)
+
+
+def _peak(shape: np.ndarray) -> float:
+    return float(np.linalg.norm(np.abs(shape), axis=1).max()) or 1.0
+
+
+def _real(shape: np.ndarray) -> np.ndarray:
+    """The real shape at the phase where Σ φ² is real and largest."""
+    if not np.iscomplexobj(shape):
+        return np.asarray(shape, dtype=float)
+    return np.asarray(np.real(shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))))
+
+
+def _fitting(seen: Surface, values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, dtype=float)
+    if values.shape not in ((len(seen.faces),), (len(seen.points),)):
+        raise ShapeError(
+            f"{values.shape} values for {len(seen.faces)} faces and {len(seen.points)} points"
+        )
+    return values
+
+
+def _circle(ax: Axes, camera: Camera, point: np.ndarray, radius: float) -> None:
+    """The outline of a sphere is a circle in parallel projection."""
+    from matplotlib.patches import Circle
+
+    u, v = camera.project(np.asarray(point)[None])[0]
+    if radius > 0:
+        style = {"fc": (*paper.RED, 0.16), "ec": paper.RED, "lw": 1.8, "zorder": 5}
+        ax.add_patch(Circle((u, v), radius, clip_on=False, **style))
+    ax.plot(u, v, "+", ms=13, mew=2.4, color=paper.RED, zorder=6, clip_on=False)
+
+
+def _arrows(
+    ax: Axes, camera: Camera, markers: Sequence[Marker], colour: str, reach: float, name: str
+) -> None:
+    if not markers:
+        return
+    uv = camera.project(np.array([m.point for m in markers]))
+    tip = camera.project(np.array([m.direction for m in markers])) * reach
+    ax.plot(*uv.T, "o", ms=5, mfc=colour, mec="white", mew=0.7, zorder=6, label=name, clip_on=False)
+    for place, arrow, marker in zip(uv, tip, markers, strict=True):
+        style = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", place + arrow, place, arrowprops=style, zorder=6)  # type: ignore[arg-type]
+        paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
+
+
+def _scale_bar(ax: Axes, camera: Camera) -> None:
+    """A round length of about a fifth of the window, below the picture."""
+    u0, u1, v0, v1 = camera.window
+    length = round_length((u1 - u0) / 5)
+    v = v0 - 0.05 * (v1 - v0)
+    ax.plot(
+        [u0, u0 + length], [v, v], color="#222222", lw=2.2, solid_capstyle="butt", clip_on=False
+    )
+    unit = f"{1e3 * length:g} mm" if length < 1 else f"{length:g} m"
+    beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
+    ax.annotate(unit, (u0 + length, v), (5, 0), **beside, annotation_clip=False)
+    ax.set(xlim=(u0, u1), ylim=(v0, v1))
+
+
+def round_length(most: float) -> float:
+    """The largest 1, 2 or 5 times a power of ten that is not above ``most``.
+
+    >>> round_length(0.37)
+    0.2
+    """
+    base = 10.0 ** np.floor(np.log10(most))
+    return float(max(k * base for k in (1, 2, 5) if k * base <= most * (1 + 1e-12)))

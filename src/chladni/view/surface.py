@@ -1,0 +1,133 @@
+"""What a picture shows: points, faces and lines, taken from plain arrays or from an assembly."""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from ..arrays import readonly
+from ..errors import ModelError, ShapeError
+from ..model.assembly import Assembly
+
+_SIDES = {  # faces of a solid by its number of nodes; a triangle repeats its last node
+    8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    6: ((0, 2, 1, 1), (3, 4, 5, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    4: ((0, 2, 1, 1), (0, 1, 3, 3), (1, 2, 3, 3), (2, 0, 3, 3)),
+}
+
+
+def _no_rows(columns: int) -> np.ndarray:
+    return np.zeros((0, columns), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Faces and lines over points.
+
+    Attributes
+    ----------
+    points : (n, 3)        [m]
+    faces : (m, 4) int     rows of points; a triangle repeats its third node
+    lines : (k, 2) int     beams, bars, springs
+    part : (m,) int        part of each face; outlines are drawn where parts meet
+    """
+
+    points: np.ndarray
+    faces: np.ndarray = field(default_factory=lambda: _no_rows(4))
+    lines: np.ndarray = field(default_factory=lambda: _no_rows(2))
+    part: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        for name, columns in (("points", 3), ("faces", 4), ("lines", 2)):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[1] != columns:
+                raise ShapeError(f"{name} are {shape}, due is (n, {columns})")
+            object.__setattr__(self, name, readonly(np.asarray(getattr(self, name))))
+        if self.part is None:
+            object.__setattr__(self, "part", np.zeros(len(self.faces), dtype=np.int64))
+
+    @classmethod
+    def of(cls, points: np.ndarray, quads: np.ndarray, tris: np.ndarray | None = None) -> Self:
+        """Quadrilaterals first, triangles after them."""
+        tris = np.zeros((0, 3), np.int64) if tris is None else np.asarray(tris)
+        four = np.concatenate([np.asarray(quads).reshape(-1, 4), tris[:, [0, 1, 2, 2]]])
+        return cls(np.asarray(points, dtype=float), four.astype(np.int64))
+
+    def moved(self, displacement: np.ndarray) -> Self:
+        """The same faces over displaced points (n, 3) [m]."""
+        return replace(self, points=self.points + displacement)
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around the points in use [m]."""
+        used = self.points[self.used]
+        return float(np.linalg.norm(np.ptp(used, axis=0))) if len(used) else 1.0
+
+    @property
+    def used(self) -> np.ndarray:
+        """Rows of the points that any face or line needs."""
+        held = np.concatenate([self.faces.ravel(), self.lines.ravel()])
+        return np.unique(held) if len(held) else np.arange(len(self.points))
+
+    def areas(self) -> np.ndarray:
+        """Vector areas a = ½ d₁ × d₂ of the faces (m, 3) [m²], d the diagonals."""
+        a, b, c, d = (self.points[self.faces[:, k]] for k in range(4))
+        return np.asarray(0.5 * np.cross(c - a, d - b))
+
+    def normals(self) -> np.ndarray:
+        """Unit normals of the faces (m, 3)."""
+        a = self.areas()
+        return a / np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-300)
+
+    def outline(self, crease: float = 35.0) -> np.ndarray:
+        """Edges (k, 2) that show the form: free, between parts, or folded by ``crease`` degrees."""
+        edges = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], -1), axis=-1)
+        owner = np.repeat(np.arange(len(self.faces)), 4)
+        edges = edges.reshape(-1, 2)
+        real = edges[:, 0] != edges[:, 1]
+        edges, owner = edges[real], owner[real]
+        order = np.lexsort((edges[:, 1], edges[:, 0]))
+        edges, owner = edges[order], owner[order]
+        first = np.r_[True, np.any(edges[1:] != edges[:-1], axis=1)] if len(edges) else np.array([])
+        begin = np.flatnonzero(first)
+        count = np.diff(np.r_[begin, len(edges)])
+        shown = count != 2
+        pair = begin[~shown]
+        one, two = owner[pair], owner[pair + 1]
+        n, part = self.normals(), np.asarray(self.part)
+        fold = np.abs(np.einsum("ij,ij->i", n[one], n[two])) < np.cos(np.radians(crease))
+        shown[~shown] = fold | (part[one] != part[two])
+        return np.concatenate([edges[begin[shown]], self.lines])
+
+
+def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Outer faces (m, 4), their part (m,) and their solid (m,) of solids with 8, 6 or 4 nodes."""
+    sides = np.array(_SIDES[nodes.shape[1]])
+    faces = nodes[:, sides].reshape(-1, 4)
+    owner = np.repeat(np.arange(len(nodes)), len(sides))
+    _, at, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    at = np.sort(at[count == 1])
+    return faces[at], np.asarray(part)[owner[at]], owner[at]
+
+
+def surface(assembly: Assembly) -> Surface:
+    """All that can be seen of an assembly: shells, skins of solids, beams, springs, bushes.
+
+    The shells' faces come first and in the deck's order, so a value per shell is a value per face.
+    """
+    faces, parts = [assembly.shells.nodes], [assembly.shells.part]
+    for solids in assembly.solids:
+        outer, part, _ = skin(solids.nodes, solids.part)
+        faces.append(outer)
+        parts.append(part)
+    pairs = [assembly.beams.nodes, assembly.springs.nodes, assembly.bushes.nodes]
+    lines = np.concatenate(pairs).astype(np.int64)
+    seen = Surface(
+        np.asarray(assembly.points, dtype=float),
+        np.concatenate(faces).astype(np.int64),
+        lines[(lines >= 0).all(axis=1)],
+        np.concatenate(parts).astype(np.int64),
+    )
+    if not len(assembly.points):
+        raise ModelError("there is nothing to draw: the deck has no grids")
+    return seen
