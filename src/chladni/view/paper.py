@@ -68,4 +68,5 @@ def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str) -> None:
 
     halo = [withStroke(linewidth=2.2, foreground="white")]
     style: dict[str, Any] = {"fontsize": 7.5, "color": colour, "ha": "center", "va": "center"}
-    ax.text(*place, text, **style, path_effects=halo, zorder=7, clip_on=False)
+    u, v = place.tolist()
+    ax.text(u, v, text, **style, path_effects=halo, zorder=7, clip_on=False)

@@ -1,7 +1,7 @@
 """Curves and matrices of a vibration test, as matplotlib figures without global state.
 
-Each function writes one picture (PNG, SVG or PDF by the suffix) and returns its path. Test is black,
-the model before is orange and dashed, the model after is blue: distinct in grey and to any eye.
+Each function writes one picture (PNG, SVG or PDF by the suffix) and returns its path. Test is
+black, the model before orange and dashed, the model after blue: distinct in grey and to any eye.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,9 +18,9 @@ from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
 Curves = Mapping[str, tuple[np.ndarray, np.ndarray]]  # name: frequency [Hz] (n,), complex H (n,)
 Bands = Sequence[tuple[float, float]]
 _STYLES: dict[str, dict[str, Any]] = {
-    "test": {"color": TEST, "lw": 1.5, "zorder": 3},
+    "test": {"color": TEST, "lw": 2.3, "alpha": 0.8, "zorder": 3},
     "before": {"color": BEFORE, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 2},
-    "after": {"color": AFTER, "lw": 1.4, "zorder": 4},
+    "after": {"color": AFTER, "lw": 1.1, "zorder": 4},
 }
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
