@@ -1,0 +1,90 @@
+"""Executive and case control: which solution, and what each subcase selects."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+_SOLUTIONS: Final = {
+    "SESTATIC": 101, "SESTATICS": 101, "STATIC": 101, "STATICS": 101,
+    "SEMODES": 103, "MODES": 103, "SEDFREQ": 108, "SEMFREQ": 111, "SEBUCKL": 105,
+    "SEDCEIG": 107, "SEMCEIG": 110, "SEDTRAN": 109, "SEMTRAN": 112,
+}  # fmt: skip
+_COSMIC: Final = {1: 101, 3: 103, 8: 108, 11: 111}
+_SELECTS: Final = {
+    "SPC": "SPC", "MPC": "MPC", "LOAD": "LOAD", "METHOD": "METHOD", "METH": "METHOD",
+    "FREQ": "FREQ", "FREQUENCY": "FREQ", "FREQUENC": "FREQ", "DLOAD": "DLOAD",
+    "SDAMP": "SDAMP", "SDAMPING": "SDAMP", "SUPORT1": "SUPORT", "SUPORT": "SUPORT",
+    "LOADSET": "LOADSET", "K2GG": "K2GG", "M2GG": "M2GG", "B2GG": "B2GG",
+    "K2PP": "K2PP", "M2PP": "M2PP", "B2PP": "B2PP",
+}  # fmt: skip
+_COMMAND = re.compile(r"^\s*([A-Z]\w*)\s*(?:\([^)]*\))?\s*=\s*([\w.]+)")
+_SUBCASE = re.compile(r"^\s*(SUBCASE|SUBCOM|SYM|REPCASE)\s*=?\s*(\d+)", re.I)
+_SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
+
+
+@dataclass(frozen=True)
+class Subcase:
+    """What one subcase selects: {"SPC": 1, "LOAD": 2, ...}."""
+
+    id: int
+    selects: dict[str, int]
+    matrices: dict[str, str] = field(default_factory=dict)  # direct matrices: K2GG, M2PP...
+
+    def get(self, what: str) -> int:
+        """Set id selected, 0 where none is."""
+        return self.selects.get(what, 0)
+
+
+@dataclass(frozen=True)
+class CaseControl:
+    """Solution number (0: not stated) and the subcases; always at least one where there are any."""
+
+    sol: int = 0
+    subcases: tuple[Subcase, ...] = ()
+    present: bool = False
+
+
+def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
+    """Parse the lines before BEGIN BULK; ``sections``: there is a case control at all."""
+    sol, common, cases, current = 0, _Case(0), [], None
+    for line in lines:
+        text = line.split("$")[0]
+        if found := _SOL.match(text):
+            sol = _solution(found[1])
+        elif found := _SUBCASE.match(text):
+            current = _Case(int(found[2]))
+            cases.append(current)
+        elif found := _COMMAND.match(text.upper()):
+            (current or common).add(found[1], found[2])
+    made = [case.over(common) for case in cases] or [common.over(_Case(0))]
+    return CaseControl(sol, tuple(made) if sections else (), sections)
+
+
+class _Case:
+    """A subcase being read."""
+
+    def __init__(self, id: int) -> None:
+        self.id = id
+        self.selects: dict[str, int] = {}
+        self.matrices: dict[str, str] = {}
+
+    def add(self, command: str, value: str) -> None:
+        """Keep a selection; anything else is output requests."""
+        name = _SELECTS.get(command)
+        if name and value.isdecimal():
+            self.selects[name] = int(value)
+        elif name and "2" in name:
+            self.matrices[name] = value
+
+    def over(self, common: "_Case") -> Subcase:
+        """The subcase with what stands above all subcases."""
+        return Subcase(
+            self.id, {**common.selects, **self.selects}, {**common.matrices, **self.matrices}
+        )
+
+
+def _solution(word: str) -> int:
+    if word.isdecimal():
+        return _COSMIC.get(int(word), int(word))
+    return _SOLUTIONS.get(word.upper(), 0)

@@ -1,0 +1,139 @@
+"""Numbers as Nastran writes them: "1.5-3", "1.", "1.D+3", ".5"; whole columns at once."""
+
+import numpy as np
+
+_DIGIT_OR_DOT = np.zeros(256, bool)
+_DIGIT_OR_DOT[list(b"0123456789.")] = True
+
+
+def bytes_matrix(text: np.ndarray) -> np.ndarray:
+    """(n, width) uint8 of fixed-width byte strings (n,)."""
+    text = np.ascontiguousarray(text)
+    return text.view(np.uint8).reshape(len(text), text.dtype.itemsize)
+
+
+def spell_exponents(text: np.ndarray) -> np.ndarray:
+    """Exponents spelled out: 1.5-3 -> 1.5E-3, 1.D+3 -> 1.E+3, for byte strings (n,)."""
+    c = bytes_matrix(text)
+    c = np.where(c == ord("D"), ord("E"), c).astype(np.uint8)
+    bare = (c == ord("+")) | (c == ord("-"))
+    bare[:, 1:] &= _DIGIT_OR_DOT[c[:, :-1]]
+    bare[:, 0] = False
+    rows = np.flatnonzero(bare.any(axis=1))
+    out = np.zeros((len(c), c.shape[1] + 1), np.uint8)
+    out[:, :-1] = c
+    at = bare[rows].argmax(axis=1)[:, None]
+    place = np.arange(out.shape[1])
+    shifted = np.take_along_axis(out[rows], place - (place > at), axis=1)
+    out[rows] = np.where(place == at, ord("E"), shifted)
+    return out.view(f"S{out.shape[1]}").ravel()
+
+
+def _first_bad(text: np.ndarray, parse: type) -> int:
+    for k, word in enumerate(text.tolist()):
+        try:
+            parse(word)
+        except ValueError:
+            return k
+    return -1
+
+
+def _parsed(text: np.ndarray, kind: type) -> tuple[np.ndarray, int]:
+    try:
+        return text.astype(kind), -1
+    except (ValueError, OverflowError):
+        bad = _first_bad(text, kind)
+        return np.zeros(len(text), kind), max(bad, 0)
+
+
+def reals(text: np.ndarray, blank: float) -> tuple[np.ndarray, int]:
+    """(values (n,), position of the first that is no number or -1) of stripped byte strings."""
+    if not len(text):
+        return np.zeros(0), -1
+    empty = text == b""
+    text = np.where(empty, b"0", text)
+    values, bad = _parsed(text, float)
+    if bad >= 0:
+        values, bad = _parsed(spell_exponents(text), float)
+    if bad < 0 and not np.all(np.isfinite(values)):
+        bad = int(np.argmin(np.isfinite(values)))
+    return np.where(empty, blank, values), bad
+
+
+def integers(text: np.ndarray, blank: int) -> tuple[np.ndarray, int]:
+    """(values (n,), position of the first that is no integer or -1) of stripped byte strings."""
+    if not len(text):
+        return np.zeros(0, np.int64), -1
+    empty = text == b""
+    values, bad = _parsed(np.where(empty, b"0", text), np.int64)
+    return np.where(empty, blank, values), bad
+
+
+def _fixed(value: float, width: int) -> list[str]:
+    """Fixed-point spellings, the longest first."""
+    texts = (f"{value:.{digits}f}" for digits in range(width, -1, -1))
+    texts = (t if "." in t else t + "." for t in texts)
+    return [t.replace("0.", ".", 1) if t.lstrip("-").startswith("0.") else t for t in texts]
+
+
+def _exponent(value: float, width: int) -> list[str]:
+    """Nastran's short exponents, 1.234-5, the longest first."""
+    out = []
+    for digits in range(width, -1, -1):
+        mantissa, power = f"{value:.{digits}e}".split("e")
+        out.append((mantissa if "." in mantissa else mantissa + ".") + f"{int(power):+d}")
+    return out
+
+
+def _shortest(text: str) -> str:
+    """The same number without useless zeros: 1.500-3 -> 1.5-3."""
+    cut = max(text.rfind("+"), text.rfind("-"))
+    mantissa, power = (text[:cut], text[cut:]) if cut > 0 else (text, "")
+    mantissa = mantissa.rstrip("0")
+    return ("0." if mantissa in (".", "-.") else mantissa) + power
+
+
+def real(value: float, width: int = 8) -> str:
+    """The most precise spelling of a real in so many columns.
+
+    >>> real(0.001234567), real(-123456.789), real(1.5), real(2.1e11)
+    ('.0012346', '-123457.', '1.5', '2.1+11')
+    >>> real(0.001234567, 16)
+    '.001234567'
+    """
+    value = float(value)
+    best, error = "", np.inf
+    for spellings in (_fixed(value, width), _exponent(value, width)):
+        for text in spellings:
+            short = _shortest(text)
+            if len(short) <= width:
+                off = abs(parse_real(short) - value)
+                if off < error or (off == error and len(short) < len(best)):
+                    best, error = short, off
+                break
+    return best
+
+
+def parse_real(text: str) -> float:
+    """Value of one Nastran real; nan where the text is none."""
+    values, bad = reals(np.array([text.strip().upper().encode()]), 0.0)
+    return float("nan") if bad >= 0 else float(values[0])
+
+
+def field(value: float | int | str | None, width: int = 8) -> str:
+    """A field's text: reals as precise as the width allows, integers and words as they are."""
+    if value is None:
+        return ""
+    if isinstance(value, str | int | np.integer) and not isinstance(value, bool):
+        return str(value)
+    return real(float(value), width)
+
+
+def fits(value: float | int | str | None, width: int = 8, tolerance: float = 1e-6) -> bool:
+    """True where so many columns hold the value to the relative tolerance."""
+    text = field(value, width)
+    if len(text) > width:
+        return False
+    if isinstance(value, float | np.floating):
+        return abs(parse_real(text) - value) <= tolerance * abs(value)
+    return True
