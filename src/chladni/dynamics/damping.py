@@ -1,0 +1,92 @@
+"""Where damping ratios come from, and matrices that carry them."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import ShapeError
+from .modes import ModalModel
+from .system import System
+
+Kind = Literal["g", "crit", "q"]
+
+
+@dataclass(frozen=True, eq=False)
+class DampingTable:
+    """Modal damping against frequency (Nastran's TABDMP1).
+
+    Attributes
+    ----------
+    frequency : (k,)  Hz, not decreasing; a doubled frequency is a jump, its mean counts there
+    value : (k,)      structural damping g (``kind`` "g", Nastran's default when TYPE is absent),
+                      fraction of critical ("crit") or quality factor ("q")
+    """
+
+    frequency: np.ndarray
+    value: np.ndarray
+    kind: Kind = "g"
+
+    def __post_init__(self) -> None:
+        if np.shape(self.frequency) != np.shape(self.value) or len(self.frequency) < 1:
+            raise ShapeError(
+                f"{np.shape(self.frequency)} frequencies, {np.shape(self.value)} values"
+            )
+        if np.any(np.diff(self.frequency) < 0):
+            raise ShapeError(f"frequencies of a damping table must not fall: {self.frequency}")
+
+    def ratio(self, frequency: np.ndarray) -> np.ndarray:
+        """ζ = g/2 or 1/2Q, linear between the points and beyond the ends."""
+        y = _piecewise(np.asarray(frequency, float), self.frequency, self.value)
+        return {"g": y / 2, "crit": y, "q": 1 / (2 * np.where(y == 0, np.inf, y))}[self.kind]
+
+
+def _piecewise(x: np.ndarray, knots: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Linear interpolation; beyond the ends along the last segment of some length."""
+    u = np.unique(knots)
+    if len(u) == 1:
+        return np.full(x.shape, float(np.mean(value)))
+    left = np.array([value[knots == a][0] for a in u])
+    right = np.array([value[knots == a][-1] for a in u])
+    k = np.clip(np.searchsorted(u, x, side="right") - 1, 0, len(u) - 2)
+    y = right[k] + (x - u[k]) * (left[k + 1] - right[k]) / (u[k + 1] - u[k])
+    at = np.searchsorted(u, x)
+    hit = (at < len(u)) & (u[np.minimum(at, len(u) - 1)] == x)
+    at = np.minimum(at, len(u) - 1)
+    return np.where(hit, (left[at] + right[at]) / 2, y)
+
+
+def with_table(modal: ModalModel, table: DampingTable) -> ModalModel:
+    """The modes with damping ratios read from a table at their frequencies."""
+    return modal.with_damping(table.ratio(modal.frequency))
+
+
+def hysteretic(system: System, g: float) -> System:
+    """K (1 + i g): structural damping of the whole (PARAM,G)."""
+    return replace(system, K=sp.csr_array(system.K * (1 + 1j * g)))
+
+
+def modal_damping(system: System, modal: ModalModel) -> tuple[np.ndarray, np.ndarray]:
+    """V = U diag(d) Uᵀ with U = M Φ (n, r) and d = 2 ζ_r ω_r: damps mode r by ζ_r, no other.
+
+    With unit modal masses this is M X diag(2 ζ ω m) Xᵀ M (Abrahamsson and Kammer 2015, 26.14).
+    """
+    return system.M @ modal.shapes, 2 * modal.damping * 2 * np.pi * modal.frequency
+
+
+def with_modal_damping(system: System, modal: ModalModel) -> System:
+    """The system with V = M Φ diag(2 ζ ω) Φᵀ M, a full matrix: for small systems."""
+    U, d = modal_damping(system, modal)
+    return replace(system, V=sp.csr_array((U * d) @ U.T))
+
+
+def equalised_poles(poles: np.ndarray, zeta: float) -> np.ndarray:
+    """|p| (-ζ₀ ± i √(1 - ζ₀²)) for each pole p: undamped frequency kept, damping ratio ζ₀."""
+    turned = -zeta + 1j * np.sqrt(1 - zeta**2) * np.where(np.imag(poles) < 0, -1, 1)
+    return np.abs(poles) * turned
+
+
+def equalising_line(frequency: np.ndarray, zeta: float) -> np.ndarray:
+    """ω (ζ_e + i), the line s [rad/s]: undamped poles seen from here look damped by about ζ_e."""
+    return 2 * np.pi * np.asarray(frequency) * (zeta + 1j)

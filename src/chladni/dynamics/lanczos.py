@@ -1,0 +1,171 @@
+"""Block Lanczos with full orthogonalisation in the mass inner product.
+
+The operator is A⁻¹M with A = K - σM; its largest eigenvalues θ = 1/(λ - σ) belong to the lowest λ.
+Grimes, Lewis and Simon 1994 (SIAM J. Matrix Anal. 15, 228), without their selective reduction: the
+block recurrence takes out all but rounding, one pass over the basis takes out the rest.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cholesky, eigh, solve_triangular
+
+_DROP = 1e-13  # of the operator's norm: a direction this small carries nothing new
+_THIN = 1e-5  # of it: rounding in such a column is large enough to orthogonalise once more
+_UNEVEN = 1e-2  # between columns of a block: their Gram matrix has lost its square in digits
+
+
+@dataclass(frozen=True, eq=False)
+class Ritz:
+    """Approximate eigenpairs, best first.
+
+    Attributes
+    ----------
+    theta : (m,)      Ritz values of A⁻¹M, falling
+    error : (m,)      |A⁻¹M x - θ x|_M / θ as the recurrence tells it
+    basis : (n, m)    M-orthonormal Q
+    weights : (m, m)  S; the vectors are Q S
+    """
+
+    theta: np.ndarray
+    error: np.ndarray
+    basis: np.ndarray
+    weights: np.ndarray
+
+    def vectors(self, k: int) -> np.ndarray:
+        """The first k Ritz vectors (n, k), M-orthonormal."""
+        return np.asfortranarray(self.basis @ self.weights[:, :k])
+
+
+def block_lanczos(
+    solve: Callable[[np.ndarray], np.ndarray],
+    M: sp.csr_array,
+    k: int,
+    *,
+    block: int = 8,
+    locked: np.ndarray | None = None,
+    tolerance: float = 1e-9,
+    largest_basis: int | None = None,
+    seed: int = 0,
+) -> Ritz:
+    """The k largest θ of A⁻¹M x = θ x and whatever else the basis holds.
+
+    Parameters
+    ----------
+    solve : (n, b) -> (n, b)     applies A⁻¹, A positive definite
+    M : (n, n)                   positive semidefinite
+    locked : (n, l), optional    M-orthonormal vectors already found, kept out of the basis
+    tolerance : float            on ``Ritz.error`` of the first k
+    largest_basis : int          where to stop unconverged (the caller looks at ``error``)
+    """
+    n = M.shape[0]
+    run = _Run(M, locked, min(n, largest_basis or max(6 * k, 200)) + block)
+    rng = np.random.default_rng(seed)
+    run.start(solve(M @ rng.standard_normal((n, block))))
+    while True:
+        run.step(solve)
+        full = run.size + block > run.capacity or run.size >= n
+        if run.size >= k and (full or run.due(k)):
+            ritz = run.ritz()
+            if full or np.all(ritz.error[:k] < tolerance):
+                return ritz
+        if run.exhausted:
+            run.start(solve(M @ rng.standard_normal((n, block))))
+            if run.exhausted:
+                return run.ritz()
+
+
+class _Run:
+    """The growing basis; Q in Fortran order so that its products are plain BLAS-3."""
+
+    def __init__(self, M: sp.csr_array, locked: np.ndarray | None, capacity: int) -> None:
+        self.M, self.locked, self.capacity = M, locked, capacity
+        self.Q = np.empty((M.shape[0], capacity), order="F")
+        self.H = np.zeros((capacity, capacity))
+        self.size, self.norm, self._checked = 0, 0.0, 0
+        self.last = self.before = slice(0, 0)  # columns of the last two blocks
+        self.MQ = np.empty((M.shape[0], 0))  # M times the last block
+        self.coupling = np.zeros((0, 0))  # R of the last step: W = Q_next R
+
+    @property
+    def exhausted(self) -> bool:
+        """No new direction left: what is in the basis is invariant."""
+        return self.last.stop - self.last.start == 0
+
+    def due(self, k: int) -> bool:
+        """Ritz values are looked at every few blocks only."""
+        wait = max(16, k // 6)
+        if self.size - self._checked < wait:
+            return False
+        self._checked = self.size
+        return True
+
+    def start(self, X: np.ndarray) -> None:
+        """A new block with no coupling to the ones before."""
+        X = np.asfortranarray(X)
+        X /= np.sqrt(np.maximum(np.einsum("ij,ij->j", X, self.M @ X), 1e-300))
+        X, MX = self._swept(*self._swept(X, self.M @ X))
+        self._append(X, MX, 1.0)
+        self.coupling = np.zeros((self.last.stop - self.last.start, 0))
+        self.before = slice(0, 0)
+
+    def step(self, solve: Callable[[np.ndarray], np.ndarray]) -> None:
+        """W = A⁻¹M Q_j - Q_j A_j - Q_{j-1} R_{j-1}ᵀ = Q_{j+1} R_j."""
+        j, W = self.last, np.asfortranarray(solve(self.MQ))
+        alpha = self.MQ.T @ W
+        W -= self.Q[:, j] @ alpha
+        if self.coupling.size:
+            W -= self.Q[:, self.before] @ self.coupling.T
+        self.H[j, j] = (alpha + alpha.T) / 2
+        self.norm = max(self.norm, np.abs(alpha).max())
+        W, MW = self._swept(W, self.M @ W)
+        self.before = j
+        self._append(W, MW, self.norm)
+        self.H[self.last, j], self.H[j, self.last] = self.coupling, self.coupling.T
+
+    def _swept(self, W: np.ndarray, MW: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """W - Q Qᵀ M W, with M W renewed unless the correction was rounding."""
+        kept = [self.Q[:, : self.size], *([] if self.locked is None else [self.locked])]
+        change = 0.0
+        for Q in kept:
+            C = Q.T @ MW
+            W -= Q @ C
+            change = max(change, np.abs(C).max(initial=0.0))
+        size = np.sqrt(np.abs(np.einsum("ij,ij->j", W, MW)).min(initial=np.inf))
+        return W, MW if change < 1e-11 * size else self.M @ W
+
+    def _append(self, W: np.ndarray, MW: np.ndarray, norm: float) -> None:
+        """Q R = W with QᵀMQ = I; columns that hold nothing new are left out."""
+        w, V = eigh(_symmetric(W.T @ MW))
+        keep = w > (_DROP * norm) ** 2
+        scale = np.sqrt(w[keep])
+        T, R = V[:, keep] / scale, (V[:, keep] * scale).T
+        Q, MQ = np.asfortranarray(W @ T), MW @ T
+        thin = np.any(scale < _THIN * norm)
+        uneven = np.any(scale < _UNEVEN * scale.max(initial=0.0))
+        for _ in range(3 if thin or uneven else 0):
+            Q, MQ = self._swept(Q, self.M @ Q) if thin else (Q, self.M @ Q)
+            G = _symmetric(Q.T @ MQ)
+            L = cholesky(G, lower=True)
+            Q, MQ = (np.asfortranarray(solve_triangular(L, Y.T, lower=True).T) for Y in (Q, MQ))
+            R = L.T @ R
+            if np.abs(G - np.eye(len(G))).max() < 1e-6:
+                break
+        self.last = slice(self.size, self.size + Q.shape[1])
+        self.Q[:, self.last], self.MQ, self.coupling = Q, MQ, R
+        self.size += Q.shape[1]
+
+    def ritz(self) -> Ritz:
+        """Eigenpairs of H over all blocks but the last, whose row gives the error."""
+        m = self.last.start
+        theta, S = eigh(self.H[:m, :m])
+        theta, S = theta[::-1], S[:, ::-1]
+        rest = np.linalg.norm(self.coupling @ S[self.before], axis=0) if self.coupling.size else 0.0
+        error = rest / np.maximum(np.abs(theta), 1e-300) + np.zeros(m)
+        return Ritz(theta, error, self.Q[:, :m], S)
+
+
+def _symmetric(G: np.ndarray) -> np.ndarray:
+    return (G + G.T) / 2
