@@ -17,6 +17,7 @@ from ..dynamics.frf import FRF
 from ..errors import ChladniError, FileError
 from .setup import Function, Recording, Shapes
 from .uff_units import FileUnits, Meaning, file_units, meaning
+from .uff_write import write_uff as write_uff
 
 _KINDS = {1: "time", 2: "auto spectrum", 3: "cross spectrum", 9: "psd", 12: "spectrum"}
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
@@ -122,6 +123,8 @@ def _take_function(pile: _Pile, number: int, d: dict, quantity: str | None) -> N
     _check_points(d, where)
     output, input = _dof(d["rsp_node"], d["rsp_dir"]), _dof(d["ref_node"], d["ref_dir"])
     kind = int(d["func_type"])
+    if kind in (4, 5, 6) and d["ref_node"] == 0 and d["ref_dir"] != 0:
+        input = label(0, abs(d["ref_dir"]), d["ref_dir"]).replace("0:", "base:")
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(d["data"]) and d["ref_node"]):
         _take_frf(pile, number, d, (output, input), quantity)
     elif kind in (6, 26):
