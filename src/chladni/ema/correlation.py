@@ -1,0 +1,209 @@
+"""How alike two sets of modes, or a model's and a recording's responses, are.
+
+Sources: Allemang (2003), Sound and Vibration 37(8), 14-23 (MAC, COMAC, FRAC);
+Hunt (1992), IMAC X, 66-71 (enhanced COMAC); thesis eq. 4 (the deviation δ and Q).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..errors import LabelError, ShapeError
+
+_LN10 = np.log(10.0)
+
+
+def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """Modal assurance criterion |φᴴψ|² / (φᴴφ ψᴴψ), every mode of Φ against every mode of Ψ.
+
+    Parameters
+    ----------
+    phi, psi : (n, r), (n, q)   shapes by column, real or complex, any scale
+
+    Returns
+    -------
+    (r, q) in [0, 1]; 0 where a shape is zero everywhere
+
+    Examples
+    --------
+    >>> mac(np.eye(2), np.array([[1.0, 1.0], [0.0, 1.0]]))
+    array([[1. , 0.5], [0. , 0.5]])
+    """
+    if len(phi) != len(psi):
+        raise ShapeError(f"shapes over {len(phi)} and {len(psi)} dofs cannot be compared")
+    power = np.outer(_power(phi, 0), _power(psi, 0))
+    return _ratio(np.abs(phi.conj().T @ psi) ** 2, power)
+
+
+def auto_mac(phi: np.ndarray) -> np.ndarray:
+    """MAC of a set with itself: off-diagonal entries say which modes the sensors cannot tell."""
+    return mac(phi, phi)
+
+
+def _power(x: np.ndarray, axis: int) -> np.ndarray:
+    return np.asarray((np.abs(x) ** 2).sum(axis=axis))
+
+
+def _ratio(above: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """above / below, 0 where both vanish; rounding kept inside [0, 1]."""
+    safe = np.where(below > 0, below, 1.0)
+    return np.clip(np.where(below > 0, above / safe, 0.0), 0.0, 1.0)
+
+
+def subspace_mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """Share of each shape of Φ inside span Ψ, ‖QᴴΦ_r‖² / ‖Φ_r‖² with Ψ = QR (r,).
+
+    The MAC for close modes: shapes of a cluster may mix, the space they span may not.
+
+    >>> subspace_mac(np.array([[1.0], [1.0]]), np.eye(2))
+    array([1.])
+    """
+    if len(phi) != len(psi):
+        raise ShapeError(f"shapes over {len(phi)} and {len(psi)} dofs cannot be compared")
+    Q, _ = np.linalg.qr(psi)
+    return _ratio(_power(Q.conj().T @ phi, 0), _power(phi, 0))
+
+
+Convention = Literal["allemang", "enhanced"]
+
+
+def comac(phi: np.ndarray, psi: np.ndarray, convention: Convention = "allemang") -> np.ndarray:
+    """Coordinate MAC of every dof over paired modes (n,).
+
+    - ``allemang``: (Σ_r |φ_ir ψ_ir*|)² / (Σ_r |φ_ir|² Σ_r |ψ_ir|²): 1 is perfect; blind to signs;
+    - ``enhanced``: Σ_r |φ_ir - ψ_ir|² / (2 n_r) with shapes of largest entry 1 and aligned phase
+      (Hunt): 0 is perfect; a wrong sign, gain or swapped channel stands out.
+
+    Parameters
+    ----------
+    phi, psi : (n, r)   column r of one belongs to column r of the other
+    """
+    if phi.shape != psi.shape:
+        raise ShapeError(f"paired shapes must agree: {phi.shape} against {psi.shape}")
+    phi, psi = _aligned(phi, psi)
+    if convention == "allemang":
+        return _ratio(np.abs(phi * psi.conj()).sum(1) ** 2, _power(phi, 1) * _power(psi, 1))
+    if convention == "enhanced":
+        return np.asarray(_power(phi - psi, 1) / (2 * phi.shape[1]))
+    raise LabelError(f"no convention {convention!r}; there are allemang, enhanced")
+
+
+def _aligned(phi: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both with the scale that makes ψ the least-squares image of φ, largest |φ| = 1."""
+    phi = phi / np.abs(phi).max(axis=0)
+    factor = (psi.conj() * phi).sum(0) / np.maximum(_power(psi, 0), 1e-300)
+    return phi, psi * factor
+
+
+def wrapped(delta: np.ndarray) -> np.ndarray:
+    """A complex log₁₀ with its phase wrapped into ±π / ln 10.
+
+    >>> wrapped(np.array([1 + 2j * np.pi / np.log(10)]))
+    array([1.+0.j])
+    """
+    turn = 2 * np.pi / _LN10
+    return delta.real + 1j * (delta.imag - turn * np.round(delta.imag / turn))
+
+
+def deviation(model: FRF, test: FRF) -> np.ndarray:
+    """δ = log₁₀(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in) (thesis eq. 4).
+
+    Logarithmic, so an anti-resonance counts like a resonance.
+
+    Raises
+    ------
+    ShapeError
+        If labels, quantity or frequencies differ.
+    LabelError
+        If a channel is zero somewhere.
+    """
+    same = (model.outputs, model.inputs, model.quantity) == (
+        *(test.outputs, test.inputs),
+        test.quantity,
+    )
+    if not same or model.values.shape != test.values.shape:
+        raise ShapeError(
+            f"model ({model.values.shape}, {model.quantity}) and test ({test.values.shape}, "
+            f"{test.quantity}) differ in labels, lines or quantity; use FRF.sel and FRF.to first"
+        )
+    if not np.allclose(model.frequency, test.frequency, rtol=1e-6):
+        raise ShapeError("model and test are on different frequencies")
+    if not (test.values.all() and model.values.all()):
+        dead = ~(test.values.all(axis=(0, 2)) & model.values.all(axis=(0, 2)))
+        names = [o for o, d in zip(test.outputs, dead, strict=True) if d]
+        raise LabelError(f"a response of exactly zero has no logarithm: leave out {names[:6]}")
+    return wrapped(np.log(model.values / test.values) / _LN10)
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """Q = mean |δ|² over channels and lines, and where it comes from.
+
+    Attributes
+    ----------
+    Q : float                 mean |δ|²
+    total : float             Σ |δ|², the thesis' own, unnormalised
+    magnitude, phase : float  the shares of Q from |H| (log₁₀) and from the angle
+    channel : (n_out, n_in)   mean over lines
+    band : (n_bands,)         mean over the lines of each band
+    bands : ((low, high), ...)  [Hz]
+    """
+
+    Q: float
+    total: float
+    magnitude: float
+    phase: float
+    channel: np.ndarray
+    band: np.ndarray
+    bands: tuple[tuple[float, float], ...]
+
+
+def quality(
+    delta: np.ndarray,
+    frequency: np.ndarray,
+    bands: Sequence[tuple[float, float]] = (),
+    weight: np.ndarray | None = None,
+) -> Quality:
+    """Q = Σ w |δ|² / Σ w, with its decomposition.
+
+    Parameters
+    ----------
+    delta : (n_f, n_out, n_in) complex
+    frequency : (n_f,) Hz
+    bands : default: the whole
+    weight : (n_f, n_out, n_in), default: ones (zero leaves a line or channel out)
+    """
+    w = np.ones(delta.shape) if weight is None else np.broadcast_to(weight, delta.shape)
+    square = w * np.abs(delta) ** 2
+    total = max(float(w.sum()), 1e-300)
+    ends = tuple(bands) or ((float(frequency[0]), float(frequency[-1])),)
+    inside = [(low <= frequency) & (frequency <= high) for low, high in ends]
+    per_band = [square[k].sum() / max(w[k].sum(), 1e-300) for k in inside]
+    return Quality(
+        Q=float(square.sum() / total),
+        total=float(square.sum()),
+        magnitude=float((w * delta.real**2).sum() / total),
+        phase=float((w * delta.imag**2).sum() / total),
+        channel=square.sum(0) / np.maximum(w.sum(0), 1e-300),
+        band=np.array(per_band),
+        bands=ends,
+    )
+
+
+def frac(model: FRF, test: FRF) -> np.ndarray:
+    """FRF assurance |Σ_f H_A* H_X|² / (Σ|H_A|² Σ|H_X|²) of every channel (n_out, n_in)."""
+    if model.values.shape != test.values.shape:
+        raise ShapeError(f"FRFs of {model.values.shape} and {test.values.shape} cannot be compared")
+    cross = np.abs((model.values.conj() * test.values).sum(0)) ** 2
+    return _ratio(cross, _power(model.values, 0) * _power(test.values, 0))
+
+
+def response_assurance(model: FRF, test: FRF) -> np.ndarray:
+    """Assurance of the response pattern at every line: MAC over outputs (n_f, n_in)."""
+    if model.values.shape != test.values.shape:
+        raise ShapeError(f"FRFs of {model.values.shape} and {test.values.shape} cannot be compared")
+    cross = np.abs((model.values.conj() * test.values).sum(1)) ** 2
+    return _ratio(cross, _power(model.values, 1) * _power(test.values, 1))
