@@ -1,0 +1,250 @@
+"""From an assembly to the matrices of its free degrees of freedom.
+
+Every point has six motions in the basic frame, u = T q with q the free dofs: T turns displacement
+frames, carries rigid elements and constraint equations, and leaves out supports and dofs without
+stiffness. An element matrix A over any points adds Tᵀ A T.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.system import System
+from ..errors import LabelError, ModelError
+from ..model.assembly import Assembly
+from . import shell
+from .gather import accumulate, blocks, congruence, with_rotations
+from .shell_section import SectionArrays, section_arrays
+
+EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSPC
+PIECE = 4096  # shells whose matrices are in memory at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The assembled matrices and the way from the free dofs to any point's motion.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    T : (6 n_points, n_free) csr    motion of every point in the basic frame, u = T q
+    system : System                 M, V, K over the free dofs; K real
+    loss : (n_free, n_free) csr     imaginary part of the stiffness from materials' damping [N/m]
+    """
+
+    assembly: Assembly
+    T: sp.csr_array
+    system: System
+    loss: sp.csr_array
+
+    def scatter(self, matrices: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
+        """Tᵀ A T of element matrices A: (n_free, n_free).
+
+        Parameters
+        ----------
+        matrices : (m, 6k, 6k)      basic frame, nodal order ux uy uz rx ry rz
+        nodes : (m, k) int          rows of points
+        """
+        return congruence(self.T, blocks(matrices, nodes, len(self.assembly.points)))
+
+    def rows(self, dofs: np.ndarray) -> sp.csr_array:
+        """Motion at (point id, component 1-6) in the point's displacement frame: (k, n_free)."""
+        dofs = np.asarray(dofs, dtype=np.int64)
+        at, component = self.assembly.rows(dofs[:, 0]), dofs[:, 1] - 1
+        if np.any(bad := (component < 0) | (component > 5)):
+            raise LabelError(f"no component {dofs[bad][0, 1]} at a grid; there are 1 to 6")
+        axes = np.eye(3)[component % 3]
+        if self.assembly.axes is not None:
+            axes = self.assembly.axes[at, component % 3]
+        return self._directions(6 * at + 3 * (component // 3), axes)
+
+    def along(self, ids: np.ndarray, directions: np.ndarray) -> sp.csr_array:
+        """Translation of the points with these ids along directions (k, 3) of the basic frame."""
+        return self._directions(6 * self.assembly.rows(ids), np.asarray(directions, float))
+
+    def hysteretic(self) -> System:
+        """The system with the complex stiffness K (1 + i g) + i K_loss."""
+        s, g = self.system, self.assembly.structural_damping
+        return System(s.M, s.V, sp.csr_array(s.K * (1 + 1j * g) + 1j * self.loss), s.dofs)
+
+    def _directions(self, first: np.ndarray, axes: np.ndarray) -> sp.csr_array:
+        k = len(first)
+        columns = (first[:, None] + np.arange(3)).ravel()
+        pick = sp.csr_array(
+            (axes.ravel(), (np.repeat(np.arange(k), 3), columns)), shape=(k, self.T.shape[0])
+        )
+        pick.eliminate_zeros()
+        return sp.csr_array(pick @ self.T)
+
+
+def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure:
+    """Assemble M, V, K of all families and reduce them to the free dofs.
+
+    Parameters
+    ----------
+    residual_bending : bool
+        MacNeal's residual bending flexibility in shells (agreement with Nastran).
+
+    Raises
+    ------
+    ModelError
+        If nothing is left to move.
+    """
+    M, V, K, loss = _families(assembly, residual_bending)
+    T, dofs = _transformation(assembly)
+    held = _held(assembly, dofs)
+    T, dofs = sp.csr_array(T[:, ~held]), dofs[~held]
+    K, M = congruence(T, K), congruence(T, M)
+    idle = _without_stiffness(K, M, dofs, assembly.auto_spc)
+    kept = np.flatnonzero(~idle)
+    if not len(kept):
+        raise ModelError("no degree of freedom is left free; do the supports hold them all?")
+    if idle.any():
+        K, M, T, dofs = K[kept][:, kept], M[kept][:, kept], sp.csr_array(T[:, kept]), dofs[kept]
+    labels = np.column_stack([assembly.ids[dofs[:, 0]], dofs[:, 1]])
+    system = System(M, congruence(T, V), K, labels)
+    return Structure(assembly, T, system, congruence(T, loss))
+
+
+def _families(assembly: Assembly, residual_bending: bool) -> list[sp.csr_array]:
+    """M, V, K and the imaginary K of everything over all 6 n motions, basic frame."""
+    n = 6 * len(assembly.points)
+    total = [sp.csr_array((n, n)) for _ in range(4)]
+    for M, V, K, loss in _each_family(assembly, residual_bending):
+        for k, A in enumerate((M, V, K, loss)):
+            if A is not None and A.nnz:
+                total[k] = A if not total[k].nnz else sp.csr_array(total[k] + A)
+    return total
+
+
+Matrices = tuple[sp.csr_array, sp.csr_array | None, sp.csr_array, sp.csr_array | None]
+
+
+def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrices]:
+    """(M, V, K, loss) of each family that has members."""
+    n = len(assembly.points)
+    if len(assembly.shells):
+        yield _shells(assembly, residual_bending)
+    if any(map(len, assembly.solids)):
+        from . import solid
+
+        for nodes, K_e, M_e in solid.stiffness_and_mass(assembly):
+            K, M = (blocks(with_rotations(A), nodes, n) for A in (K_e, M_e))
+            yield M, None, K, None
+    if len(assembly.beams):
+        from . import beam
+
+        nodes, K_e, M_e = beam.stiffness_and_mass(assembly)
+        yield blocks(M_e, nodes, n), None, blocks(K_e, nodes, n), None
+    lumps = ("springs", "dampers", "scalar_masses", "bushes", "masses")
+    if any(len(getattr(assembly, name)) for name in lumps):
+        from . import spring
+
+        K, V, M, loss = spring.matrices(assembly)
+        yield M, V, K, loss
+
+
+def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:
+    """Shells in pieces; the mass lumped where the assembly says so."""
+    geo = shell.geometry(assembly.points, assembly.shells)
+    sections = section_arrays(assembly, geo, residual_bending=residual_bending)
+    lossy = bool(sections.loss.any())
+    parts = _pieces(assembly, geo, sections, lossy)
+    found = accumulate(geo.nodes, len(assembly.points), parts, 3 if lossy else 2)
+    return found[0], None, found[1], found[2] if lossy else None
+
+
+def _pieces(
+    assembly: Assembly, geo: shell.ShellGeometry, sections: SectionArrays, lossy: bool
+) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
+    """(rows, (M, K[, loss K])) of one piece after another."""
+    for start in range(0, len(geo), PIECE):
+        rows = slice(start, start + PIECE)
+        part, s, t = geo[rows], sections[rows], assembly.shells.thickness[rows]
+        K = shell.stiffness(part, t, **s.stiffness)
+        M = shell.mass(part, t, s.rho, s.nsm, coupled=assembly.coupled_mass)
+        yield rows, (M, K, s.loss[:, None, None] * K)[: 3 if lossy else 2]
+
+
+def _transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
+    """T (6n, independent) and the (row of point, component 1-6) of its columns."""
+    n = len(assembly.points)
+    if assembly.rigid:
+        from . import rigid
+
+        T, independent = rigid.transformation(assembly)
+        T, at = sp.csr_array(T), np.asarray(independent)
+    else:
+        T, at = frames(assembly), np.arange(6 * n)
+    return T, np.column_stack([at // 6, at % 6 + 1])
+
+
+def frames(assembly: Assembly) -> sp.csr_array:
+    """u_basic = T q with q counted in each point's displacement frame: csr (6n, 6n)."""
+    n = len(assembly.points)
+    if assembly.axes is None:
+        return sp.csr_array(sp.eye_array(6 * n, format="csr"))
+    turn = np.repeat(assembly.axes.swapaxes(1, 2), 2, axis=0)
+    T = sp.csr_array(sp.bsr_array((turn, np.arange(2 * n), np.arange(2 * n + 1))).tocsr())
+    T.eliminate_zeros()
+    return T
+
+
+def _held(assembly: Assembly, dofs: np.ndarray) -> np.ndarray:
+    """Supports, and all but the one motion of scalar points."""
+    held = np.zeros((len(assembly.points), 6), bool)
+    held[assembly.supports[:, 0], assembly.supports[:, 1] - 1] = True
+    if assembly.scalar_points is not None:
+        held[assembly.scalar_points, 1:] = True
+    return held[dofs[:, 0], dofs[:, 1] - 1]
+
+
+def _without_stiffness(
+    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, auto_spc: bool
+) -> np.ndarray:
+    """Dofs with neither stiffness nor mass, and with ``auto_spc`` those without stiffness.
+
+    AUTOSPC looks at the three translations and the three rotations of a point: where their 3 x 3
+    stiffness has a direction softer than ``EMPTY`` times the stiffest, the dof nearest to that
+    direction goes.
+    """
+    stiff = K.diagonal()
+    if not auto_spc:
+        return (stiff == 0) & (M.diagonal() == 0)
+    triple = 2 * dofs[:, 0] + (dofs[:, 1] > 3)
+    _, triple = np.unique(triple, return_inverse=True)
+    D = _diagonal_blocks(K, dofs, triple)
+    idle = np.zeros((len(D), 3), bool)
+    for k in _suspects(D):
+        idle[k] = _idle(D[k])
+    return idle[triple, (dofs[:, 1] - 1) % 3]
+
+
+def _diagonal_blocks(K: sp.csr_array, dofs: np.ndarray, triple: np.ndarray) -> np.ndarray:
+    """Stiffness among the dofs of each triple (k, 3, 3); absent dofs have none."""
+    D = np.zeros((triple[-1] + 1 if len(triple) else 0, 3, 3))
+    component = (dofs[:, 1] - 1) % 3
+    for shift in range(3):
+        diagonal = K.diagonal(shift)
+        i = np.flatnonzero(triple[: len(triple) - shift] == triple[shift:])
+        D[triple[i], component[i], component[i + shift]] = diagonal[i]
+        D[triple[i], component[i + shift], component[i]] = diagonal[i]
+    return D
+
+
+def _suspects(D: np.ndarray) -> np.ndarray:
+    """Triples whose determinant is small against the product of their diagonal."""
+    scale = np.einsum("kii->k", D)
+    return np.flatnonzero(np.linalg.det(D) <= 10 * EMPTY * scale**3)
+
+
+def _idle(D: np.ndarray) -> np.ndarray:
+    """(3,) bool: for each direction without stiffness, the component nearest to it."""
+    value, vector = np.linalg.eigh(D)
+    idle = np.zeros(3, bool)
+    for k in np.flatnonzero(value <= EMPTY * max(value[-1], 0.0)):
+        nearness = np.where(idle, -1, np.abs(vector[:, k]))
+        idle[int(np.argmax(nearness))] = True
+    return idle

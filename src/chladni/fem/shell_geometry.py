@@ -1,0 +1,141 @@
+"""Where flat four- and three-node shells lie: frames, flattened corners, links to the nodes.
+
+A quadrilateral's plane is the mean plane of its corners (normal along the cross product of the
+diagonals, x along their bisector, as Nastran's CQUAD4); a triangle's x runs along side 1-2. The
+corners of a warped quadrilateral lie alternately above and below the plane; rigid links carry
+their motion to it, so that a rigid motion of the nodes strains nothing (MacNeal, Finite Elements:
+Their Design and Performance, 1994, section 8.3).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.assembly import Shells
+
+
+@dataclass(frozen=True, eq=False)
+class ShellGeometry:
+    """Frames and flattened corners of m shells; index it with a mask, rows or a slice for a subset.
+
+    Attributes
+    ----------
+    nodes : (m, 4) int       rows of points; a triangle repeats its third
+    frames : (m, 3, 3)       rows are the unit vectors x, y, n of the element frame
+    corners : (m, 4, 2)      flattened corners from the element's middle [m]
+    link : (m, 4)            from each node along n to the mid-surface (minus warp, plus offset) [m]
+    offset : (m,)            of the mid-surface along n (Nastran's ZOFFS) [m]
+    triangle : (m,) bool
+    area : (m,)              of the flattened element [m²]
+    sides : (m, 2)           length along x and y that residual bending flexibility takes [m]
+    turn : (m,)              angle from the element's x to material axis 1 [rad]
+    """
+
+    nodes: np.ndarray
+    frames: np.ndarray
+    corners: np.ndarray
+    link: np.ndarray
+    offset: np.ndarray
+    triangle: np.ndarray
+    area: np.ndarray
+    sides: np.ndarray
+    turn: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def __getitem__(self, which: np.ndarray | slice) -> Self:
+        return replace(self, **{name: value[which] for name, value in vars(self).items()})
+
+    @property
+    def corner_count(self) -> np.ndarray:
+        """3 or 4 for every shell (m,)."""
+        return np.where(self.triangle, 3, 4)
+
+
+def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
+    """Frames, flattened corners and rigid links of every shell.
+
+    Parameters
+    ----------
+    points : (n, 3)     places in the basic frame [m]
+    shells : Shells
+
+    Raises
+    ------
+    ModelError
+        If a shell has no area or an inner angle beyond 180 degrees; the sentence names it.
+    """
+    x, triangle = points[shells.nodes], shells.triangle
+    frames = _frames(x, triangle)
+    middle = np.where(triangle[:, None], x[:, :3].mean(axis=1), x.mean(axis=1))
+    local = (x - middle[:, None]) @ frames.swapaxes(1, 2)
+    corners = np.ascontiguousarray(local[:, :, :2])
+    area = _areas(corners)
+    _check(shells.ids, corners, triangle)
+    axis = np.einsum("mij,mj->mi", frames[:, :2], shells.axis)
+    return ShellGeometry(
+        nodes=shells.nodes,
+        frames=frames,
+        corners=corners,
+        link=shells.offset[:, None] - local[:, :, 2],
+        offset=shells.offset,
+        triangle=triangle,
+        area=area,
+        sides=_sides(corners, triangle),
+        turn=np.arctan2(axis[:, 1], axis[:, 0]),
+    )
+
+
+def _frames(x: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """Rows e1, e2, n; (m, 3, 3) of corners (m, 4, 3)."""
+    first, second = x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]
+    n = _unit(np.cross(first, second))
+    e1 = np.where(triangle[:, None], x[:, 1] - x[:, 0], _unit(first) - _unit(second))
+    e1 = _unit(e1)
+    return np.stack([e1, np.cross(n, e1), n], axis=1)
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    return v / np.where(length == 0, 1, length)
+
+
+def _cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    """½ |d₁₃ × d₂₄|, which holds for triangles as well."""
+    return _cross2(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2
+
+
+def _sides(corners: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """Mean distance of opposite sides; of a triangle √(12 ∫x² dA / A) = √(Σ x_i²)."""
+    c = corners
+    quad = np.abs(
+        np.stack(
+            [
+                c[:, 1, 0] + c[:, 2, 0] - c[:, 0, 0] - c[:, 3, 0],
+                c[:, 2, 1] + c[:, 3, 1] - c[:, 0, 1] - c[:, 1, 1],
+            ],
+            axis=1,
+        )
+    )
+    return np.where(triangle[:, None], np.sqrt((c[:, :3] ** 2).sum(axis=1)), quad / 2)
+
+
+def _check(ids: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> None:
+    """Every corner turns left: area and convexity."""
+    side = np.roll(corners, -1, axis=1) - corners
+    side[triangle, 2] = side[triangle, 3]
+    turn = np.stack([_cross2(side[:, k - 1], side[:, k]) for k in range(4)], axis=1)
+    turn[triangle, 3] = turn[triangle, 2]
+    bad = ~(turn > 0).all(axis=1)
+    if bad.any():
+        raise ModelError(
+            f"shells {ids[bad][:5].tolist()} ({bad.sum()} in all) have no area or an inner angle "
+            "beyond 180 degrees; check the order and place of their grids"
+        )

@@ -1,0 +1,250 @@
+"""From parts and materials to what a shell element needs: Q_m, Q_b, Q_c, S, drilling, density.
+
+Residual bending flexibility (MacNeal, A simple quadrilateral shell element, Computers and
+Structures 8, 1978, 175-183; Nastran's CQUAD4): a linear deflection with tied shear misses the
+cubic part of bending between corners. Its flexibility L²/12D is put in series with transverse
+shear, S⁻¹ = (k_s G t)⁻¹ + diag(L_x²/D_11, L_y²/D_22)/12. It brings frequencies to within a per
+cent of Nastran's and makes very coarse panels (two elements a side) too soft.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.assembly import Assembly
+from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
+from .shell import ShellGeometry, geometry, turned
+
+DRILLING = 0.1  # of G t: MacNeal-Harder's twisted beam to 0.1 %; 1e-3 is 30 % too soft
+STIFF = 1e-3  # shear flexibility, as a fraction of 1/(5/6 G_12 t), where the deck asks for none
+
+
+@dataclass(frozen=True, eq=False)
+class SectionArrays:
+    """Section values of every shell, ready for :func:`chladni.fem.shell.stiffness`.
+
+    Attributes
+    ----------
+    Qm, Qb, Qc : (m, 3, 3)      material frame, Qb times 12 I/t³, Qc in MID4's sign [Pa]
+    S : (m, 2, 2)               transverse shear with residual bending, element frame [N/m]
+    drill : (m,)                [N/m]
+    rho, nsm : (m,)             [kg/m³], [kg/m²]
+    loss : (m,)                 loss factor of the section [-]
+    shear_flexibility : (m, 2, 2)     (k_s G t)⁻¹ alone, element frame [m/N]
+    residual_flexibility : (m, 2)     L²/12D alone [m/N]
+    """
+
+    Qm: np.ndarray
+    Qb: np.ndarray
+    Qc: np.ndarray
+    S: np.ndarray
+    drill: np.ndarray
+    rho: np.ndarray
+    nsm: np.ndarray
+    loss: np.ndarray
+    shear_flexibility: np.ndarray
+    residual_flexibility: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rho)
+
+    def __getitem__(self, which: np.ndarray | slice) -> "SectionArrays":
+        return SectionArrays(**{name: value[which] for name, value in vars(self).items()})
+
+    @property
+    def stiffness(self) -> dict[str, np.ndarray]:
+        """The keywords of :func:`chladni.fem.shell.stiffness`."""
+        return {name: getattr(self, name) for name in ("Qm", "Qb", "Qc", "S", "drill")}
+
+    def shear_by_thickness(
+        self, geo: ShellGeometry, t: np.ndarray, change: np.ndarray
+    ) -> np.ndarray:
+        """DS = S (Z_s + 3 Z_r) S δt/t for a change δt (m, 4) of the corners; (m, 2, 2) [N/m]."""
+        Z = self.shear_flexibility + 3 * _diagonal(self.residual_flexibility)
+        ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
+        return np.asarray(self.S @ Z @ self.S * ratio[:, None, None])
+
+    def shear_by_bending(self, geo: ShellGeometry, dQb: np.ndarray) -> np.ndarray:
+        """DS = S diag(Z_r dQ_ii/Q_ii) S for a change dQb of the bending material; (m, 2, 2)."""
+        Q, dQ = (_pair(turned(q, geo.turn)) for q in (self.Qb, np.asarray(dQb)))
+        change = np.where(Q > 0, dQ / np.where(Q > 0, Q, 1), 0.0)
+        return np.asarray(self.S @ _diagonal(self.residual_flexibility * change) @ self.S)
+
+    def shear_by_modulus(self, relative: np.ndarray | float) -> np.ndarray:
+        """DS = S Z_s S dG/G for a relative change of both transverse shear moduli; (m, 2, 2)."""
+        change = np.broadcast_to(relative, (len(self),))[:, None, None]
+        return np.asarray(self.S @ self.shear_flexibility @ self.S * change)
+
+    def drill_by_thickness(
+        self, geo: ShellGeometry, t: np.ndarray, change: np.ndarray
+    ) -> np.ndarray:
+        """Ds = s δt/t (m,) [N/m]."""
+        ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
+        return np.asarray(self.drill * ratio)
+
+    def drill_by_membrane(self, geo: ShellGeometry, t: np.ndarray, dQm: np.ndarray) -> np.ndarray:
+        """Ds = alpha dQ_66 t (m,) [N/m]."""
+        dG = np.broadcast_to(dQm, (len(self), 3, 3))[:, 2, 2]
+        return np.asarray(DRILLING * dG * mean_thickness(geo, t))
+
+
+def section_arrays(
+    assembly: Assembly,
+    geo: ShellGeometry | None = None,
+    *,
+    residual_bending: bool = True,
+) -> SectionArrays:
+    """Section values of every shell of the assembly.
+
+    Parameters
+    ----------
+    geo : ShellGeometry
+        Of all the assembly's shells; made here where not given.
+    residual_bending : bool
+        Add MacNeal's residual bending flexibility to transverse shear (agreement with Nastran).
+
+    Raises
+    ------
+    ModelError
+        If a shell refers to a part that is no shell, or its thickness is not positive.
+    """
+    shells = assembly.shells
+    geo = geometry(assembly.points, shells) if geo is None else geo
+    _check(assembly)
+    table = [_constants(p.section) for p in assembly.parts]
+    Qm, Qb, Qc, Z, ratio, rho, nsm, loss = (
+        np.array(column)[shells.part] for column in zip(*table, strict=True)
+    )
+    t = mean_thickness(geo, shells.thickness)
+    flexibility = rotated(Z, geo.turn) / (ratio * t)[:, None, None]
+    residual = _residual(geo, turned(Qb, geo.turn), t) * residual_bending
+    return SectionArrays(
+        Qm=Qm,
+        Qb=Qb,
+        Qc=Qc,
+        S=_inverse(flexibility + _diagonal(residual), Qb),
+        drill=DRILLING * Qm[:, 2, 2] * t,
+        rho=rho,
+        nsm=nsm,
+        loss=loss,
+        shear_flexibility=flexibility,
+        residual_flexibility=residual,
+    )
+
+
+def modulus_derivative(material: Material, name: str) -> np.ndarray:
+    """dQ/dp of the plane stiffness for p = E, nu, E1, E2, nu12 or G12; dQ = -Q dC Q, C = Q⁻¹.
+
+    An isotropic sheet is taken as the orthotropic one that equals it: E1, E2 and G12 then change
+    on their own, with nu12 kept (nu21 = nu12 E2/E1 follows).
+    """
+    Q = material.plane_stress()
+    if name == "E" and isinstance(material, Isotropic):
+        own_G = np.diag([0, 0, material.shear_modulus if material.G is not None else 0.0])
+        return np.asarray((Q - own_G) / material.E)
+    dC = np.zeros((3, 3))
+    if name == "nu" and isinstance(material, Isotropic):
+        dC[0, 1] = dC[1, 0] = -1 / material.E
+        dC[2, 2] = 2 / material.E if material.G is None else 0.0
+        return np.asarray(-Q @ dC @ Q)
+    E1, E2, nu12, G12 = _engineering(material)
+    if name == "E1":
+        dC[0, 0], dC[0, 1] = -1 / E1**2, nu12 / E1**2
+    elif name == "E2":
+        dC[1, 1] = -1 / E2**2
+    elif name == "nu12":
+        dC[0, 1] = -1 / E1
+    elif name == "G12":
+        dC[2, 2] = -1 / G12**2
+    else:
+        raise ModelError(f"no modulus {name!r}; there are E, nu, E1, E2, nu12, G12")
+    dC[1, 0] = dC[0, 1]
+    return np.asarray(-Q @ dC @ Q)
+
+
+def rotated(Z: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Rᵀ Z R (m, 2, 2): a tensor of the material axes in the element frame."""
+    c, s = np.cos(turn), np.sin(turn)
+    R = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
+    return np.asarray(R.swapaxes(1, 2) @ Z @ R)
+
+
+def mean_thickness(geo: ShellGeometry, t: np.ndarray) -> np.ndarray:
+    """Mean over the corners, three of a triangle (m,) [m]."""
+    return np.where(geo.triangle, t[:, :3].mean(axis=1), t.mean(axis=1))
+
+
+def _engineering(material: Material) -> tuple[float, float, float, float]:
+    """E1, E2, nu12, G12 of a sheet whose Q has no shear coupling."""
+    if isinstance(material, Orthotropic):
+        return material.E1, material.E2, material.nu12, material.G12
+    C = np.linalg.inv(material.plane_stress())
+    return 1 / C[0, 0], 1 / C[1, 1], -C[0, 1] / C[0, 0], 1 / C[2, 2]
+
+
+def _check(assembly: Assembly) -> None:
+    shells = assembly.shells
+    for k in np.unique(shells.part):
+        if not isinstance(assembly.parts[k].section, ShellSection):
+            raise ModelError(f"part {assembly.parts[k].name!r} has shells but no shell section")
+    if (thin := (shells.thickness <= 0).any(axis=1)).any():
+        raise ModelError(f"shells {shells.ids[thin][:5].tolist()} have no thickness")
+
+
+def _constants(section: object) -> tuple:
+    """(Qm, Qb, Qc, shear flexibility times k_s t, k_s, rho, nsm, loss) of one section."""
+    if not isinstance(section, ShellSection):
+        return (*np.zeros((3, 3, 3)), np.zeros((2, 2)), 1.0, 0.0, 0.0, 0.0)
+    Qm, Qb, Qc = (
+        np.zeros((3, 3)) if m is None else m.plane_stress()
+        for m in (section.membrane, section.bending, section.coupling)
+    )
+    sheet = section.membrane or section.bending
+    return (
+        Qm,
+        Qb * section.bending_ratio,
+        Qc,
+        _flexibility(section),
+        section.shear_ratio,
+        sheet.rho if sheet else 0.0,
+        section.nonstructural,
+        section.damping or (sheet.damping if sheet else 0.0),
+    )
+
+
+def _flexibility(section: ShellSection) -> np.ndarray:
+    """Inverse of the transverse moduli (2, 2) [1/Pa]; a tiny one where there is none."""
+    if section.bending is None:
+        return np.zeros((2, 2))
+    least = STIFF / section.bending.plane_stress()[2, 2] * np.eye(2)
+    shear = section.shear or section.bending
+    G = shear.transverse() if not section.rigid_shear else np.zeros((2, 2))
+    given = np.diag(G) > 0
+    if not given.all():
+        return np.where(given, 1 / np.where(given, np.diag(G), 1), np.diag(least)) * np.eye(2)
+    return np.asarray(np.linalg.inv(G))
+
+
+def _residual(geo: ShellGeometry, Qb: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """L²/12D along x and y (m, 2), D = Q_b t³/12."""
+    D = _pair(Qb) * t[:, None] ** 3 / 12
+    return np.where(D > 0, geo.sides**2 / 12 / np.where(D > 0, D, 1), 0.0)
+
+
+def _pair(Q: np.ndarray) -> np.ndarray:
+    return np.stack([Q[:, 0, 0], Q[:, 1, 1]], axis=1)
+
+
+def _diagonal(d: np.ndarray) -> np.ndarray:
+    return d[:, :, None] * np.eye(2)
+
+
+def _inverse(Z: np.ndarray, Qb: np.ndarray) -> np.ndarray:
+    """Z⁻¹ where the shell bends, zero where it is a membrane alone."""
+    bends = Qb[:, 0, 0] > 0
+    return np.where(
+        bends[:, None, None],
+        np.linalg.inv(np.where(bends[:, None, None], Z, np.eye(2))),
+        0.0,
+    )
