@@ -1,0 +1,102 @@
+"""What a page is made of: titled sections of text, tables, facts and pictures."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import FileError
+
+_MIME = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml", ".jpg": "image/jpeg"}
+
+
+@dataclass(frozen=True)
+class Text:
+    """Paragraphs."""
+
+    paragraphs: Sequence[str]
+    kind: str = "text"
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of sentences."""
+
+    items: Sequence[str]
+    kind: str = "items"
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Numbers worth reading first: (what, value)."""
+
+    facts: Sequence[tuple[str, str]]
+    kind: str = "facts"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of ready-made text; columns named in ``words`` are words, the others numbers."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: Sequence[str] = ()
+    caption: str = ""
+    kind: str = "table"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A PNG, GIF, SVG or JPEG that is laid into the page itself."""
+
+    path: Path
+    caption: str = ""
+    wide: bool = True
+    kind: str = "picture"
+
+    @property
+    def uri(self) -> str:
+        """The picture as a data URI."""
+        mime = _MIME.get(self.path.suffix.lower())
+        if mime is None:
+            raise FileError(f"{self.path} is no picture a page can hold; use {', '.join(_MIME)}")
+        try:
+            data = self.path.read_bytes()
+        except OSError as error:
+            raise FileError(f"picture {self.path} cannot be read: {error.strerror}") from error
+        return f"data:{mime};base64,{b64encode(data).decode('ascii')}"
+
+    @property
+    def width(self) -> int | None:
+        """Width on a screen [px] at which its letters are about those of the text; PNG only."""
+        head = self.path.read_bytes()[:24]
+        if head[:8] != b"\x89PNG\r\n\x1a\n":
+            return None
+        return round(int.from_bytes(head[16:20], "big") / 1.9)
+
+
+@dataclass(frozen=True)
+class Links:
+    """Files beside the page: (name, what it is)."""
+
+    files: Sequence[tuple[str, str]]
+    kind: str = "links"
+
+
+@dataclass(frozen=True)
+class Code:
+    """Commands, word for word."""
+
+    lines: Sequence[str]
+    kind: str = "code"
+
+
+Block = Text | Items | Facts | Table | Picture | Links | Code
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it; a section without blocks is left out."""
+
+    title: str
+    blocks: Sequence[Block]

@@ -1,0 +1,103 @@
+"""One self-contained page per run: pictures inside, no network, readable on a phone, printable.
+
+Everything that came from a deck or a recording is text to the page: Jinja escapes all of it.
+"""
+
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from ..output import write_text
+from .blocks import Block, Picture, Section
+from .verdict import HEADING, TONE, sections, sentence
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def write_page(
+    folder: Path | str,
+    diagnosis: Mapping[str, Any],
+    figures: Mapping[str, Path] | None = None,
+    notes: Sequence[str] = (),
+    tables: Sequence[Section] = (),
+    command: str = "",
+    title: str = "",
+) -> Path:
+    """Write ``report.html`` of a diagnosis into ``folder``.
+
+    Parameters
+    ----------
+    diagnosis : dict   as ``diagnosis.json`` (verdict, effects, alternatives, fit, mass, ...)
+    figures : dict     name to picture; ``where`` stands on top, known names are put in their
+                       section, others at the end (``verdict.PLACES`` lists the known ones)
+    notes : sentences  what was done and why
+    tables : sections  anything more, put before the files
+    command : str      the line that makes this run again
+    """
+    shown = {name: Path(path) for name, path in (figures or {}).items()}
+    verdict = str(diagnosis.get("verdict", ""))
+    return write_sections(
+        Path(folder) / "report.html",
+        title or "Diagnosis",
+        sections(diagnosis, shown, notes, tables, command),
+        lead=sentence(diagnosis),
+        badge=HEADING.get(verdict, verdict),
+        tone=TONE.get(verdict, "neutral"),
+        hero=shown.get("where"),
+    )
+
+
+def write_sections(
+    path: Path | str,
+    title: str,
+    body: Sequence[Section],
+    *,
+    lead: str = "",
+    badge: str = "",
+    tone: str = "neutral",
+    hero: Path | None = None,
+) -> Path:
+    """Write one page of titled sections; the page of every command but the diagnosis."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["beside"] = lambda name: "./" + quote(str(name))
+    html = environment.get_template("page.html").render(
+        title=title,
+        lead=lead,
+        badge=badge,
+        tone=tone,
+        hero=Picture(hero) if hero else None,
+        sections=[s for s in body if s.blocks],
+        made=made_with(),
+    )
+    return write_text(path, html)
+
+
+def made_with() -> str:
+    """Versions and date, for the foot of the page."""
+    tools = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    today = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return f"chladni {_own_version()}, Python {platform.python_version()}, {tools}; {today}"
+
+
+def pictures(named: Mapping[str, tuple[Path, str]]) -> list[Block]:
+    """Pictures with captions, in order."""
+    return [Picture(path, caption) for path, caption in named.values()]
+
+
+def _own_version() -> str:
+    try:
+        return version("chladni")
+    except PackageNotFoundError:
+        return "(not installed)"

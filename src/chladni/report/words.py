@@ -1,0 +1,82 @@
+"""Numbers as an engineer writes them: four digits, SI prefixes, intervals in one unit."""
+
+import math
+
+_PREFIX = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+_SCALED = ("Pa", "N/m", "N m", "N s/m")  # units that take a prefix in front
+_NONE = "–"
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number with so many significant digits.
+
+    >>> number(0.0123456), number(31794.2), number(None), number(1e-9)
+    ('0.01235', '31794', '–', '1e-09')
+    """
+    if value is None or not math.isfinite(value):
+        return _NONE
+    if value and digits - 1 < math.log10(abs(value)) < 6:
+        return f"{value:.0f}"
+    return f"{value:.{digits}g}"
+
+
+def unit_text(unit: str) -> str:
+    """A unit with raised digits.
+
+    >>> unit_text("N/m2"), unit_text("kg/m3"), unit_text("-")
+    ('N/m²', 'kg/m³', '')
+    """
+    if unit in ("-", "1"):
+        return ""
+    return unit.replace("**", "").replace("^", "").replace("2", "²").replace("3", "³")
+
+
+def quantity(value: float | None, unit: str = "", reference: float | None = None) -> str:
+    """A value with its unit; stiffnesses and stresses get a prefix chosen by ``reference``.
+
+    >>> quantity(3.1e9, "N/m2"), quantity(0.0007, "m"), quantity(0.4, "-")
+    ('3.1 GN/m²', '0.7 mm', '0.4')
+    """
+    scale, named = _scale(value if reference is None else reference, unit)
+    shown = number(None if value is None else value / scale)
+    return f"{shown} {named}".strip() if shown != _NONE else _NONE
+
+
+def interval(value: float | None, low: float | None, high: float | None, unit: str = "") -> str:
+    """A value and its interval in the same unit.
+
+    >>> interval(3.1e9, 2.2e9, 4.4e9, "N/m2")
+    '3.1 GN/m² (2.2 to 4.4)'
+    """
+    scale, _ = _scale(value, unit)
+    text = quantity(value, unit)
+    if low is None or high is None:
+        return text
+    return f"{text} ({number(low / scale)} to {number(high / scale)})"
+
+
+def percent(new: float | None, old: float | None) -> str:
+    """Change in per cent.
+
+    >>> percent(0.02, 0.2), percent(1.0, None)
+    ('-90 %', '–')
+    """
+    if new is None or not old or not math.isfinite(new / old):
+        return _NONE
+    change = 100 * (new / old - 1)
+    return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
+
+
+def _scale(value: float | None, unit: str) -> tuple[float, str]:
+    shown = unit_text(unit)
+    if not value or not math.isfinite(value):
+        return 1.0, shown
+    if unit == "m" and abs(value) < 0.5:
+        return 1e-3, "mm"
+    if unit == "kg" and abs(value) < 0.5:
+        return 1e-3, "g"
+    if not unit.startswith(_SCALED):
+        return 1.0, shown
+    power = 3 * math.floor(math.log10(abs(value)) / 3)
+    power = min(9, max(power, 0))
+    return 10.0**power, _PREFIX[power] + shown
