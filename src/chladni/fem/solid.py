@@ -3,12 +3,14 @@
 Element dofs are translations in the basic frame, ordered node by node. Either handedness of the
 node order is accepted: the volume is |det J|.
 
-Sources: Zienkiewicz, Taylor, The Finite Element Method 1 (shape functions); Taylor, Beresford,
-Wilson, Int. J. Num. Meth. Eng. 10 (1976) 1211-1219 (incompatible modes that pass the patch test).
+Sources: Zienkiewicz, Taylor, The Finite Element Method 1 (shape functions); Simo, Rifai, Int. J.
+Num. Meth. Eng. 29 (1990) 1595-1638 (enhanced assumed strain); Andelfinger, Ramm, Int. J. Num. Meth.
+Eng. 36 (1993) 1311-1337 (its 21 strains of the hexahedron); Taylor, Beresford, Wilson, Int. J. Num.
+Meth. Eng. 10 (1976) 1211-1219 (incompatible modes, which are the first nine).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,6 +33,9 @@ _CUBE = np.array(
 )
 
 
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
+
+
 @dataclass(frozen=True, eq=False)
 class _Family:
     """Shape functions of one kind of solid: values N(ξ) (k,), gradients dN/dξ (3, k)."""
@@ -42,8 +47,7 @@ class _Family:
     centre: np.ndarray
     mass_points: np.ndarray
     mass_weights: np.ndarray
-    bubbles: Callable[[np.ndarray], np.ndarray] | None = None
-    faces: tuple[tuple[int, ...], ...] = field(default=())
+    enhanced: Callable[[np.ndarray], np.ndarray] | None = None
 
 
 def _hexa_values(xi: np.ndarray) -> np.ndarray:
@@ -57,9 +61,20 @@ def _hexa_gradients(xi: np.ndarray) -> np.ndarray:
     return np.stack([_CUBE[:, 0] * b * c, a * _CUBE[:, 1] * c, a * b * _CUBE[:, 2]]) / 8
 
 
-def _hexa_bubbles(xi: np.ndarray) -> np.ndarray:
-    """d/dξ of 1 - ξ², 1 - η², 1 - ζ² (3, 3)."""
-    return np.diag(-2 * xi)
+def _hexa_enhanced(xi: np.ndarray) -> np.ndarray:
+    """Strains (6, 21) along the element's own axes, the nine of incompatible modes first.
+
+    εξ gains ξ, then ξη and ξζ; γξη gains ξ and η, then ξζ and ηζ; and so on round.
+    """
+    cycle = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    linear = [(i, xi[i]) for i in range(3)]
+    linear += [(3 + i, xi[k]) for i, j, _ in cycle for k in (i, j)]
+    bilinear = [(i, xi[i] * xi[k]) for i, *others in cycle for k in others]
+    bilinear += [(3 + i, xi[k] * xi[h]) for i, j, h in cycle for k in (i, j)]
+    M = np.zeros((6, 21))
+    for column, (row, value) in enumerate(linear + bilinear):
+        M[row, column] = value
+    return M
 
 
 def _wedge_values(xi: np.ndarray) -> np.ndarray:
@@ -98,7 +113,7 @@ _FAMILIES = {
         np.zeros(3),
         _G * _CUBE,
         np.ones(8),
-        _hexa_bubbles,
+        _hexa_enhanced,
     ),
     6: _Family(
         _wedge_values,
@@ -126,29 +141,25 @@ def stiffness_and_mass(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray,
     out = []
     for solids in assembly.solids:
         X = assembly.points[solids.nodes]
-        sections = _sections(assembly, solids)
-        C = np.array([elasticity(s.material) for s in sections])[_inverse(solids)]
-        rho = np.array([s.material.rho for s in sections])[_inverse(solids)]
-        full = np.array([s.full for s in sections], dtype=bool)[_inverse(solids)]
         _check(X, solids, assembly)
-        K = stiffness(X, C, full)
+        sections, which = _sections(assembly, solids)
+        C = np.array([elasticity(s.material) for s in sections])[which]
+        rho = np.array([s.material.rho for s in sections])[which]
+        modes = np.array([0 if s.full else s.modes for s in sections])[which]
         M = mass(X, rho) if assembly.coupled_mass else lumped_mass(X, rho)
-        out.append((solids.nodes, K, M))
+        out.append((solids.nodes, stiffness(X, C, modes), M))
     return out
 
 
-def _inverse(solids: Solids) -> np.ndarray:
-    return np.unique(solids.part, return_inverse=True)[1]
-
-
-def _sections(assembly: Assembly, solids: Solids) -> list[SolidSection]:
-    """The sections in use, in the order of ``np.unique(solids.part)``."""
+def _sections(assembly: Assembly, solids: Solids) -> tuple[list[SolidSection], np.ndarray]:
+    """The sections in use, and which of them each element has."""
+    used, which = np.unique(solids.part, return_inverse=True)
     found = []
-    for part in (assembly.parts[k] for k in np.unique(solids.part)):
+    for part in (assembly.parts[k] for k in used):
         if not isinstance(part.section, SolidSection):
             raise ModelError(f"part {part.name} ({part.id}) has solids but no solid section")
         found.append(part.section)
-    return found
+    return found, which
 
 
 def elasticity(material: object) -> np.ndarray:
@@ -183,60 +194,68 @@ def _strain(G: np.ndarray) -> np.ndarray:
     """B (m, 6, 3k) with ε = B u from dN/dx (m, 3, k)."""
     m, _, k = G.shape
     B = np.zeros((m, 6, k, 3))
-    for row, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))):
+    for row, (i, j) in enumerate(_PAIRS):
         B[:, row, :, i] = G[:, j]
         B[:, row, :, j] = G[:, i]
     return B.reshape(m, 6, 3 * k)
 
 
-def stiffness(X: np.ndarray, C: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """K_e = ∫ Bᵀ C B dV, internal (incompatible) modes condensed out.
+def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.ndarray:
+    """K_e = ∫ Bᵀ C B dV, internal strains condensed out.
 
     Parameters
     ----------
-    X : (m, k, 3)      corners [m]
-    C : (m, 6, 6)      elasticity [Pa]
-    full : (m,) bool   without incompatible modes
+    X : (m, k, 3)        corners [m]
+    C : (m, 6, 6)        elasticity [Pa]
+    modes : (m,) or int  internal strains of a hexahedron: 21, 9 (incompatible modes) or 0 (plain)
 
     Notes
     -----
-    The incompatible modes 1 - ξ² etc. get gradients J₀⁻¹ (det J₀ / det J), so that constant
-    stress does no work on them (Taylor et al. 1976). With them a brick bends without locking and
-    nearly incompressible material does not lock.
+    The internal strains vary along the element's axes at its centre and are scaled by
+    det J₀ / det J, so that constant stress does no work on them: the patch test is passed. With
+    them a brick bends without locking and nearly incompressible material does not lock. On a
+    box 21 reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL.
     """
+    modes = np.broadcast_to(np.asarray(modes), len(X))
     family = _FAMILIES[X.shape[1]]
-    rich = ~full if family.bubbles is not None else np.zeros(len(X), dtype=bool)
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))
-    if np.any(~rich):
-        K[~rich] = _integrated(family, X[~rich], C[~rich], None)
-    if np.any(rich):
-        K[rich] = _condensed(_integrated(family, X[rich], C[rich], family.bubbles), 3 * X.shape[1])
+    for n in np.unique(modes):
+        at = modes == n
+        K[at] = _integrated(family, X[at], C[at], int(n) if family.enhanced else 0)
     return K
 
 
-def _integrated(
-    family: _Family,
-    X: np.ndarray,
-    C: np.ndarray,
-    bubbles: Callable[[np.ndarray], np.ndarray] | None,
-) -> np.ndarray:
-    """Σ w |det J| Bᵀ C B over displacements and, where given, internal modes."""
+def _integrated(family: _Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+    """Σ w |det J| Bᵀ C B over displacements and the first ``modes`` internal strains."""
     J0 = family.gradients(family.centre) @ X
+    turn = _to_basic(np.linalg.inv(J0)) * np.linalg.det(J0)[:, None, None]
     K: np.ndarray | float = 0.0
     for xi, w in zip(family.points, family.weights, strict=True):
         J = family.gradients(xi) @ X
         dV = np.linalg.det(J)
         G = np.linalg.solve(J, np.broadcast_to(family.gradients(xi), (len(X), 3, X.shape[1])))
-        if bubbles is not None:
-            inner = np.linalg.solve(J0, np.broadcast_to(bubbles(xi), (len(X), *bubbles(xi).shape)))
-            G = np.concatenate([G, inner * (np.linalg.det(J0) / dV)[:, None, None]], axis=2)
         B = _strain(G)
+        if modes and family.enhanced is not None:
+            inner = turn @ family.enhanced(xi)[:, :modes] / dV[:, None, None]
+            B = np.concatenate([B, inner], axis=2)
         K = K + (w * np.abs(dV))[:, None, None] * (B.transpose(0, 2, 1) @ C @ B)
-    return np.asarray(K)
+    return _condensed(np.asarray(K), 3 * X.shape[1])
+
+
+def _to_basic(A: np.ndarray) -> np.ndarray:
+    """ε -> A ε Aᵀ on strains (εx εy εz γxy γyz γzx), shears twice the tensor's (m, 6, 6)."""
+    T = np.empty((len(A), 6, 6))
+    for row, (i, j) in enumerate(_PAIRS):
+        for column, (k, h) in enumerate(_PAIRS):
+            value = A[:, i, k] * A[:, j, h] + A[:, i, h] * A[:, j, k]
+            T[:, row, column] = value / 2 if i == j else value
+    return T
 
 
 def _condensed(K: np.ndarray, n: int) -> np.ndarray:
     """K_uu - K_ua K_aa⁻¹ K_au, the first n dofs kept."""
+    if K.shape[1] == n:
+        return K
     return K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
 
 

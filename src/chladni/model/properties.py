@@ -105,10 +105,15 @@ class ShellSection:
 
 @dataclass(frozen=True)
 class SolidSection:
-    """Solid section (PSOLID); ``full`` is plain 2x2x2 integration without bubble functions."""
+    """Solid section (PSOLID); ``full`` is plain 2x2x2 integration without internal strains.
+
+    ``modes``: internal strains of a hexahedron, 21 (enhanced, as NX Nastran) or 9 (incompatible
+    modes, as OptiStruct).
+    """
 
     material: Material
     full: bool = False
+    modes: int = 21
 
 
 @dataclass(frozen=True)
