@@ -48,7 +48,7 @@ def _power(x: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _ratio(above: np.ndarray, below: np.ndarray) -> np.ndarray:
-    """above / below, 0 where both vanish; rounding kept inside [0, 1]."""
+    """Quotient above / below, 0 where both vanish; rounding kept inside [0, 1]."""
     safe = np.where(below > 0, below, 1.0)
     return np.clip(np.where(below > 0, above / safe, 0.0), 0.0, 1.0)
 
@@ -120,11 +120,8 @@ def deviation(model: FRF, test: FRF) -> np.ndarray:
     LabelError
         If a channel is zero somewhere.
     """
-    same = (model.outputs, model.inputs, model.quantity) == (
-        *(test.outputs, test.inputs),
-        test.quantity,
-    )
-    if not same or model.values.shape != test.values.shape:
+    names = [(frf.outputs, frf.inputs, frf.quantity) for frf in (model, test)]
+    if names[0] != names[1] or model.values.shape != test.values.shape:
         raise ShapeError(
             f"model ({model.values.shape}, {model.quantity}) and test ({test.values.shape}, "
             f"{test.quantity}) differ in labels, lines or quantity; use FRF.sel and FRF.to first"
@@ -132,9 +129,9 @@ def deviation(model: FRF, test: FRF) -> np.ndarray:
     if not np.allclose(model.frequency, test.frequency, rtol=1e-6):
         raise ShapeError("model and test are on different frequencies")
     if not (test.values.all() and model.values.all()):
-        dead = ~(test.values.all(axis=(0, 2)) & model.values.all(axis=(0, 2)))
-        names = [o for o, d in zip(test.outputs, dead, strict=True) if d]
-        raise LabelError(f"a response of exactly zero has no logarithm: leave out {names[:6]}")
+        alive = np.asarray(test.values.all(axis=(0, 2)) & model.values.all(axis=(0, 2)))
+        zero = [test.outputs[k] for k in np.flatnonzero(~alive)]
+        raise LabelError(f"a response of exactly zero has no logarithm: leave out {zero[:6]}")
     return wrapped(np.log(model.values / test.values) / _LN10)
 
 
