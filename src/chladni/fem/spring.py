@@ -72,7 +72,7 @@ def _points(assembly: Assembly) -> sp.csr_array:
 
 def scattered(blocks: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array:
     """Σ of element matrices (m, 6k, 6k) at the six dofs of nodes (m, k); -1 is ground (6n, 6n)."""
-    dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), -1)
+    dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), 6 * nodes.shape[1])
     rows = np.broadcast_to(dofs[:, :, None], blocks.shape)
     columns = np.broadcast_to(dofs[:, None, :], blocks.shape)
     keep = (rows >= 0) & (columns >= 0) & (blocks != 0)

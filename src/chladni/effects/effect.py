@@ -1,0 +1,153 @@
+"""What may differ between model and article, and how it enters the reduced model.
+
+An effect acts in three ways, and in no other:
+
+- it multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
+  stiffness) on groups of shells.  Multiplying calibrated operators, never subtracting nominal
+  ones, keeps every stiffness positive whatever the other parameters do;
+- it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass);
+- it changes *channels* of the test: gain, sign.
+
+Parameters are unbounded numbers x with a Gaussian prior; :meth:`Parameter.value` gives the
+physical one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..model.assembly import Assembly
+
+FIELDS = ("t", "E", "rho", "Q11", "Q22", "Q12", "Q66")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown x with prior N(mean, sd²).
+
+    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``.
+    ``step`` is the longest step a fit may take at once, ``starts`` where a search begins.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    scale: float = 1.0
+    kind: Literal["log", "linear"] = "log"
+    step: float = 0.7
+    starts: tuple[float, ...] = ()
+
+    def value(self, x: float) -> float:
+        """Physical value."""
+        return float(self.scale * (np.exp(x) if self.kind == "log" else x))
+
+    def interval(self, x: float, sd: float, width: float = 1.96) -> tuple[float, float]:
+        """Values at x -+ width sd, in increasing order."""
+        low, high = sorted((self.value(x - width * sd), self.value(x + width * sd)))
+        return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class FieldChange:
+    """Logarithm of the factor on one sheet field, over the groups of shells.
+
+    ``value`` (n_groups,), ``gradient`` (n_groups, n_parameters).
+    """
+
+    field: str
+    value: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PointTerm:
+    """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters)."""
+
+    matrix: Literal["K", "M"]
+    rows: sp.csr_array
+    coefficient: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelChange:
+    """log10 of the factor on every output, complex: level and phase (n_out,), (n_out, n_p)."""
+
+    value: np.ndarray
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One kind of physics; subclasses say what it does, this one does nothing.
+
+    Attributes
+    ----------
+    parameters : the unknowns, in the order of x
+    text : where it acts, in words
+    parts, grids : names of parts and ids of grids it concerns
+    point : (3,) or None  its place in the basic frame [m]
+    places : how many places were tried before this one (look-elsewhere)
+    replaces : names of ordinary parameters it makes superfluous
+    """
+
+    name: ClassVar[str] = "nothing"
+    claim: ClassVar[str] = "the model is right as it is"
+    kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
+
+    parameters: tuple[Parameter, ...] = ()
+    text: str = ""
+    parts: tuple[str, ...] = ()
+    grids: tuple[int, ...] = ()
+    point: tuple[float, float, float] | None = None
+    radius: float | None = None
+    places: int = 1
+    replaces: tuple[str, ...] = ()
+    channels: tuple[str, ...] = field(default=())
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """Sheet fields it multiplies."""
+        return ()
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """Point springs and masses it adds."""
+        return ()
+
+    def outputs(self, x: np.ndarray) -> ChannelChange | None:
+        """What it does to the channels of the test."""
+        return None
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
+        return 0.0, np.zeros(len(self.parameters))
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """The structure with the effect written into it."""
+        return assembly
+
+    def starts(self) -> list[np.ndarray]:
+        """Points from which a fit begins: every combination of its parameters' starts."""
+        options = [p.starts or (p.mean,) for p in self.parameters]
+        grid = np.meshgrid(*options, indexing="ij") if options else []
+        return [np.array(x) for x in zip(*(g.ravel() for g in grid), strict=True)]
+
+    def where(self) -> dict[str, Any]:
+        """The place as diagnosis.json has it."""
+        return {
+            "text": self.text,
+            "parts": list(self.parts),
+            "grids": [int(g) for g in self.grids],
+            "point_m": None if self.point is None else [float(v) for v in self.point],
+            "radius_m": self.radius,
+            "band_hz": None,
+            "channels": list(self.channels),
+        }
+
+
+def count(effects: Sequence[Effect]) -> int:
+    """How many parameters these effects have together."""
+    return sum(len(effect.parameters) for effect in effects)

@@ -1,0 +1,185 @@
+"""Parameters a user may calibrate anyway, and the scatter no calibration removes.
+
+Their optimum is the null of every diagnosis, never a finding.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..model.assembly import Assembly
+from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
+from .effect import ChannelChange, Effect, FieldChange, Parameter
+from .sheet import Sheet
+
+SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05}  # prior sd of ln(value / deck's value)
+
+
+@dataclass(frozen=True, eq=False)
+class PartScale(Effect):
+    """E, rho or t of one part (or of several together) times e^x."""
+
+    name = "part-scale"
+    claim = "an ordinary value of the deck is off"
+    kind = "ordinary"
+
+    quantity: str = "E"
+    positions: tuple[int, ...] = ()
+    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n_groups,) 1 in these parts
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """ln factor x on the groups of these parts."""
+        return (FieldChange(self.quantity, x[0] * self.inside, self.inside[:, None]),)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """The deck with the value changed in these parts."""
+        factor = float(np.exp(x[0]))
+        parts = list(assembly.parts)
+        for k in self.positions:
+            parts[k] = scaled(parts[k], self.quantity, factor)
+        assembly = assembly.with_parts(tuple(parts))
+        if self.quantity != "t":
+            return assembly
+        chosen = np.isin(assembly.shells.part, self.positions)[:, None]
+        t = assembly.shells.thickness * np.where(chosen, factor, 1.0)
+        return replace(assembly, shells=replace(assembly.shells, thickness=t))
+
+
+def ordinary(
+    sheet: Sheet, quantity: str, positions: Sequence[int], sd: float | None = None
+) -> PartScale:
+    """One ordinary parameter of these parts, with its prior."""
+    parts = sheet.structure.assembly.parts
+    names = tuple(parts[k].name for k in positions)
+    units = {"E": "Pa", "rho": "kg/m3", "t": "m"}
+    nominal = value(parts[positions[0]], quantity)
+    sd = SPREAD[quantity] if sd is None else sd
+    parameter = Parameter(quantity, units[quantity], 0.0, sd, nominal, step=0.1)
+    inside = np.isin(sheet.part, positions).astype(float)
+    return PartScale(
+        (parameter,), f"{quantity} of {', '.join(names)}", names,
+        quantity=quantity, positions=tuple(positions), inside=inside,
+    )  # fmt: skip
+
+
+def value(part: Part, quantity: str) -> float:
+    """E [Pa], rho [kg/m³] or t [m] of a shell part; E of an orthotropic sheet is sqrt(E1 E2)."""
+    section = part.section
+    if not isinstance(section, ShellSection):
+        raise TypeError(f"part {part.name} is no shell")
+    if quantity == "t":
+        return section.thickness
+    material = section.membrane or section.bending
+    if quantity == "rho" and material is not None:
+        return material.rho
+    if isinstance(material, Isotropic):
+        return material.E
+    if isinstance(material, Orthotropic):
+        return float(np.sqrt(material.E1 * material.E2))
+    return float(np.sqrt(material.Q[0, 0] * material.Q[1, 1])) if material is not None else 0.0
+
+
+def scaled(part: Part, quantity: str, factor: float) -> Part:
+    """The part with E, rho or t times a factor."""
+    section = part.section
+    if not isinstance(section, ShellSection):
+        return part
+    if quantity == "t":
+        return part.with_section(thickness=section.thickness * factor)
+    changed = {
+        name: _scaled_material(material, quantity, factor)
+        for name in ("membrane", "bending", "shear", "coupling")
+        if (material := getattr(section, name)) is not None
+    }
+    return part.with_section(**changed)
+
+
+def _scaled_material(material: Material, quantity: str, factor: float) -> Material:
+    if quantity == "rho":
+        return replace(material, rho=material.rho * factor)
+    if isinstance(material, Isotropic):
+        G = None if material.G is None else material.G * factor
+        return replace(material, E=material.E * factor, G=G)
+    if isinstance(material, Anisotropic):
+        return replace(material, Q=material.Q * factor, G=material.G * factor)
+    names = ("E1", "E2", "G12", "G1z", "G2z")
+    return replace(material, **{name: getattr(material, name) * factor for name in names})
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter(Effect):
+    """Smooth scatter of a field within the parts, by Karhunen-Loève functions of unit prior."""
+
+    name = "scatter"
+    claim = "thickness and modulus vary smoothly within a part"
+    kind = "nuisance"
+
+    quantity: str = "t"
+    functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n_groups, n), sd in
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """Σ_j x_j φ_j over the groups."""
+        return (FieldChange(self.quantity, self.functions @ x, self.functions),)
+
+
+def scatter(sheet: Sheet, quantity: str, sd: float, length: float = 0.3, most: int = 12) -> Scatter:
+    """Gaussian scatter of standard deviation sd within each part, mean removed.
+
+    Correlation exp(-d²/2ℓ²) with ℓ a share ``length`` of the part's longest side; the ``most``
+    strongest functions per square root of parts are kept.
+    Ghanem and Spanos (1991), Stochastic Finite Elements, ch. 2.
+    """
+    columns = []
+    parts = np.unique(sheet.part)
+    each = max(3, round(most / np.sqrt(len(parts))))
+    for p in parts:
+        inside = np.flatnonzero(sheet.part == p)
+        if len(inside) > 2:
+            columns += _functions(sheet, inside, sd, length, each)
+    functions = np.array(columns).T if columns else np.zeros((len(sheet), 0))
+    unknown = tuple(
+        Parameter(f"{quantity} scatter {j + 1}", "-", 0.0, 1.0, kind="linear", step=1.5)
+        for j in range(functions.shape[1])
+    )
+    return Scatter(unknown, f"scatter of {quantity}", quantity=quantity, functions=functions)
+
+
+def _functions(
+    sheet: Sheet, inside: np.ndarray, sd: float, length: float, most: int
+) -> list[np.ndarray]:
+    """Eigenfunctions of the area-weighted covariance of one part, scaled to sd."""
+    X, area = sheet.centre[inside], sheet.area[inside]
+    ell = length * np.ptp(X, axis=0).max()
+    d2 = ((X[:, None] - X[None]) ** 2).sum(axis=-1)
+    mean = np.eye(len(area)) - np.outer(np.ones(len(area)), area / area.sum())
+    root = np.sqrt(area / area.sum())
+    C = mean @ np.exp(-d2 / (2 * ell**2)) @ mean.T
+    w, V = np.linalg.eigh(root[:, None] * C * root)
+    out = []
+    for k in np.argsort(-w)[:most]:
+        if w[k] > 1e-3:
+            column = np.zeros(len(sheet))
+            column[inside] = sd * np.sqrt(w[k]) * V[:, k] / root
+            out.append(column)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Gain(Effect):
+    """One real factor common to all channels is unknown."""
+
+    name = "gain"
+    claim = "the gain of the measuring chain is unknown"
+    kind = "nuisance"
+    n_outputs: int = 1
+
+    def outputs(self, x: np.ndarray) -> ChannelChange:
+        """x / ln 10 on every channel."""
+        one = np.ones(self.n_outputs) / np.log(10)
+        return ChannelChange(x[0] * one.astype(complex), one[:, None].astype(complex))
+
+
+def gain(n_outputs: int, sd: float) -> Gain:
+    """The unknown gain, a factor e^x."""
+    return Gain((Parameter("gain", "-", 0.0, sd, step=1.0),), "every channel", n_outputs=n_outputs)

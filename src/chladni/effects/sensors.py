@@ -1,0 +1,38 @@
+"""What the test itself does to a channel."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .effect import ChannelChange, Effect, Parameter
+
+
+@dataclass(frozen=True, eq=False)
+class SensorFault(Effect):
+    """Gain and sign of one channel: H_i is multiplied by ± e^x."""
+
+    name = "sensor-fault"
+    claim = "a channel's gain or sign is wrong"
+    kind = "test"
+
+    channel: int = 0
+    n_outputs: int = 1
+    sign: int = 1
+    mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def outputs(self, x: np.ndarray) -> ChannelChange:
+        """x / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
+        value, slope = np.zeros(self.n_outputs, complex), np.zeros((self.n_outputs, 1), complex)
+        value[self.channel] = (x[0] + (1j * np.pi if self.sign < 0 else 0)) / np.log(10)
+        slope[self.channel] = 1 / np.log(10)
+        return ChannelChange(value, slope)
+
+
+def sensor_fault(label: str, channel: int, n_outputs: int, sign: int, start: float) -> SensorFault:
+    """A wrong gain (and sign) of one channel."""
+    text = f"channel {label}" + (", sign reversed" if sign < 0 else "")
+    unknown = Parameter("gain", "-", 0.0, 0.7, step=0.7, starts=(start,))
+    return SensorFault(
+        (unknown,), text, channels=(label,), places=2 * n_outputs,
+        channel=channel, n_outputs=n_outputs, sign=sign,
+    )  # fmt: skip

@@ -1,0 +1,205 @@
+"""What a recording says about a state of the reduced model: whitened residuals and their slopes.
+
+Two ways of reading a recording share one interface:
+
+- :class:`Responses`: complex log10 deviation of the damping-equalised FRF on the line
+  s = ω (ζ + i) (Abrahamsson and Kammer's equalisation, poles moved to |p| on both sides);
+- :class:`Poles`: ln of natural frequencies, where gain or places are unknown.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol, Self
+
+import numpy as np
+
+from ..ema.correlation import wrapped
+from .pairing import paired
+from .reduced import Reduced, State
+
+LN10 = np.log(10.0)
+POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
+
+
+class Data(Protocol):
+    """Residuals of a state, whitened so that their expected square is one."""
+
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """r (n,) and ∂r/∂x (n, n_p)."""
+
+    def over(self, model: Reduced) -> Self:
+        """The same data seen through another basis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Damping-equalised FRFs.
+
+    Attributes
+    ----------
+    values : (n_f, n_out, n_in) complex    H_X(s)
+    s : (n_f,) complex                     [rad/s]
+    outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
+    use : (n_f, n_out) bool                lines and channels the fit may see
+    floor : float                          standard deviation of log10 H that no model reaches
+    """
+
+    values: np.ndarray
+    s: np.ndarray
+    outputs: object
+    inputs: object
+    use: np.ndarray
+    quantity: str = "accelerance"
+    floor: float = 0.01
+    a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
+    b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
+
+    def over(self, model: Reduced) -> Self:
+        """Rows of sensors and shakers in the basis of this model."""
+        return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
+
+    def model(self, state: State) -> np.ndarray:
+        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) (n_f, n_out, n_in)."""
+        phi_o, phi_i, d = self._modal(state)
+        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        return np.asarray(self.s[:, None, None] ** POWER[self.quantity] * H)
+
+    def _modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        d = 1 / (state.lam + self.s[:, None] ** 2)
+        return self.a @ state.phi, self.b @ state.phi, d
+
+    def deviation(self, state: State) -> np.ndarray:
+        """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
+        delta = np.log(self.model(state) / self.values) / LN10
+        if state.offset is not None:
+            delta = delta + state.offset[:, None]
+        return wrapped(delta)
+
+    def spread(self) -> np.ndarray:
+        """Standard deviation of δ: the floor, inflated where the response itself is small."""
+        rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
+        out = self.floor**2 + (0.6 * self.floor * rms / np.abs(self.values)) ** 2
+        return np.sqrt(out + (0.0 if self.noise is None else self.noise**2))
+
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Real and imaginary part of δ over its spread, on the lines and channels in use."""
+        sd = self.spread()
+        delta = (self.deviation(state) / sd)[self.use].ravel()
+        r = np.concatenate([delta.real, delta.imag])
+        if not gradient:
+            return r, np.zeros((len(r), 0))
+        J = (self._slopes(state) / sd[None])[:, self.use].reshape(len(state.dK), -1).T
+        return r, np.concatenate([J.real, J.imag])
+
+    def _slopes(self, state: State) -> np.ndarray:
+        """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D (dK + s² dM) D φ_i, over H ln 10."""
+        phi_o, phi_i, d = self._modal(state)
+        n_p, r = len(state.dK), len(state.lam)
+        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        out = np.empty((n_p, *H.shape), complex)
+        for j in range(len(phi_i)):
+            q = (phi_i[j] * d).T
+            W = _real_times(state.dK.reshape(-1, r), q) + _real_times(
+                state.dM.reshape(-1, r), q * self.s**2
+            )
+            W = W.reshape(n_p, r, -1) * d.T
+            out[:, :, :, j] = -np.einsum("or,prf->pfo", phi_o, W, optimize=True)
+        out /= H * LN10
+        if state.doffset is not None:
+            out += state.doffset.T[:, None, :, None]
+        return out
+
+    def only(self, use: np.ndarray) -> Self:
+        """The same responses on other lines and channels."""
+        return replace(self, use=use)
+
+    def Q(self, state: State, use: np.ndarray | None = None) -> float:
+        """Mean |δ|² over the lines and channels in use."""
+        use = self.use if use is None else use
+        return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
+
+
+def _real_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """A z of a real and a complex matrix without making A complex."""
+    return np.asarray(A @ z.real + 1j * (A @ z.imag))
+
+
+@dataclass(frozen=True, eq=False)
+class Poles:
+    """Natural frequencies, each with the standard deviation of its logarithm.
+
+    Attributes
+    ----------
+    frequency : (n,) Hz
+    sd : (n,)                 of ln f, from the identification
+    scale : float             spread of ln f that no model reaches; a hypothesis may raise it
+    use : (n,) bool           poles the fit may see
+    visible : (n_places...)   rows that say how well a model mode can be seen, or None
+    rigid : int               rigid-body modes of the model, left out
+    """
+
+    frequency: np.ndarray
+    sd: np.ndarray
+    use: np.ndarray
+    scale: float = 0.006
+    outputs: object = None
+    inputs: object = None
+    a: np.ndarray | None = None
+    b: np.ndarray | None = None
+    lowest: float = 1.0
+
+    def over(self, model: Reduced) -> Self:
+        """Rows for the visibility of modes in the basis of this model."""
+        if self.outputs is None or self.inputs is None:
+            return self
+        return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
+
+    def pairs(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (test pole, model mode) that belong together."""
+        f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+        flexible = np.flatnonzero(f > self.lowest)
+        flexible = flexible[f[flexible] < 1.6 * self.frequency.max()]
+        test, model = paired(self.frequency, f[flexible], self.visibility(state, flexible))
+        return test, flexible[model]
+
+    def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
+        """How strongly each mode shows, 1 = as the strongest: rms residue over likely places."""
+        if self.a is None or self.b is None:
+            return np.ones(len(modes))
+        seen = np.sqrt(((self.a @ state.phi[:, modes]) ** 2).mean(axis=0))
+        hit = np.sqrt(((self.b @ state.phi[:, modes]) ** 2).mean(axis=0))
+        strength = seen * hit
+        return np.asarray(strength / strength.max())
+
+    def deviation(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """ln(f_model / f_test) of every pair, with the pairs."""
+        test, model = self.pairs(state)
+        f = np.sqrt(state.lam[model]) / (2 * np.pi)
+        return np.log(f / self.frequency[test]), test, model
+
+    def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """ln(f_model / f_test) over its spread; a pole without a partner costs four spreads."""
+        delta, test, model = self.deviation(state)
+        n = len(self.frequency)
+        r, J = np.full(n, LONELY), np.zeros((n, len(state.dK)))
+        sd = np.sqrt(self.sd[test] ** 2 + self.scale**2)
+        r[test] = delta / sd
+        if gradient:
+            lam = state.lam[model]
+            dlam = state.dK[:, model, model] - lam * state.dM[:, model, model]
+            J[test] = (dlam / (2 * lam) / sd).T
+        return r[self.use], J[self.use]
+
+    def only(self, use: np.ndarray) -> Self:
+        """The same poles, others in use."""
+        return replace(self, use=use)
+
+    def Q(self, state: State, use: np.ndarray | None = None) -> float:
+        """Mean |log10(f_model / f_test)|² over the paired poles in use."""
+        use = self.use if use is None else use
+        delta, test, _ = self.deviation(state)
+        mine = use[test]
+        return float(np.mean((delta[mine] / LN10) ** 2)) if mine.any() else float("nan")
+
+
+LONELY = 4.0  # whitened residual of a test pole without a partner

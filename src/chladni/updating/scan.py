@@ -1,0 +1,131 @@
+"""Every place at once: exact low-rank re-analysis, ordinary parameters profiled out linearly.
+
+The receptance of the structure with a spring or mass D(s) at b is G_of - G_ob (1/D + G_bb)⁻¹ G_bf;
+G_bb carries the residual flexibility of what the basis leaves out.  Ordinary parameters and scatter
+are marginalised: C = I + W Wᵀ with W the slopes times the prior deviations (Woodbury).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.catalogue import Places
+from ..effects.effect import Effect, FieldChange, Parameter
+from .calibration import Weighing, unknowns
+from .likelihood import LN10, POWER, Data, Responses
+from .reduced import Reduced, State, evaluate
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A state of the base effects and what is needed to score small changes of it.
+
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².
+    """
+
+    effects: tuple[Effect, ...]
+    x: np.ndarray
+    state: State
+    residual: np.ndarray
+    Z: np.ndarray
+    weighing: Weighing | None
+
+    def score(self, residuals: np.ndarray) -> np.ndarray:
+        """rᵀ C⁻¹ r of every column (n, m) -> (m,)."""
+        return np.asarray((residuals**2).sum(axis=0) - ((self.Z @ residuals) ** 2).sum(axis=0))
+
+    def with_mass(self, r: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+        """The data's residuals (n_data, m) with the row of the scales below them."""
+        if self.weighing is None:
+            return r
+        row = (self.state.weight + added - self.weighing.mass) / self.weighing.sd
+        return np.concatenate([r, np.broadcast_to(row, (1, r.shape[1]))])
+
+
+def baseline(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Data,
+    weighing: Weighing | None,
+    x: np.ndarray,
+) -> Baseline:
+    """Linearise the base effects at x."""
+    state = evaluate(model, effects, x)
+    r, J = data.residual(state, True)
+    if weighing is not None:
+        r = np.append(r, (state.weight - weighing.mass) / weighing.sd)
+        J = np.concatenate([J, state.dweight[None] / weighing.sd])
+    W = J * np.array([p.sd for p in unknowns(effects)])
+    L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
+    return Baseline(tuple(effects), x, state, r, np.linalg.solve(L, W.T), weighing)
+
+
+def point_scores(
+    base: Baseline, model: Reduced, data: Responses, places: Places, matrix: str,
+    strengths: np.ndarray, residual_flexibility: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Score of one mass or spring of each strength at each place (n_places, n_strengths).
+
+    Parameters
+    ----------
+    strengths : [kg] or [N/m]
+    residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
+    """
+    state = base.state
+    phi_o, phi_i = data.a @ state.phi, data.b @ state.phi
+    phi_b = model.rows(places.rows) @ state.phi
+    d = 1 / (state.lam + data.s[:, None] ** 2)
+    H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+    G_ob = np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True)
+    G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
+    G_bb = (phi_b**2) @ d.T + residual_flexibility[:, None]
+    out = np.empty((len(places), len(strengths)))
+    for k, c in enumerate(strengths):
+        D = c * data.s**2 if matrix == "M" else c + 0 * data.s
+        share = D / (1 + D * G_bb)
+        new = H[None] - G_ob[..., None] * (share[:, :, None, None] * G_bi[:, :, None, :])
+        added = c if matrix == "M" else 0.0
+        out[:, k] = base.score(base.with_mass(_residuals(data, state, new), added))
+    return out
+
+
+def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
+    """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
+    from ..ema.correlation import wrapped
+
+    scale = data.s[:, None, None] ** POWER[data.quantity] / data.values
+    delta = np.log(H * scale) / LN10
+    if state.offset is not None:
+        delta = delta + state.offset[:, None]
+    z = (wrapped(delta) / data.spread())[:, data.use].reshape(len(H), -1)
+    return np.concatenate([z.real, z.imag], axis=1).T
+
+
+@dataclass(frozen=True, eq=False)
+class _Probe(Effect):
+    """Thickness of every group by itself."""
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """ln t of each group is one parameter."""
+        return (FieldChange("t", x, np.eye(len(x))),)
+
+
+def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
+    """∂r/∂ln t of every group, the row of the scales included (n, n_groups)."""
+    n = len(model.sheet)
+    probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
+    state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
+    _, J = data.residual(state, True)
+    if base.weighing is not None:
+        J = np.concatenate([J, state.dweight[None] / base.weighing.sd])
+    return J[:, -n:]
+
+
+def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Best amount along each column and the score there: min_a (r + a c)ᵀ C⁻¹ (r + a c)."""
+    Zc, Zr = base.Z @ columns, base.Z @ base.residual
+    cc = (columns**2).sum(axis=0) - (Zc**2).sum(axis=0)
+    cr = columns.T @ base.residual - Zc.T @ Zr
+    amount = -cr / np.maximum(cc, 1e-12)
+    return amount, base.score(base.residual[:, None])[0] - cr**2 / np.maximum(cc, 1e-12)
