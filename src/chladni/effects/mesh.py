@@ -1,0 +1,93 @@
+"""What the mesh of the deck, and the formulation of its elements, hide."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import ModalModel
+from ..fem.assemble import Structure, structure
+from ..model.refine import refined
+from .effect import Effect, Parameter, PointTerm
+
+MOST = 40_000  # dofs of a structure that is still refined
+LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
+
+
+@dataclass(frozen=True, eq=False)
+class MeshError(Effect):
+    """Modal stiffness moves by x times the change that a mesh twice as fine brings."""
+
+    name = "mesh-error"
+    claim = "the mesh is not infinitely fine"
+    kind = "nuisance"
+
+    rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    change: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """x ΔK over the modes."""
+        return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None]),)
+
+
+@dataclass(frozen=True, eq=False)
+class Jitter(Effect):
+    """Every mode's stiffness may be off a little on its own."""
+
+    name = "jitter"
+    claim = "elements of another formulation give slightly other frequencies"
+    kind = "nuisance"
+
+    rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    lam: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """λ_r x_r on the diagonal of the modal stiffness."""
+        return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam)),)
+
+
+def mesh_error(built: Structure, top: float) -> MeshError | None:
+    """The mesh error of a structure up to 1.4 times the frequency ``top``; None if too large.
+
+    With Ψ the refined modes at the old points, B = polar(ΦᵀMΨ) and ΔK = B Λ_ref Bᵀ - Λ.
+    """
+    if len(built.system.dofs) > MOST or not len(built.assembly.shells):
+        return None
+    coarse = _flexible(normal_modes(built.system, band=1.4 * top), top)
+    finer = structure(refined(built.assembly))
+    fine = _flexible(normal_modes(finer.system, band=1.6 * top), top)
+    rows = _rows_of(finer, built)
+    M_phi = built.system.M @ coarse.shapes
+    U, _, Vt = np.linalg.svd(M_phi.T @ (rows @ fine.shapes), full_matrices=False)
+    B = U @ Vt
+    omega2 = (2 * np.pi * fine.frequency) ** 2
+    delta = (B * omega2) @ B.T - np.diag((2 * np.pi * coarse.frequency) ** 2)
+    change, V = np.linalg.eigh((delta + delta.T) / 2)
+    unknown = Parameter("mesh", "-", LIMIT - 0.17, 0.3, kind="linear", step=0.5)
+    return MeshError(
+        (unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change
+    )
+
+
+def jitter(built: Structure, top: float, sd: float = 0.002) -> Jitter:
+    """Independent scatter of each modal frequency up to ``top``, sd of ln f."""
+    modes = _flexible(normal_modes(built.system, band=1.1 * top), top)
+    unknown = tuple(
+        Parameter(f"mode {r + 1}", "-", 0.0, 2 * sd, kind="linear", step=4 * sd)
+        for r in range(len(modes.frequency))
+    )
+    rows = sp.csr_array((built.system.M @ modes.shapes).T)
+    return Jitter(unknown, "every mode", rows=rows, lam=(2 * np.pi * modes.frequency) ** 2)
+
+
+def _flexible(modes: ModalModel, top: float) -> ModalModel:
+    keep = modes.frequency > 1e-3 * top
+    return ModalModel(
+        modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs
+    )
+
+
+def _rows_of(finer: Structure, coarse: Structure) -> sp.csr_array:
+    """Rows of the finer structure at the free dofs of the coarse one."""
+    return finer.rows(coarse.system.dofs)

@@ -1,0 +1,123 @@
+"""The same structure with every shell split in four: what the mesh hides becomes visible.
+
+New nodes lie on the smooth surface through the old ones where the sheet is smooth (cubic edges
+from vertex normals, Vlachos et al. 2001, Curved PN triangles), on the chord at folds.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .assembly import Assembly, Shells
+
+SMOOTH = np.cos(np.radians(35.0))  # facets that differ by more make a fold
+
+
+def refined(assembly: Assembly) -> Assembly:
+    """The assembly with every shell halved along both directions; all else as it was.
+
+    Old points keep their rows and ids; new ones follow with new ids.
+    """
+    shells = assembly.shells
+    tri = shells.triangle
+    edges, of = _edges(shells.nodes)
+    normal, smooth = _normals(assembly)
+    middle = _bent(assembly.points, edges, normal, smooth)
+    n, m = len(assembly.points), len(edges)
+    quads = shells.nodes[~tri]
+    centre = assembly.points[quads].mean(axis=1)
+    sides = middle[of[~tri]]
+    # the centre of a bent patch: Coons' blend of its sides
+    centre = sides.mean(axis=1) * 2 - centre if len(quads) else centre
+    points = np.concatenate([assembly.points, middle, centre])
+    first = int(assembly.ids.max()) + 1
+    ids = np.concatenate([assembly.ids, first + np.arange(m + len(quads))])
+    return replace(
+        assembly,
+        ids=ids,
+        points=points,
+        shells=_split(shells, of + n, n + m),
+        axes=None if assembly.axes is None else _padded(assembly.axes, len(points)),
+        scalar_points=None
+        if assembly.scalar_points is None
+        else np.append(assembly.scalar_points, np.zeros(m + len(quads), bool)),
+    )
+
+
+def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unique edges (k, 2) and, per shell, the edge after each corner (m, 4)."""
+    pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
+    tri = nodes[:, 2] == nodes[:, 3]
+    pairs[tri, 2] = pairs[tri, 3]  # a triangle's third edge leads from its third corner to the first
+    flat = np.sort(pairs.reshape(-1, 2), axis=1)
+    edges, of = np.unique(flat, axis=0, return_inverse=True)
+    return edges, of.reshape(-1, 4)
+
+
+def _normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+    """Vertex normals (n, 3) and whether all facets of one part agree there (n,)."""
+    nodes = assembly.shells.nodes
+    X = assembly.points[nodes]
+    face = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
+    total = np.zeros_like(assembly.points)
+    for k in range(4):
+        np.add.at(total, nodes[:, k], face)
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    least, low, high = (np.full(len(total), v) for v in (1.0, 1e9, -1e9))
+    for k in range(4):
+        np.minimum.at(least, nodes[:, k], np.einsum("ij,ij->i", face, total[nodes[:, k]]))
+        np.minimum.at(low, nodes[:, k], assembly.shells.part)
+        np.maximum.at(high, nodes[:, k], assembly.shells.part)
+    return total, (least > SMOOTH) & (low == high)
+
+
+def _bent(
+    points: np.ndarray, edges: np.ndarray, normal: np.ndarray, smooth: np.ndarray
+) -> np.ndarray:
+    """Middle of each edge on the cubic through both ends square to both normals."""
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    n_a, n_b = normal[edges[:, 0]], normal[edges[:, 1]]
+    d = b - a
+    lift = np.einsum("ij,ij->i", d, n_a)[:, None] * n_a - np.einsum("ij,ij->i", d, n_b)[:, None] * n_b
+    both = (smooth[edges[:, 0]] & smooth[edges[:, 1]])[:, None]
+    return np.asarray((a + b) / 2 - np.where(both, lift / 8, 0.0))
+
+
+def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
+    """Four shells in place of each: corners, sides and centres as rows of the new points."""
+    c, t = shells.nodes, shells.thickness
+    tri = np.flatnonzero(shells.triangle)
+    quad = np.flatnonzero(~shells.triangle)
+    mid = np.zeros(len(c), int)
+    mid[quad] = centre + np.arange(len(quad))
+    t_side = (t + np.roll(t, -1, axis=1)) / 2
+    t_side[tri, 2] = (t[tri, 2] + t[tri, 0]) / 2
+    t_mid = t.mean(axis=1)
+    pieces = []
+    for k in range(4):
+        j = (k - 1) % 4
+        nodes = np.stack([c[quad, k], side[quad, k], mid[quad], side[quad, j]], axis=1)
+        thick = np.stack([t[quad, k], t_side[quad, k], t_mid[quad], t_side[quad, j]], axis=1)
+        pieces.append((quad, nodes, thick))
+    for k in range(3):
+        j = (k - 1) % 3
+        nodes = np.stack([c[tri, k], side[tri, k], side[tri, j], side[tri, j]], axis=1)
+        thick = np.stack([t[tri, k], t_side[tri, k], t_side[tri, j], t_side[tri, j]], axis=1)
+        pieces.append((tri, nodes, thick))
+    nodes = np.stack([side[tri, 0], side[tri, 1], side[tri, 2], side[tri, 2]], axis=1)
+    thick = np.stack([t_side[tri, 0], t_side[tri, 1], t_side[tri, 2], t_side[tri, 2]], axis=1)
+    pieces.append((tri, nodes, thick))
+    at = np.concatenate([p[0] for p in pieces])
+    return Shells(
+        1 + np.arange(len(at)),
+        np.concatenate([p[1] for p in pieces]),
+        shells.part[at],
+        np.concatenate([p[2] for p in pieces]),
+        shells.axis[at],
+        shells.offset[at],
+    )
+
+
+def _padded(axes: np.ndarray, n: int) -> np.ndarray:
+    return np.concatenate([axes, np.broadcast_to(np.eye(3), (n - len(axes), 3, 3))])
