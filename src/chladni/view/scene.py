@@ -54,19 +54,19 @@ def montage(
     seen: Surface,
     shapes: np.ndarray,
     frequency: np.ndarray,
-    first: int = 1,
+    numbers: Sequence[int] | None = None,
     columns: int = 4,
 ) -> Path:
-    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from ``first``."""
+    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from 1 if not told."""
     camera, r = _roomy(seen), shapes.shape[2]
-    columns = min(columns, r)
+    names, columns = list(numbers or range(1, r + 1)), min(columns, r)
     rows = -(-r // columns)
     tile = 12.0 / columns
     figure = Figure(figsize=(12.0, rows * (tile / max(camera.aspect, 0.7) + 0.32)))
     for k in range(r):
         ax = figure.add_axes(_cell(k, rows, columns))
         _swung(ax, seen, _real(shapes[:, :, k]), camera)
-        ax.set_title(f"{first + k}    {frequency[k]:.4g} Hz", fontsize=10)
+        ax.set_title(f"{names[k]}    {frequency[k]:.4g} Hz", fontsize=10)
     return paper.save(figure, path, dpi=140)
 
 

@@ -1,0 +1,113 @@
+"""What commands share about a model: from a path to its assembly, its modes, its pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dofs import parse
+from ..dynamics.modes import ModalModel
+from ..errors import FileError, LabelError
+from ..fem.assemble import Structure, structure
+from ..model.assembly import Assembly
+from ..view.surface import Surface, surface
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """An assembly with its matrices, made when first asked for."""
+
+    source: Path
+    assembly: Assembly
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Matrices of the free degrees of freedom."""
+        return structure(self.assembly)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Place of the node of each row of the system (n, 3) [m]."""
+        dofs = self.structure.system.dofs
+        return np.asarray(self.assembly.points[self.assembly.rows(dofs[:, 0])])
+
+    @cached_property
+    def seen(self) -> Surface:
+        """What a picture of it shows."""
+        return surface(self.assembly)
+
+    def modes(self, count: int) -> ModalModel:
+        """The lowest normal modes."""
+        from ..dynamics.eigen import normal_modes
+
+        count = min(count, len(self.structure.system.dofs))
+        return normal_modes(self.structure.system, count, points=self.places)
+
+    def directions(self, labels: Sequence[str]) -> sp.csr_array:
+        """Motion at labels as 12:+Z or 12:n (the surface normal): (k, n_free)."""
+        return sp.csr_array(sp.vstack([self._direction(text) for text in labels]))
+
+    def _direction(self, text: str) -> sp.csr_array:
+        point, _, axis = text.partition(":")
+        if axis.strip() == "n" and point.strip().isdecimal():
+            ids = np.array([int(point)])
+            return self.structure.along(ids, normals_at(self.assembly, ids))
+        point_id, component, sign = parse(text)
+        return sp.csr_array(sign * self.structure.rows(np.array([[point_id, component]])))
+
+    def motion(self, shapes: np.ndarray) -> np.ndarray:
+        """Translation of every point in the basic frame, u = T q: (n, r) -> (n_points, 3, r)."""
+        u = self.structure.T @ shapes
+        return np.asarray(u.reshape(len(self.assembly.points), 6, -1)[:, :3])
+
+
+def load_model(source: Path, units: str | None = None) -> Model:
+    """The model of a bare deck, or of a case (folder or case.toml).
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is no deck and no case.
+    """
+    if not source.exists():
+        raise FileError(f"no file or folder {source}{_beside(source)}")
+    if is_case(source):
+        from ..case import load_case
+
+        return Model(source, load_case(source).assembly)
+    from ..meshing.nastran import assembly, read_deck
+
+    return Model(source, assembly(read_deck(source), units))
+
+
+def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
+    """Unit normal of the shells around each grid, weighted by area: (k, 3)."""
+    seen, at = surface(assembly), assembly.rows(ids)
+    normal = np.zeros_like(seen.points)
+    for corner in range(4):
+        np.add.at(normal, seen.faces[:, corner], seen.areas())
+    length = np.linalg.norm(normal[at], axis=1, keepdims=True)
+    if np.any(bare := length[:, 0] == 0):
+        raise LabelError(
+            f"grid {ids[bare][0]} is on no shell, so it has no normal; give +X, +Y, +Z"
+        )
+    return np.asarray(normal[at] / length)
+
+
+def is_case(source: Path) -> bool:
+    """A folder (with a case.toml, or to be told that there is none) or a .toml file."""
+    return source.is_dir() or source.suffix == ".toml"
+
+
+def _beside(source: Path) -> str:
+    """The names nearest to the one that is missing, else those of its kind."""
+    if not source.parent.is_dir():
+        return f"; there is no folder {source.parent} either"
+    names = sorted(p.name for p in source.parent.iterdir() if not p.name.startswith("."))
+    alike = [n for n in names if Path(n).suffix == source.suffix]
+    near = get_close_matches(source.name, names, 4) or alike[:4]
+    return f"; beside it there is {', '.join(near)}" if near else ""
