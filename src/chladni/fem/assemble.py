@@ -15,11 +15,11 @@ from ..dynamics.system import System
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from . import shell
-from .gather import accumulate, blocks, congruence, with_rotations
+from .gather import EVERY, INERTIA, accumulate, blocks, congruence, with_rotations
 from .shell_section import SectionArrays, section_arrays
 
 EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSPC
-PIECE = 4096  # shells whose matrices are in memory at a time
+PIECE = 1024  # shells whose matrices are in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,9 @@ def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:
     sections = section_arrays(assembly, geo, residual_bending=residual_bending)
     lossy = bool(sections.loss.any())
     parts = _pieces(assembly, geo, sections, lossy)
-    found = accumulate(geo.nodes, len(assembly.points), parts, 3 if lossy else 2)
+    inertia = EVERY if geo.offset.any() else INERTIA
+    masks = (inertia, EVERY, EVERY)[: 3 if lossy else 2]
+    found = accumulate(geo.nodes, len(assembly.points), parts, masks)
     return found[0], None, found[1], found[2] if lossy else None
 
 
@@ -217,8 +219,8 @@ def _without_stiffness(
     _, triple = np.unique(triple, return_inverse=True)
     D = _diagonal_blocks(K, dofs, triple)
     idle = np.zeros((len(D), 3), bool)
-    for k in _suspects(D):
-        idle[k] = _idle(D[k])
+    weak = _suspects(D)
+    idle[weak] = _idle(D[weak])
     return idle[triple, (dofs[:, 1] - 1) % 3]
 
 
@@ -241,10 +243,11 @@ def _suspects(D: np.ndarray) -> np.ndarray:
 
 
 def _idle(D: np.ndarray) -> np.ndarray:
-    """(3,) bool: for each direction without stiffness, the component nearest to it."""
+    """(k, 3) bool: for each direction of D (k, 3, 3) without stiffness, the nearest component."""
     value, vector = np.linalg.eigh(D)
-    idle = np.zeros(3, bool)
-    for k in np.flatnonzero(value <= EMPTY * max(value[-1], 0.0)):
-        nearness = np.where(idle, -1, np.abs(vector[:, k]))
-        idle[int(np.argmax(nearness))] = True
+    idle, every = np.zeros((len(D), 3), bool), np.arange(len(D))
+    for r in range(3):
+        soft = value[:, r] <= EMPTY * np.maximum(value[:, 2], 0)
+        nearest = np.argmax(np.where(idle, -1, np.abs(vector[:, :, r])), axis=1)
+        idle[every[soft], nearest[soft]] = True
     return idle

@@ -1,6 +1,7 @@
 """Element matrices into sparse ones: six by six blocks between points, then Tᵀ A T."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,60 +9,143 @@ import scipy.sparse as sp
 Rows = np.ndarray | slice
 
 
-def pattern(nodes: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Block pattern of elements over n points.
+EVERY = np.ones((6, 6), dtype=bool)
+INERTIA = np.kron(np.eye(2, dtype=bool), np.ones((3, 3), dtype=bool)) & (
+    np.eye(6, dtype=bool) | (np.arange(6) > 2)
+)  # a mass without offset: translations uncoupled, rotations full
 
-    Parameters
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """The b pairs of points that share an element, row by row, and where elements meet them.
+
+    Attributes
     ----------
     nodes : (m, k) int
-
-    Returns
-    -------
-    indptr (n + 1,), indices (b,), slot (m, k, k)
-        Compressed rows of the b blocks, and the block each pair of an element's nodes adds to.
+    column : (b,) int       second point of each pair
+    width : (n,) int        pairs of each point
+    slot : (m, k, k) int    position of an element's pair among its first point's
+    before : (n,) int       pairs before each point's
     """
-    key = nodes[:, :, None].astype(np.int64) * n + nodes[:, None, :]
-    pairs, slot = np.unique(key, return_inverse=True)
-    row, indices = np.divmod(pairs, n)
-    indptr = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
-    return indptr, indices.astype(np.int32), slot.reshape(key.shape)
+
+    nodes: np.ndarray
+    column: np.ndarray
+    width: np.ndarray
+    slot: np.ndarray
+    before: np.ndarray
+
+
+def pairs(nodes: np.ndarray, n: int) -> Pairs:
+    """Pairs of points among n that share an element; nodes (m, k) int."""
+    nodes = np.asarray(nodes, dtype=np.int64)
+    key = nodes[:, :, None] * n + nodes[:, None, :]
+    found, slot = np.unique(key, return_inverse=True)
+    row, column = np.divmod(found, n)
+    width = np.bincount(row, minlength=n)
+    before = np.cumsum(width) - width
+    slot = slot.reshape(key.shape) - before[nodes][:, :, None]
+    return Pairs(nodes, column, width, slot, before)
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A csr of six rows a point whose 6 x 6 blocks are filled where ``mask`` says.
+
+    Entry (r, c) of a block lies ``start + width * above[r] + slot * along[r] + rank(r, c)`` from
+    the beginning.
+
+    Attributes
+    ----------
+    pairs : Pairs
+    mask : (6, 6) bool
+    along, above : (6,) int     entries of a block's row, and before it
+    start : (n,) int            entries before a point's
+    """
+
+    pairs: Pairs
+    mask: np.ndarray
+    along: np.ndarray
+    above: np.ndarray
+    start: np.ndarray
+
+    def structure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Column indices and row pointers of the csr."""
+        p, n = self.pairs, len(self.start)
+        if self.mask.all():
+            spots = np.empty((len(p.column), 6, 6), dtype=np.int8)
+            where = (spots, p.column.astype(np.int32), np.append(p.before, len(spots)))
+            wide = sp.bsr_array(where, shape=(6 * n, 6 * n)).tocsr()
+            return wide.indices, wide.indptr
+        count = (p.width[:, None] * self.along).ravel()
+        indices = np.empty(count.sum(), dtype=np.int32)
+        columns = 6 * p.column[:, None] + np.arange(6)
+        for r in range(6):
+            first = self.start + p.width * self.above[r] - p.before * self.along[r]
+            at = np.repeat(first, p.width) + np.arange(len(p.column)) * self.along[r]
+            indices[at[:, None] + np.arange(self.along[r])] = columns[:, self.mask[r]]
+        return indices, np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+
+    def add(self, data: np.ndarray, matrices: np.ndarray, rows: Rows = slice(None)) -> None:
+        """Add element matrices (r, 6k, 6k) of these rows of elements to the csr's values."""
+        nodes, slot = self.pairs.nodes[rows], self.pairs.slot[rows]
+        start, width = self.start[nodes][:, :, None], self.pairs.width[nodes][:, :, None]
+        A = matrices.reshape(len(nodes), nodes.shape[1], 6, nodes.shape[1], 6)
+        for r in range(6):
+            at = start + width * self.above[r] + slot * self.along[r]
+            at = at[..., None] + np.arange(self.along[r])
+            np.add.at(data, at.ravel(), A[:, :, r][..., self.mask[r]].ravel())
+
+
+def pattern(shared: Pairs, mask: np.ndarray) -> Pattern:
+    """Pattern of these pairs with blocks filled where the mask (6, 6) says."""
+    along = mask.sum(axis=1)
+    start = shared.before * int(along.sum())
+    return Pattern(shared, mask, along, np.cumsum(along) - along, start)
 
 
 def accumulate(
-    nodes: np.ndarray, n: int, parts: Iterable[tuple[Rows, tuple[np.ndarray, ...]]], count: int
+    nodes: np.ndarray,
+    n: int,
+    parts: Iterable[tuple[Rows, tuple[np.ndarray, ...]]],
+    masks: Sequence[np.ndarray] = (EVERY,),
 ) -> list[sp.csr_array]:
-    """Sum of element matrices that arrive in pieces, ``count`` matrices at a time.
+    """Sums of several kinds of element matrices that arrive in pieces.
 
     Parameters
     ----------
     nodes : (m, k) int
     n : int                 points
-    parts : pairs of (rows of elements, (A (r, 6k, 6k), B (r, 6k, 6k), ...))
+    parts : pairs of (rows of elements, one (r, 6k, 6k) of each kind)
+    masks : (6, 6) bool of each kind, where a block between two points may be other than zero
 
     Returns
     -------
     list of csr (6n, 6n)
     """
-    indptr, indices, slot = pattern(nodes, n)
-    sums = [np.zeros((len(indices), 36)) for _ in range(count)]
+    shared = pairs(nodes, n)
+    patterns = [pattern(shared, mask) for mask in masks]
+    sums = [np.zeros(len(shared.column) * int(mask.sum())) for mask in masks]
     for rows, matrices in parts:
-        blocks_here, where = np.unique(slot[rows], return_inverse=True)
-        where = where.ravel()
-        pick = sp.csr_array(
-            (np.ones(len(where)), (where, np.arange(len(where)))),
-            shape=(len(blocks_here), len(where)),
-        )
-        for total, A in zip(sums, matrices, strict=True):
-            total[blocks_here] += pick @ _blocks_of(A)
-    return [_csr(total, indptr, indices, n) for total in sums]
+        for data, places, A in zip(sums, patterns, matrices, strict=True):
+            places.add(data, A, rows)
+    return [_csr(data, *p.structure()) for data, p in zip(sums, patterns, strict=True)]
+
+
+def _csr(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csr_array:
+    """Without the zeros, where they are many."""
+    n = len(indptr) - 1
+    if np.count_nonzero(data) < 0.95 * len(data):
+        kept = np.flatnonzero(data)
+        data, indices = data[kept], indices[kept]
+        indptr = np.searchsorted(kept, indptr).astype(np.int32)
+    return sp.csr_array((data, indices, indptr), shape=(n, n))
 
 
 def blocks(matrices: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array:
     """Sum of element matrices (m, 6k, 6k) over n points: csr (6n, 6n)."""
-    nodes = np.asarray(nodes, dtype=np.int64)
     if not len(nodes):
         return sp.csr_array((6 * n, 6 * n))
-    return accumulate(nodes, n, [(slice(None), (np.asarray(matrices),))], 1)[0]
+    return accumulate(nodes, n, [(slice(None), (np.asarray(matrices),))])[0]
 
 
 def with_rotations(matrices: np.ndarray) -> np.ndarray:
@@ -113,17 +197,3 @@ def _lift(A: sp.csr_array, rows: np.ndarray, n: int) -> sp.csr_array:
     count[rows] = np.diff(A.indptr)
     indptr = np.concatenate([[0], np.cumsum(count)]).astype(A.indptr.dtype)
     return sp.csr_array((A.data, A.indices, indptr), shape=(n, A.shape[1]))
-
-
-def _blocks_of(A: np.ndarray) -> np.ndarray:
-    """(m, 6k, 6k) as its 6 x 6 blocks (m k k, 36)."""
-    m, k = len(A), A.shape[1] // 6
-    return np.ascontiguousarray(A.reshape(m, k, 6, k, 6).swapaxes(2, 3)).reshape(-1, 36)
-
-
-def _csr(data: np.ndarray, indptr: np.ndarray, indices: np.ndarray, n: int) -> sp.csr_array:
-    """Blocks as csr without the zeros."""
-    wide = sp.bsr_array((data.reshape(-1, 6, 6), indices, indptr), shape=(6 * n, 6 * n))
-    A = sp.csr_array(wide.tocsr())
-    A.eliminate_zeros()
-    return A

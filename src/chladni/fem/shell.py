@@ -11,7 +11,7 @@ With ``reference`` = the nominal Q_m the nominal stiffness is exactly QM6 and ev
 from another Q is the exact derivative of the condensed element (see :mod:`.shell_membrane`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,27 +24,24 @@ from .shell_membrane import jacobians
 from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
-CHUNK = 1024  # elements a pass: what fits the cache
+CHUNK = 512  # elements a pass: what fits the cache
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
+MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
+Rows = np.ndarray | slice
 
 
 @dataclass(frozen=True, eq=False)
 class Strains:
-    """Generalised strains of m shells of one shape at their g points, from 24 nodal motions.
+    """Generalised strains (ε κ γ ω-rz) of m shells of one shape at g points, from nodal motions.
 
     Attributes
     ----------
-    membrane, bending : (m, g, 3, 24)   ε [-], κ [1/m] in the element frame
-    shear : (m, g, 2, 24)               γ [-]
-    drill : (m, g, 1, 24)               ω - rz [-]
-    weight : (m, g)                     dA [m²]
-    N : (g, 4)                          shape functions, for values given at corners
+    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] in the element frame
+    weight : (m, g)       dA [m²]
+    N : (g, 4)            shape functions, for values given at corners
     """
 
-    membrane: np.ndarray
-    bending: np.ndarray
-    shear: np.ndarray
-    drill: np.ndarray
+    B: np.ndarray
     weight: np.ndarray
     N: np.ndarray
 
@@ -58,23 +55,22 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     reference : (m, 3, 3) or (3, 3)
         Membrane stiffness in the material frame, any scale, for which the bubbles are condensed.
     """
-    reference = POISSON_03 if reference is None else reference
     if geo.triangle.any():
         epsilon, omega = triangle.membrane(geo.corners)
         kappa, gamma = triangle.plate(geo.corners)
-        weight, N = np.repeat(geo.area[:, None] / 3, 3, axis=1), triangle.N
     else:
-        epsilon, omega = _quad_membrane(geo.corners, turned(reference, geo.turn))
+        sheet = POISSON_03 if reference is None else reference
+        epsilon, omega = _quad_membrane(geo.corners, turned(sheet, geo.turn))
         kappa, gamma = _quad_plate(geo.corners)
-        weight, N = jacobians(geo.corners)[1], QUAD_N
-    return Strains(
-        membrane=_from_plane(geo, epsilon),
-        bending=_from_rotations(geo, kappa),
-        shear=_from_plate(geo, gamma),
-        drill=_from_plane(geo, omega) - _from_normal(geo, N),
-        weight=weight,
-        N=N,
-    )
+    weight, N = _quadrature(geo)
+    B = np.zeros((len(geo), len(N), 9, 4, 6))  # nodal motions in the element frame
+    B[:, :, MEMBRANE, :, :2] = epsilon.reshape(len(geo), -1, 3, 4, 2)
+    B[:, :, BENDING, :, 3:5] = kappa.reshape(len(geo), -1, 3, 4, 2)
+    B[:, :, SHEAR, :, 2:5] = gamma.reshape(len(geo), -1, 2, 4, 3)
+    B[:, :, DRILL, :, :2] = omega.reshape(len(geo), -1, 1, 4, 2)
+    B[:, :, 8, :, 5] = -N
+    B = B.reshape(len(geo), -1, 24) @ _to_element(geo)
+    return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
 
 
 def stiffness(
@@ -111,21 +107,13 @@ def stiffness(
     -------
     (m, 24, 24)             basic frame, nodal order ux uy uz rx ry rz [N/m, N, N m]
     """
-    reference = Qm if reference is None else reference
-    K = np.zeros((len(geo), 24, 24))
-    for rows in _chunks(geo):
-        part, thick = geo[rows], t[rows]
-        e = strains(part, _take(reference, rows))
-        t_g = thick @ e.N.T
-        terms: list[tuple[np.ndarray, np.ndarray]] = []
-        _add(terms, e.membrane, _plane(Qm, rows, part), t_g * e.weight)
-        _add(terms, e.bending, _plane(Qb, rows, part), t_g**3 / 12 * e.weight)
-        _add(terms, e.shear, _take(S, rows), e.weight)
-        _add(terms, e.drill, _scalar(drill, rows), e.weight)
-        K[rows] = _quadratic(terms, len(part)) + _coupling(
-            e, _plane(Qc, rows, part), -(t_g**2) * e.weight
-        )
-    return K
+
+    def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
+        t_g = t[rows] @ N.T
+        weights = (t_g, t_g**3 / 12, -(t_g**2))
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, S, drill))
+
+    return _integrated(geo, Qm if reference is None else reference, section)
 
 
 def thickness_derivative(
@@ -146,25 +134,18 @@ def thickness_derivative(
 
     Parameters
     ----------
-    change : (m, 4)         δt at the corners [m]; np.eye(4)[k] broadcast gives ∂K/∂t_k
-    dS : (m, 2, 2)          change of S for this δt (SectionArrays.shear_by_thickness) [N/m]
-    ddrill : (m,)           change of s [N/m]
+    change : (m, 4)         δt at the corners [m]; np.eye(4)[k] gives ∂K/∂t_k
+    dS : (m, 2, 2)          change of S for this δt, SectionArrays.shear_by_thickness [N/m]
+    ddrill : (m,)           change of s, SectionArrays.drill_by_thickness [N/m]
     """
-    reference = Qm if reference is None else reference
-    K, change = np.zeros((len(geo), 24, 24)), np.broadcast_to(change, t.shape)
-    for rows in _chunks(geo):
-        part = geo[rows]
-        e = strains(part, _take(reference, rows))
-        t_g, d_g = t[rows] @ e.N.T, change[rows] @ e.N.T
-        terms: list[tuple[np.ndarray, np.ndarray]] = []
-        _add(terms, e.membrane, _plane(Qm, rows, part), d_g * e.weight)
-        _add(terms, e.bending, _plane(Qb, rows, part), t_g**2 * d_g / 4 * e.weight)
-        _add(terms, e.shear, _take(dS, rows), e.weight)
-        _add(terms, e.drill, _scalar(ddrill, rows), e.weight)
-        K[rows] = _quadratic(terms, len(part)) + _coupling(
-            e, _plane(Qc, rows, part), -2 * t_g * d_g * e.weight
-        )
-    return K
+    change = np.broadcast_to(change, t.shape)
+
+    def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
+        t_g, d_g = t[rows] @ N.T, change[rows] @ N.T
+        weights = (d_g, t_g**2 * d_g / 4, -2 * t_g * d_g)
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, dS, ddrill))
+
+    return _integrated(geo, Qm if reference is None else reference, section)
 
 
 def mass(
@@ -225,7 +206,7 @@ def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return np.asarray(T.swapaxes(1, 2) @ Q @ T)
 
 
-def _chunks(geo: ShellGeometry) -> Iterator[np.ndarray | slice]:
+def _chunks(geo: ShellGeometry) -> Iterator[Rows]:
     """Rows of one shape, a cache's worth at a time."""
     mixed = geo.triangle.any() and not geo.triangle.all()
     for kind in (False, True) if mixed else (None,):
@@ -244,87 +225,66 @@ def _quadrature(geo: ShellGeometry) -> tuple[np.ndarray, np.ndarray]:
     return jacobians(geo.corners)[1], QUAD_N
 
 
-def _take(Q: np.ndarray | None, rows: np.ndarray | slice) -> np.ndarray | None:
-    return Q if Q is None or Q.ndim == 2 else Q[rows]
+def _integrated(
+    geo: ShellGeometry,
+    reference: np.ndarray | None,
+    section: Callable[[Rows, ShellGeometry, np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """∫ Bᵀ C B dA with C (m, g, 9, 9) from section(rows, geometry, N)."""
+    K = np.zeros((len(geo), 24, 24))
+    for rows in _chunks(geo):
+        part = geo[rows]
+        e = strains(part, *_of(rows, reference))
+        C = section(rows, part, e.N) * e.weight[:, :, None, None]
+        m = len(part)
+        K[rows] = e.B.reshape(m, -1, 24).swapaxes(1, 2) @ (C @ e.B).reshape(m, -1, 24)
+    return K
 
 
-def _plane(Q: np.ndarray | None, rows: np.ndarray | slice, geo: ShellGeometry) -> np.ndarray | None:
-    Q = _take(Q, rows)
-    return None if Q is None else turned(Q, geo.turn)
+def _section(
+    geo: ShellGeometry,
+    weights: tuple[np.ndarray, np.ndarray, np.ndarray],
+    Qm: np.ndarray | None,
+    Qb: np.ndarray | None,
+    Qc: np.ndarray | None,
+    S: np.ndarray | None,
+    drill: np.ndarray | None,
+) -> np.ndarray:
+    """C (m, g, 9, 9) of stress resultants over generalised strains, element frame."""
+    w_m, w_b, w_c = (w[:, :, None, None] for w in weights)
+    C = np.zeros((*weights[0].shape, 9, 9))
+    if Qm is not None:
+        C[:, :, MEMBRANE, MEMBRANE] = w_m * turned(Qm, geo.turn)[:, None]
+    if Qb is not None:
+        C[:, :, BENDING, BENDING] = w_b * turned(Qb, geo.turn)[:, None]
+    if Qc is not None and Qc.any():
+        C[:, :, MEMBRANE, BENDING] = w_c * turned(Qc, geo.turn)[:, None]
+        C[:, :, BENDING, MEMBRANE] = C[:, :, MEMBRANE, BENDING].swapaxes(2, 3)
+    if S is not None:
+        C[:, :, SHEAR, SHEAR] = S[:, None]
+    if drill is not None:
+        C[:, :, 8, 8] = drill[:, None]
+    return C
 
 
-def _scalar(s: np.ndarray | None, rows: np.ndarray | slice) -> np.ndarray | None:
-    return None if s is None else s[rows, None, None]
+def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
+    """Those rows of what is given for each element; one (3, 3) stands for all."""
+    for a in arrays:
+        yield a if a is None or a.shape == (3, 3) else a[rows]
 
 
-def _add(
-    terms: list[tuple[np.ndarray, np.ndarray]],
-    B: np.ndarray,
-    D: np.ndarray | None,
-    weight: np.ndarray,
-) -> None:
-    """Append B and w D B, rows of all points one under another."""
-    if D is not None:
-        m, g, k, _ = B.shape
-        stress = (D[:, None] * weight[:, :, None, None]) @ B
-        terms.append((B.reshape(m, g * k, 24), stress.reshape(m, g * k, 24)))
+def _to_element(geo: ShellGeometry) -> np.ndarray:
+    """Motion at the mid-surface in the element frame from that of the nodes: (m, 24, 24).
 
-
-def _quadratic(terms: list[tuple[np.ndarray, np.ndarray]], m: int) -> np.ndarray:
-    """Σ Bᵀ w D B (m, 24, 24)."""
-    if not terms:
-        return np.zeros((m, 24, 24))
-    B, DB = (np.concatenate(rows, axis=1) for rows in zip(*terms, strict=True))
-    return np.asarray(B.swapaxes(1, 2) @ DB)
-
-
-def _coupling(e: Strains, D: np.ndarray | None, weight: np.ndarray) -> np.ndarray:
-    """Σ w (εᵀ D κ + κᵀ D ε)."""
-    terms: list[tuple[np.ndarray, np.ndarray]] = []
-    _add(terms, e.bending, D, weight)
-    if not terms:
-        return np.zeros(1)
-    m, rows, _ = terms[0][0].shape
-    half = e.membrane.reshape(m, rows, 24).swapaxes(1, 2) @ terms[0][1]
-    return np.asarray(half + half.swapaxes(1, 2))
-
-
-def _from_plane(geo: ShellGeometry, B: np.ndarray) -> np.ndarray:
-    """In-plane u1 v1 u2 ... of the mid-surface to 24 nodal motions, u = e·u + link (n x ...)·r."""
-    m, g, k, _ = B.shape
-    e1, e2 = geo.frames[:, 0, None, None, None], geo.frames[:, 1, None, None, None]
-    u, v = B[..., 0::2, None], B[..., 1::2, None]
-    out = np.empty((m, g, k, 4, 6))
-    out[..., :3] = u * e1 + v * e2
-    out[..., 3:] = (u * e2 - v * e1) * geo.link[:, None, None, :, None]
-    return out.reshape(m, g, k, 24)
-
-
-def _from_rotations(geo: ShellGeometry, B: np.ndarray) -> np.ndarray:
-    """rx1 ry1 rx2 ... in the element frame to 24 nodal motions."""
-    m, g, k, _ = B.shape
-    e1, e2 = geo.frames[:, 0, None, None, None], geo.frames[:, 1, None, None, None]
-    out = np.zeros((m, g, k, 4, 6))
-    out[..., 3:] = B[..., 0::2, None] * e1 + B[..., 1::2, None] * e2
-    return out.reshape(m, g, k, 24)
-
-
-def _from_plate(geo: ShellGeometry, B: np.ndarray) -> np.ndarray:
-    """w1 rx1 ry1 w2 ... in the element frame to 24 nodal motions."""
-    m, g, k, _ = B.shape
-    e1, e2, n = (geo.frames[:, i, None, None, None] for i in range(3))
-    out = np.empty((m, g, k, 4, 6))
-    out[..., :3] = B[..., 0::3, None] * n
-    out[..., 3:] = B[..., 1::3, None] * e1 + B[..., 2::3, None] * e2
-    return out.reshape(m, g, k, 24)
-
-
-def _from_normal(geo: ShellGeometry, N: np.ndarray) -> np.ndarray:
-    """Rz = Σ N n·r (m, g, 1, 24)."""
-    m, g = len(geo), len(N)
-    out = np.zeros((m, g, 1, 4, 6))
-    out[..., 3:] = N[:, None, :, None] * geo.frames[:, 2, None, None, None]
-    return out.reshape(m, g, 1, 24)
+    u' = R (u + r x link n), r' = R r; R (r x n) = (r·y, -r·x, 0).
+    """
+    T = np.zeros((len(geo), 4, 6, 4, 6))
+    x, y = geo.frames[:, 0], geo.frames[:, 1]
+    for k in range(4):
+        T[:, k, :3, k, :3] = T[:, k, 3:, k, 3:] = geo.frames
+        T[:, k, 0, k, 3:] = geo.link[:, k, None] * y
+        T[:, k, 1, k, 3:] = -geo.link[:, k, None] * x
+    return T.reshape(len(geo), 24, 24)
 
 
 def _mass(
