@@ -124,8 +124,7 @@ def carries(name: str) -> bool:
 
 # Cards of the public-domain COSMIC release, read as their present-day kin.
 LEGACY: Final = frozenset(
-    """CRIGD1 CRIGD2 CRIGD3 CRIGDR CQUAD1 CQUAD2 CTRIA1 CTRIA2 PQUAD1 PQUAD2 PTRIA1 PTRIA2
-    CTRPLT1 PTRPLT1""".split()
+    "CRIGD1 CRIGD2 CRIGD3 CRIGDR CQUAD1 CQUAD2 CTRIA1 CTRIA2 PQUAD1 PQUAD2 PTRIA1 PTRIA2".split()
 )
 
 

@@ -97,6 +97,32 @@ class Cards:
     def _bad(self, i: int, k: int, word: bytes, kind: str) -> FileError:
         return self.refuse(i, f"{self.field_name(k)} is {word.decode('latin-1')!r}, not {kind}")
 
+    def word(self, i: int, k: int) -> str:
+        """Text of field k of card i."""
+        at = self.start[i] + k - 1
+        return str(self.text[at].decode("latin-1")) if at < self.start[i + 1] else ""
+
+    def integer(self, i: int, k: int, blank: int | None = None) -> int:
+        """Integer in field k of card i."""
+        return int(self.single(i).integers(k, blank)[0])
+
+    def real(self, i: int, k: int, blank: float | None = None) -> float:
+        """Real in field k of card i."""
+        return float(self.single(i).reals(k, blank)[0])
+
+    def single(self, i: int) -> Self:
+        """Card i alone, without copying."""
+        a, b = self.start[i], self.start[i + 1]
+        c, d = self.line_start[i], self.line_start[i + 1]
+        return replace(
+            self,
+            text=self.text[a:b],
+            start=np.array([0, b - a]),
+            file=self.file[i : i + 1],
+            lines=self.lines[c:d],
+            line_start=np.array([0, d - c]),
+        )
+
     def block(self, k: int, count: int, blank: float | None = None) -> np.ndarray:
         """Reals (n, count) of fields k, k+1, ..."""
         return np.stack([self.reals(k + j, blank) for j in range(count)], axis=1)
