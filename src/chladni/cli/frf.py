@@ -39,9 +39,9 @@ def run(
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units)
-        found = response(job, model, output, input, np.linspace(low, high, lines), damping).to(
-            quantity
-        )
+        frequency = np.linspace(low, high, lines)
+        found = response(job, model, output, input, frequency, damping)
+        found = found.to(cast(Quantity, quantity))
         write_npz(job.keep("frf.npz", "the responses as arrays"), found)
         _page(job, found)
 

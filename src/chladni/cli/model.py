@@ -14,6 +14,7 @@ from ..dynamics.modes import ModalModel
 from ..errors import FileError, LabelError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
+from ..units import units as unit_system
 from ..view.surface import Surface, surface
 
 
@@ -81,7 +82,8 @@ def load_model(source: Path, units: str | None = None) -> Model:
         return Model(source, load_case(source).assembly)
     from ..meshing.nastran import assembly, read_deck
 
-    return Model(source, assembly(read_deck(source), units))
+    system = None if units is None else unit_system(units)
+    return Model(source, assembly(read_deck(source), system))
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:

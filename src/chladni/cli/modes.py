@@ -50,7 +50,7 @@ def summary(model: Model, modal: ModalModel) -> dict[str, Any]:
 
     phi, system = modal.shapes, model.structure.system
     mass, centre = mass_properties(model.assembly)
-    energy = part_energies(model.structure, phi)
+    energy = np.where(rigid_modes(modal), np.nan, part_energies(model.structure, phi))
     return {
         "frequency_hz": modal.frequency,
         "generalized_mass": np.einsum("nr,nr->r", phi, system.M @ phi),

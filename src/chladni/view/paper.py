@@ -41,7 +41,8 @@ def save_gif(images: list[np.ndarray], path: Path | str, seconds: float = 1.2) -
     """Write a looping GIF with one palette for all frames, so that colours do not flicker."""
     from PIL import Image
 
-    palette = Image.fromarray(np.concatenate(images[:: max(1, len(images) // 4)])).quantize(256)
+    palette = Image.fromarray(np.concatenate(images[:: max(1, len(images) // 4)])).quantize(255)
+    palette.putpalette([*(palette.getpalette() or [])[: 3 * 255], 255, 255, 255])
     frames = [
         Image.fromarray(i).quantize(palette=palette, dither=Image.Dither.NONE) for i in images
     ]
