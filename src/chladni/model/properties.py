@@ -135,7 +135,6 @@ class BeamSection:
     shear: tuple[float, float] = (0.0, 0.0)
     nonstructural: float = 0.0  # [kg/m]
     kind: str = "bar"  # bar, beam, rod
-    neutral_axis: tuple[float, float] = (0.0, 0.0)  # (y, z) from the shear centre [m] (PBEAM N1, N2)
     neutral: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_at: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_inertia: float = 0.0  # about its own centre [kg m]

@@ -84,8 +84,10 @@ def _pbeam(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSecti
         k += 16 if word == b"YES" else 8
     K1, K2 = card.block(k, 2, 1.0)[0].tolist()
     made = _section(ctx, materials, card, (A, I1, I2, I12, J), (K1, K2), nsm, "beam")
-    y, z = card.block(k + 12, 2, 0.0)[0] * ctx.scale.length  # N1(A), N2(A)
-    return replace(made, neutral_axis=(float(y), float(z)))
+    L = ctx.scale.length
+    at, neutral = (tuple((card.block(k + j, 2, 0.0)[0] * L).tolist()) for j in (8, 12))
+    inertia = card.real(0, k + 4, 0.0) * ctx.scale.inertia * L
+    return replace(made, neutral=neutral, nonstructural_at=at, nonstructural_inertia=inertia)
 
 
 def _prod(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
