@@ -10,130 +10,15 @@ Meth. Eng. 10 (1976) 1211-1219 (incompatible modes, which are the first nine).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
-
-_CUBE = np.array(
-    [
-        [-1, -1, -1],
-        [1, -1, -1],
-        [1, 1, -1],
-        [-1, 1, -1],
-        [-1, -1, 1],
-        [1, -1, 1],
-        [1, 1, 1],
-        [-1, 1, 1],
-    ],
-    dtype=float,
-)
-
+from .solid_shapes import FAMILIES, Family
 
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
-
-
-@dataclass(frozen=True, eq=False)
-class _Family:
-    """Shape functions of one kind of solid: values N(ξ) (k,), gradients dN/dξ (3, k)."""
-
-    values: Callable[[np.ndarray], np.ndarray]
-    gradients: Callable[[np.ndarray], np.ndarray]
-    points: np.ndarray  # (g, 3) for the stiffness
-    weights: np.ndarray
-    centre: np.ndarray
-    mass_points: np.ndarray
-    mass_weights: np.ndarray
-    enhanced: Callable[[np.ndarray], np.ndarray] | None = None
-
-
-def _hexa_values(xi: np.ndarray) -> np.ndarray:
-    """N_i = (1 + ξ_i ξ)(1 + η_i η)(1 + ζ_i ζ) / 8."""
-    return np.asarray(np.prod(1 + _CUBE * xi, axis=1) / 8)
-
-
-def _hexa_gradients(xi: np.ndarray) -> np.ndarray:
-    """dN_i/dξ = ξ_i (1 + η_i η)(1 + ζ_i ζ) / 8, and so on round."""
-    a, b, c = (1 + _CUBE * xi).T
-    return np.stack([_CUBE[:, 0] * b * c, a * _CUBE[:, 1] * c, a * b * _CUBE[:, 2]]) / 8
-
-
-def _hexa_enhanced(xi: np.ndarray) -> np.ndarray:
-    """Strains (6, 21) along the element's own axes, the nine of incompatible modes first.
-
-    εξ gains ξ, then ξη and ξζ; γξη gains ξ and η, then ξζ and ηζ; and so on round.
-    """
-    cycle = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    linear = [(i, xi[i]) for i in range(3)]
-    linear += [(3 + i, xi[k]) for i, j, _ in cycle for k in (i, j)]
-    bilinear = [(i, xi[i] * xi[k]) for i, *others in cycle for k in others]
-    bilinear += [(3 + i, xi[k] * xi[h]) for i, j, h in cycle for k in (i, j)]
-    M = np.zeros((6, 21))
-    for column, (row, value) in enumerate(linear + bilinear):
-        M[row, column] = value
-    return M
-
-
-def _wedge_values(xi: np.ndarray) -> np.ndarray:
-    """N = L_i (1 ∓ ζ) / 2 with L = (1 - ξ - η, ξ, η)."""
-    L = np.array([1 - xi[0] - xi[1], xi[0], xi[1]])
-    return np.concatenate([L * (1 - xi[2]), L * (1 + xi[2])]) / 2
-
-
-def _wedge_gradients(xi: np.ndarray) -> np.ndarray:
-    L = np.array([1 - xi[0] - xi[1], xi[0], xi[1]])
-    dL = np.array([[-1.0, 1, 0], [-1, 0, 1]])
-    low, high = (1 - xi[2]) / 2, (1 + xi[2]) / 2
-    return np.vstack([np.hstack([dL * low, dL * high]), np.concatenate([-L, L]) / 2])
-
-
-def _tetra_values(xi: np.ndarray) -> np.ndarray:
-    return np.array([1 - xi.sum(), *xi])
-
-
-def _tetra_gradients(_: np.ndarray) -> np.ndarray:
-    return np.array([[-1.0, 1, 0, 0], [-1, 0, 1, 0], [-1, 0, 0, 1]])
-
-
-_G = 1 / np.sqrt(3)
-_TRIANGLE = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
-_PRISM = np.array([[*ab, z] for z in (-_G, _G) for ab in _TRIANGLE])
-_TETRA4 = (5 + 3 * np.sqrt(5)) / 20 * np.eye(4)[:, 1:] + (5 - np.sqrt(5)) / 20 * (
-    1 - np.eye(4)[:, 1:]
-)
-_FAMILIES = {
-    8: _Family(
-        _hexa_values,
-        _hexa_gradients,
-        _G * _CUBE,
-        np.ones(8),
-        np.zeros(3),
-        _G * _CUBE,
-        np.ones(8),
-        _hexa_enhanced,
-    ),
-    6: _Family(
-        _wedge_values,
-        _wedge_gradients,
-        _PRISM,
-        np.full(6, 1 / 6),
-        np.array([1 / 3, 1 / 3, 0]),
-        _PRISM,
-        np.full(6, 1 / 6),
-    ),
-    4: _Family(
-        _tetra_values,
-        _tetra_gradients,
-        np.full((1, 3), 0.25),
-        np.array([1 / 6]),
-        np.full(3, 0.25),
-        _TETRA4,
-        np.full(4, 1 / 24),
-    ),
-}
 
 
 def stiffness_and_mass(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -180,7 +65,7 @@ def elasticity(material: object) -> np.ndarray:
 
 def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
     """Raise where an element has no volume or turns inside out."""
-    family = _FAMILIES[X.shape[1]]
+    family = FAMILIES[X.shape[1]]
     dV = np.stack([np.linalg.det(family.gradients(xi) @ X) for xi in family.mass_points])
     bad = (np.abs(dV).max(axis=0) == 0) | (dV.min(axis=0) < 0) & (dV.max(axis=0) > 0)
     if np.any(bad):
@@ -207,7 +92,8 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     ----------
     X : (m, k, 3)        corners [m]
     C : (m, 6, 6)        elasticity [Pa]
-    modes : (m,) or int  internal strains of a hexahedron: 21, 9 (incompatible modes) or 0 (plain)
+    modes : (m,) or int  internal strains of a hexahedron: 21, 9 (incompatible modes) or 0 (plain);
+                         any but 0 gives a wedge its three, and tied shear
 
     Notes
     -----
@@ -217,29 +103,79 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     box 21 reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL.
     """
     modes = np.broadcast_to(np.asarray(modes), len(X))
-    family = _FAMILIES[X.shape[1]]
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))
     for n in np.unique(modes):
         at = modes == n
-        K[at] = _integrated(family, X[at], C[at], int(n) if family.enhanced else 0)
+        K[at] = _integrated(FAMILIES[X.shape[1]], X[at], C[at], int(n))
     return K
 
 
-def _integrated(family: _Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+def _integrated(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
     """Σ w |det J| Bᵀ C B over displacements and the first ``modes`` internal strains."""
     J0 = family.gradients(family.centre) @ X
     turn = _to_basic(np.linalg.inv(J0)) * np.linalg.det(J0)[:, None, None]
+    tie = _tied(X) if modes and X.shape[1] == 6 else None
     K: np.ndarray | float = 0.0
-    for xi, w in zip(family.points, family.weights, strict=True):
-        J = family.gradients(xi) @ X
-        dV = np.linalg.det(J)
-        G = np.linalg.solve(J, np.broadcast_to(family.gradients(xi), (len(X), 3, X.shape[1])))
-        B = _strain(G)
+    for k, (xi, w) in enumerate(zip(family.points, family.weights, strict=True)):
+        B, dV = _compatible(family, X, xi)
+        if tie is not None:
+            B = tie(B, k % 3)
         if modes and family.enhanced is not None:
             inner = turn @ family.enhanced(xi)[:, :modes] / dV[:, None, None]
             B = np.concatenate([B, inner], axis=2)
         K = K + (w * np.abs(dV))[:, None, None] * (B.transpose(0, 2, 1) @ C @ B)
     return _condensed(np.asarray(K), 3 * X.shape[1])
+
+
+def _compatible(family: Family, X: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """B (m, 6, 3k) and det J (m,) at a point."""
+    J = family.gradients(xi) @ X
+    G = np.linalg.solve(J, np.broadcast_to(family.gradients(xi), (len(X), 3, X.shape[1])))
+    return _strain(G), np.linalg.det(J)
+
+
+def _tied(X: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
+    """B of a wedge with its transverse shear tied at the middles of its three walls.
+
+    Only the shear along a wall's own edge t_k is believed, e_k = t_k · γ, taken at the middle of
+    the wall. At edge k γ is e_k t_k + (c · n_k) n_k, where c is the constant that fits the three
+    best, Σ l_k t_k (t_k · c - e_k) = 0, each weighted by its length. Found here by matching NX
+    Nastran's CPENTA, which it reproduces to the printed digits on a right prism.
+    """
+    R, t, n, length = _walls(X)
+    middle = [np.array([a, b, 0.0]) for a, b, _ in FAMILIES[6].points[:3]]
+    local = _to_basic(R)
+    e = []
+    for k in range(3):
+        shear = (local @ _compatible(FAMILIES[6], X, middle[k])[0])[:, [5, 4]]  # γzx, γyz
+        e.append(np.einsum("mi,mij->mj", t[:, k], shear))
+    rows = np.stack(e, axis=1)  # (m, 3, 18)
+    fit = np.einsum("mk,mki,mkj->mij", length, t, t)
+    c = np.linalg.solve(fit, np.einsum("mk,mki,mkj->mij", length, t, rows))
+    back = _to_basic(R.transpose(0, 2, 1))
+
+    def tie(B: np.ndarray, k: int) -> np.ndarray:
+        across = np.einsum("mi,mij->mj", n[:, k], c)
+        gamma = t[:, k, :, None] * rows[:, k, None] + n[:, k, :, None] * across[:, None]
+        inside = local @ B
+        inside[:, [5, 4]] = gamma
+        return np.asarray(back @ inside)
+
+    return tie
+
+
+def _walls(X: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Frame of the mid-triangle (z its normal), its edges' directions, normals and lengths."""
+    P = (X[:, :3] + X[:, 3:]) / 2
+    edges = np.roll(P, -1, axis=1) - P
+    length = np.linalg.norm(edges, axis=2)
+    x = edges[:, 0] / length[:, :1]
+    z = np.cross(edges[:, 0], edges[:, 1])
+    z /= np.linalg.norm(z, axis=1)[:, None]
+    R = np.stack([x, np.cross(z, x), z], axis=1)
+    t = np.einsum("mij,mkj->mki", R[:, :2], edges) / length[:, :, None]
+    n = np.stack([-t[..., 1], t[..., 0]], axis=-1)
+    return R, t, n, length
 
 
 def _to_basic(A: np.ndarray) -> np.ndarray:
@@ -261,7 +197,7 @@ def _condensed(K: np.ndarray, n: int) -> np.ndarray:
 
 def _shares(X: np.ndarray) -> np.ndarray:
     """∫ N_i N_j dV (m, k, k) [m³]."""
-    family = _FAMILIES[X.shape[1]]
+    family = FAMILIES[X.shape[1]]
     shares: np.ndarray | float = 0.0
     for xi, w in zip(family.mass_points, family.mass_weights, strict=True):
         N = family.values(xi)
