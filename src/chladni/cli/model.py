@@ -24,6 +24,7 @@ class Model:
 
     source: Path
     assembly: Assembly
+    unit: str = "m"  # of length; "" where a bare deck came without its unit system
 
     @cached_property
     def structure(self) -> Structure:
@@ -39,7 +40,7 @@ class Model:
     @cached_property
     def seen(self) -> Surface:
         """What a picture of it shows."""
-        return surface(self.assembly)
+        return surface(self.assembly, self.unit)
 
     def modes(self, count: int) -> ModalModel:
         """The lowest normal modes."""
@@ -83,7 +84,7 @@ def load_model(source: Path, units: str | None = None) -> Model:
     from ..meshing.nastran import assembly, read_deck
 
     system = None if units is None else unit_system(units)
-    return Model(source, assembly(read_deck(source), system))
+    return Model(source, assembly(read_deck(source), system), "" if system is None else "m")
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:

@@ -27,10 +27,15 @@ def run(
         modal = _solved(job, model, count)
         job.progress("energies", 0.6)
         result = summary(model, modal)
+        if not model.unit:
+            job.notes.append(
+                "No unit system was given (--units), so mass and lengths are in the deck's own "
+                "units; frequencies are Hz in any consistent system."
+            )
         job.json("modes.json", result)
         job.progress("pictures", 0.7)
         _pictures(job, model, modal)
-        _page(job, result)
+        _page(job, result, *(("kg", "m") if model.unit else ("deck units", "deck units")))
 
 
 def _solved(job: Run, model: Model, count: int) -> ModalModel:
@@ -82,14 +87,15 @@ def _pictures(job: Run, model: Model, modal: ModalModel) -> None:
     job.section("Mode shapes", [Picture(picture, "Colour: displacement, 0 to its largest.")])
 
 
-def _page(job: Run, result: dict[str, Any]) -> None:
+def _page(job: Run, result: dict[str, Any], kg: str, m: str) -> None:
     f, parts = result["frequency_hz"], result["parts"]
     job.lead = (
         f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
-        f"the model weighs {number(result['mass_kg'])} kg."
+        f"its mass is {number(result['mass_kg'])} {kg}."
     )
     centre = ", ".join(number(x) for x in result["centre_of_gravity_m"])
-    facts = [("Mass", f"{number(result['mass_kg'], 6)} kg"), ("Centre of gravity", f"({centre}) m")]
+    mass = f"{number(result['mass_kg'], 6)} {kg}"
+    facts = [("Mass", mass), ("Centre of gravity", f"({centre}) {m}")]
     rows = [
         (str(k + 1), number(f[k], 6), *(_share(p["strain_energy"][k]) for p in parts.values()))
         for k in range(len(f))

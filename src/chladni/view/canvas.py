@@ -64,7 +64,7 @@ def _photo(seen: Surface, camera: Camera, paint: Paint, width: int) -> np.ndarra
     if len(seen.faces):
         plotter.add_mesh(_polydata(seen), **_look(seen, paint, width))
     if len(seen.lines):
-        plotter.add_mesh(_segments(seen.points[seen.lines]), color="#333333", line_width=4)
+        plotter.add_mesh(_segments(seen.points[seen.lines]), **_line_look(seen, paint))
     if paint.ghost is not None and len(paint.ghost):
         plotter.add_mesh(_segments(paint.ghost), color="#8a8f98", line_width=2, lighting=False)
     _aim(plotter, seen, camera)
@@ -123,6 +123,15 @@ def _look(seen: Surface, paint: Paint, width: int) -> dict[str, Any]:
     }
 
 
+def _line_look(seen: Surface, paint: Paint) -> dict[str, Any]:
+    """Lines take the colours of point values, else they are dark."""
+    if paint.values is None or len(paint.values) != len(seen.points):
+        return {"color": "#333333", "line_width": 4}
+    values = np.asarray(paint.values, dtype=float)[seen.lines].ravel()
+    colours = {"scalars": values, "clim": paint.limits, "cmap": paint.cmap}
+    return {**colours, "line_width": 6, "lighting": False, "show_scalar_bar": False}
+
+
 def _segments(ends: np.ndarray) -> Any:
     import pyvista as pv
 
@@ -149,13 +158,22 @@ def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
         ax.add_collection(
             PolyCollection(polygons, facecolors=colour, edgecolors=line, linewidths=0.3, zorder=1)  # type: ignore[arg-type]
         )
-    for ends, tint, wide in (
-        (seen.points[seen.lines], "#333333", 1.6),
-        (paint.ghost, "#8a8f98", 0.7),
-    ):
-        if ends is not None and len(ends):
-            flat = camera.project(np.asarray(ends).reshape(-1, 3)).reshape(-1, 2, 2)
-            ax.add_collection(LineCollection(list(flat), colors=tint, linewidths=wide, zorder=2))
+    _stroked(ax, camera, seen.points[seen.lines], _line_colours(seen, paint), 1.8)
+    if paint.ghost is not None:
+        _stroked(ax, camera, paint.ghost, "#8a8f98", 0.7)
+
+
+def _stroked(ax: Axes, camera: Camera, ends: np.ndarray, colours: Any, width: float) -> None:
+    flat = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2)
+    ax.add_collection(LineCollection(list(flat), colors=colours, linewidths=width, zorder=2))
+
+
+def _line_colours(seen: Surface, paint: Paint) -> Any:
+    if paint.values is None or len(paint.values) != len(seen.points) or not len(seen.lines):
+        return "#333333"
+    low, high = paint.limits
+    mean = np.asarray(paint.values, dtype=float)[seen.lines].mean(axis=1)
+    return colormaps[paint.cmap]((mean - low) / max(high - low, 1e-300))
 
 
 def _colours(seen: Surface, paint: Paint) -> np.ndarray:

@@ -41,11 +41,10 @@ def save_gif(images: list[np.ndarray], path: Path | str, seconds: float = 1.2) -
     """Write a looping GIF with one palette for all frames, so that colours do not flicker."""
     from PIL import Image
 
-    palette = Image.fromarray(np.concatenate(images[:: max(1, len(images) // 4)])).quantize(255)
-    palette.putpalette([*(palette.getpalette() or [])[: 3 * 255], 255, 255, 255])
-    frames = [
-        Image.fromarray(i).quantize(palette=palette, dither=Image.Dither.NONE) for i in images
-    ]
+    palette = Image.fromarray(np.concatenate(images[:: max(1, len(images) // 4)])).quantize(256)
+    none = Image.Dither.NONE
+    frames = [Image.fromarray(image).quantize(palette=palette, dither=none) for image in images]
+    _whiten(frames)
     data = io.BytesIO()
     pause = max(20, round(1e3 * seconds / len(frames)))
     frames[0].save(
@@ -71,3 +70,12 @@ def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str) -> None:
     style: dict[str, Any] = {"fontsize": 7.5, "color": colour, "ha": "center", "va": "center"}
     u, v = place.tolist()
     ax.text(u, v, text, **style, path_effects=halo, zorder=7, clip_on=False)
+
+
+def _whiten(frames: list[Any]) -> None:
+    """The ground (colour of the first pixel) becomes pure white; a palette only comes near it."""
+    ground = frames[0].getpixel((0, 0))
+    for frame in frames:
+        colours = frame.getpalette()
+        colours[3 * ground : 3 * ground + 3] = [255, 255, 255]
+        frame.putpalette(colours)

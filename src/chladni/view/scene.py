@@ -44,8 +44,8 @@ def mode_shape(
     """
     figure, ax = _sheet(camera := _roomy(seen))
     _swung(ax, seen, _real(shape), camera)
-    ax.set_title(f"{name}: {frequency:.4g} Hz", **paper.TITLE)
-    _scale_bar(ax, camera)
+    ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
+    _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
@@ -66,7 +66,7 @@ def montage(
     for k in range(r):
         ax = figure.add_axes(_cell(k, rows, columns))
         _swung(ax, seen, _real(shapes[:, :, k]), camera)
-        ax.set_title(f"{names[k]}    {frequency[k]:.4g} Hz", fontsize=10)
+        ax.set_title(f"{names[k]}    {hertz(frequency[k])}", fontsize=10)
     return paper.save(figure, path, dpi=140)
 
 
@@ -84,7 +84,7 @@ def mode_gif(
     for angle in 2 * np.pi * np.arange(frames) / frames:
         figure, ax = _sheet(camera, width=5.0)
         _swung(ax, seen, np.real(phi * np.exp(1j * angle)), camera, peak=_peak(phi))
-        ax.set_title(f"{name}: {frequency:.4g} Hz", **paper.TITLE)
+        ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
         images.append(paper.pixels(figure))
     return paper.save_gif(images, path)
 
@@ -114,13 +114,14 @@ def scalar_map(
     if where is not None:
         _circle(ax, camera, *where)
     paper.colour_bar(figure, ax, cmap, (low, high), f"{name} [{unit}]" if unit else name)
-    _scale_bar(ax, camera)
+    _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
 def thickness_map(path: Path | str, seen: Surface, thickness: np.ndarray) -> Path:
     """Thickness [m] of every face, shown in millimetres."""
-    return scalar_map(path, seen, 1e3 * np.asarray(thickness), "thickness", "mm", "cividis")
+    scale, unit = (1e3, "mm") if seen.unit == "m" else (1.0, seen.unit)
+    return scalar_map(path, seen, scale * np.asarray(thickness), "thickness", unit, "cividis")
 
 
 def sensors(
@@ -137,7 +138,7 @@ def sensors(
         _arrows(ax, camera, markers, colour, reach, name)
     if outputs or inputs:
         ax.legend(loc="upper right", bbox_to_anchor=(1.0, -0.01), ncols=2, **paper.LEGEND)
-    _scale_bar(ax, camera)
+    _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
@@ -150,7 +151,7 @@ def location(
     _circle(ax, camera, np.asarray(point), radius)
     if text:
         ax.set_title(text, **paper.TITLE, wrap=True)
-    _scale_bar(ax, camera)
+    _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
@@ -239,7 +240,7 @@ def _arrows(
         paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
 
 
-def _scale_bar(ax: Axes, camera: Camera) -> None:
+def _scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
     """A round length of about a fifth of the window, below the picture."""
     u0, u1, v0, v1 = camera.window
     length = round_length((u1 - u0) / 5)
@@ -247,9 +248,9 @@ def _scale_bar(ax: Axes, camera: Camera) -> None:
     ax.plot(
         [u0, u0 + length], [v, v], color="#222222", lw=2.2, solid_capstyle="butt", clip_on=False
     )
-    unit = f"{1e3 * length:g} mm" if length < 1 else f"{length:g} m"
+    text = f"{length:g} {unit}" if unit != "m" or length >= 1 else f"{1e3 * length:g} mm"
     beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
-    ax.annotate(unit, (u0 + length, v), (5, 0), **beside, annotation_clip=False)
+    ax.annotate(text.strip(), (u0 + length, v), (5, 0), **beside, annotation_clip=False)
     ax.set(xlim=(u0, u1), ylim=(v0, v1))
 
 
@@ -261,3 +262,12 @@ def round_length(most: float) -> float:
     """
     base = 10.0 ** np.floor(np.log10(most))
     return float(max(k * base for k in (1, 2, 5) if k * base <= most * (1 + 1e-12)))
+
+
+def hertz(f: float) -> str:
+    """A frequency with four digits.
+
+    >>> hertz(27.1828), hertz(27182.8)
+    ('27.18 Hz', '27.18 kHz')
+    """
+    return f"{f:.4g} Hz" if f < 9999.5 else f"{f / 1e3:.4g} kHz"

@@ -30,12 +30,14 @@ class Surface:
     faces : (m, 4) int     rows of points; a triangle repeats its third node
     lines : (k, 2) int     beams, bars, springs
     part : (m,) int        part of each face; outlines are drawn where parts meet
+    unit : str             "m"; "" where the deck's own unit of length is not known
     """
 
     points: np.ndarray
     faces: np.ndarray = field(default_factory=lambda: _no_rows(4))
     lines: np.ndarray = field(default_factory=lambda: _no_rows(2))
     part: np.ndarray | None = None
+    unit: str = "m"
 
     def __post_init__(self) -> None:
         for name, columns in (("points", 3), ("faces", 4), ("lines", 2)):
@@ -110,7 +112,7 @@ def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     return faces[at], np.asarray(part)[owner[at]], owner[at]
 
 
-def surface(assembly: Assembly) -> Surface:
+def surface(assembly: Assembly, unit: str = "m") -> Surface:
     """All that can be seen of an assembly: shells, skins of solids, beams, springs, bushes.
 
     The shells' faces come first and in the deck's order, so a value per shell is a value per face.
@@ -127,6 +129,7 @@ def surface(assembly: Assembly) -> Surface:
         np.concatenate(faces).astype(np.int64),
         lines[(lines >= 0).all(axis=1)],
         np.concatenate(parts).astype(np.int64),
+        unit,
     )
     if not len(assembly.points):
         raise ModelError("there is nothing to draw: the deck has no grids")
