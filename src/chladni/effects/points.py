@@ -42,8 +42,7 @@ class MassEffect(AtPoints):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CONM2 at each grid."""
         m = self.parameters[0].value(x[0])
-        block = np.diag([m, m, m, 0.0, 0.0, 0.0])
-        return _with_masses(assembly, self.grids, [block] * len(self.grids))
+        return with_masses(assembly, self.grids, m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,7 @@ class ExtraSupport(AtPoints):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CELAS2 to ground at the grid, along the axis nearest to the direction."""
         k = self.parameters[0].value(x[0])
-        return _with_springs(assembly, self.grids, self.directions, k)
+        return with_springs(assembly, self.grids, self.directions, k)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +88,7 @@ class Suspension(AtPoints):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CELAS2 to ground at each hanger."""
         k = self.parameters[0].value(x[0])
-        return _with_springs(assembly, self.grids, self.directions, k)
+        return with_springs(assembly, self.grids, self.directions, k)
 
 
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
@@ -97,19 +96,20 @@ def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float,
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)
 
 
-def _with_masses(assembly: Assembly, grids: tuple[int, ...], blocks: list[np.ndarray]) -> Assembly:
-    """Concentrated masses added to those there are."""
+def with_masses(assembly: Assembly, grids: tuple[int, ...], m: float) -> Assembly:
+    """The assembly with a mass m [kg] at each of these grids."""
     old = assembly.masses
     first = int(old.ids.max(initial=0)) + 1
+    block = np.diag([m, m, m, 0.0, 0.0, 0.0])
     new = Masses(
         np.append(old.ids, first + np.arange(len(grids))),
         np.append(old.node, assembly.rows(list(grids))),
-        np.concatenate([old.matrix, np.array(blocks)]),
+        np.concatenate([old.matrix, np.tile(block, (len(grids), 1, 1))]),
     )
     return replace(assembly, masses=new)
 
 
-def _with_springs(
+def with_springs(
     assembly: Assembly, grids: tuple[int, ...], directions: np.ndarray, k: float
 ) -> Assembly:
     """Springs k to ground, k d_i² along each axis of the grid's frame (cross terms neglected)."""

@@ -44,6 +44,7 @@ class Fit:
     misfit : float                 |r|² of the data alone
     S : float                      -2 ln evidence up to a constant common to all fits of the data
     state : State                  the reduced model there
+    data : Data                    what was fitted
     """
 
     effects: tuple[Effect, ...]
@@ -52,6 +53,7 @@ class Fit:
     misfit: float
     S: float
     state: State
+    data: Data
     status: Status
 
     def of(self, effect: Effect) -> np.ndarray:
@@ -124,8 +126,8 @@ def fit(
     A = J.T @ J
     S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
     S += sum(2 * np.log(effect.places) for effect in effects)
-    misfit = float(r[: len(r) - len(x) - (weighing is not None)] @ r[: len(r) - len(x) - (weighing is not None)])
-    return Fit(tuple(effects), x, np.linalg.inv(A), misfit, float(S), state, status)
+    own = r[: len(r) - len(x) - (weighing is not None)]
+    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
 
 
 def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm, qmc
 
 from ..effects import catalogue
 from ..effects.effect import Effect, count
@@ -19,7 +20,7 @@ from ..effects.thickness import ThicknessDistribution, thickness_distribution
 from ..errors import ModelError
 from .calibration import Fit, Weighing, fit
 from .likelihood import LN10, Data, Poles, Responses
-from .reduced import Reduced, evaluate
+from .reduced import Reduced, State, evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 from .workbench import Workbench
 
@@ -36,7 +37,11 @@ class Trial:
     effect: Effect
     fit: Fit
     model: Reduced
-    data: Data
+
+    @property
+    def data(self) -> Data:
+        """What was fitted."""
+        return self.fit.data
 
     @property
     def S(self) -> float:
@@ -107,7 +112,7 @@ class Search:
         kept = self.without(effect)
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
-        return Trial(effect, _fit(model, [*kept, effect], data, self.weighing, x0), model, data)
+        return Trial(effect, _fit(model, [*kept, effect], data, self.weighing, x0), model)
 
     def without(self, effect: Effect) -> list[Effect]:
         """The base less what the effect makes superfluous."""
@@ -123,34 +128,42 @@ def _fit(
     return fit(model, effects, data, weighing, x)
 
 
-SCALES = np.geomspace(0.003, 0.2, 60)
-SCALE_SD = 0.7  # of ln(scale) about its prior median
+SCALES = np.geomspace(0.003, 0.2, 25)
+WIDE = 0.06  # scale at which starts are compared
+SCALE_SD = 0.5  # of ln(scale) about its prior median
 
 
 def _fit_poles(
     model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
 ) -> Fit:
     """Alternate the fit with the most probable scale of what no model reaches."""
-    median, best = data.scale, None
+    best = None
     for scale in (0.08, 0.04, 0.02):  # wide first: the pairing must settle
         x = fit(model, effects, replace(data, scale=scale), weighing, x, max_steps=12).x
     for _ in range(4):
-        state = evaluate(model, effects, x, False)
-        delta, test, _ = data.deviation(state)
-        mine = data.use[test]
-        var = data.sd[test][mine] ** 2 + SCALES[:, None] ** 2
-        cost = (np.log(var) + delta[mine] ** 2 / var).sum(axis=1)
-        cost += (np.log(SCALES / median) / SCALE_SD) ** 2
-        scale = float(SCALES[np.argmin(cost)])
+        scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), weighing, x)
-        _, test, _ = data.deviation(now.state)
         var = data.sd[data.use] ** 2 + scale**2
-        S = now.S + float(np.log(var).sum()) + (np.log(scale / median) / SCALE_SD) ** 2
-        now = replace(now, S=S)
-        if best is not None and S > best.S - 0.05:
+        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale, data.scale))
+        if best is not None and now.S > best.S - 0.05:
             break
         best, x = now, now.x
     return best if best is not None else now
+
+
+def _likely_scale(data: Poles, state: State) -> float:
+    """The scale at which the pairing as a whole is most probable."""
+
+    def cost(scale: float) -> float:
+        wider = replace(data, scale=scale)
+        r, _ = wider.residual(state, False)
+        return float(r @ r + 2 * np.log(wider.spread()[data.use]).sum()) + _scale_prior(scale)
+
+    return float(min(SCALES, key=cost))
+
+
+def _scale_prior(scale: float, median: float = 0.006) -> float:
+    return float((np.log(scale / median) / SCALE_SD) ** 2)
 
 
 def diagnose(search: Search, progress: Progress = lambda text, share: None) -> Diagnosis:
@@ -184,7 +197,7 @@ def _base_trial(search: Search, effects: Sequence[Effect], starts: list[np.ndarr
     """Best fit of these effects alone over several starts."""
     model = search.bench.model
     fits = [_fit(model, effects, search.data, search.weighing, x) for x in starts]
-    return Trial(Effect(), min(fits, key=lambda f: f.S), model, search.data)
+    return Trial(Effect(), min(fits, key=lambda f: f.S), model)
 
 
 def _nominal_starts(search: Search) -> list[np.ndarray]:
@@ -233,9 +246,21 @@ def _scores(search: Search, base: Baseline, effect: Effect, starts: list[np.ndar
             state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, start]), False)
         except ModelError:
             continue
+        if isinstance(search.data, Poles):
+            z = (start - [p.mean for p in effect.parameters]) / [p.sd for p in effect.parameters]
+            r, _ = replace(search.data, scale=WIDE).residual(state, False)
+            out[k] = r @ r + z @ z
+            continue
         r, _ = search.data.residual(state, False)
         out[k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
     return out
+
+
+def _draws(effect: Effect, n: int) -> list[np.ndarray]:
+    """Sobol points of an effect's prior."""
+    u = qmc.Sobol(len(effect.parameters), seed=1).random(n)
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
+    return list(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))
 
 
 def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
@@ -249,8 +274,10 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
     out: list[Candidate] = []
     for effect in effects:
         base, starts = bases[-1], effect.starts()
+        several = 1
+        if isinstance(search.data, Poles) and len(effect.parameters) > 2:
+            starts, several = [*starts, *_draws(effect, 1024)], 12  # pairing makes many valleys
         scores = _scores(search, base, effect, starts)
-        several = 3 if isinstance(search.data, Poles) and len(starts) > 9 else 1
         out += [(effect, starts[k], base.x) for k in np.argsort(scores)[:several]]
     return out
 

@@ -13,7 +13,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from ..ema.correlation import wrapped
-from .pairing import paired
+from .pairing import paired, price_alone, price_missed
 from .reduced import Reduced, State
 
 LN10 = np.log(10.0)
@@ -130,23 +130,25 @@ class Poles:
 
     Attributes
     ----------
-    frequency : (n,) Hz
+    frequency : (n,) Hz       increasing
     sd : (n,)                 of ln f, from the identification
-    scale : float             spread of ln f that no model reaches; a hypothesis may raise it
     use : (n,) bool           poles the fit may see
-    visible : (n_places...)   rows that say how well a model mode can be seen, or None
-    rigid : int               rigid-body modes of the model, left out
+    strength : (n,)           peak height relative to the highest
+    band : (low, high) Hz     in which the test would have shown a mode
+    scale : float             spread of ln f that no model reaches; a hypothesis may raise it
+    outputs, inputs           rows at the likely places of sensors and shakers, or None
     """
 
     frequency: np.ndarray
     sd: np.ndarray
     use: np.ndarray
+    strength: np.ndarray
+    band: tuple[float, float]
     scale: float = 0.006
     outputs: object = None
     inputs: object = None
     a: np.ndarray | None = None
     b: np.ndarray | None = None
-    lowest: float = 1.0
 
     def over(self, model: Reduced) -> Self:
         """Rows for the visibility of modes in the basis of this model."""
@@ -154,41 +156,60 @@ class Poles:
             return self
         return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
 
-    def pairs(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (test pole, model mode) that belong together."""
+    def spread(self) -> np.ndarray:
+        """Standard deviation of ln f of every pole (n,)."""
+        return np.sqrt(self.sd**2 + self.scale**2)
+
+    def pairs(
+        self, state: State, among: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Positions (test pole, model mode) that belong together, and the price of lonely modes."""
+        poles = np.flatnonzero(self.use if among is None else among)
         f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-        flexible = np.flatnonzero(f > self.lowest)
-        flexible = flexible[f[flexible] < 1.6 * self.frequency.max()]
-        test, model = paired(self.frequency, f[flexible], self.visibility(state, flexible))
-        return test, flexible[model]
+        top = self.frequency[poles[-1]]
+        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * top))
+        missed = price_missed(self.visibility(state, modes))
+        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], top * (1 + 1e-9)))
+        test, model, lonely = paired(
+            self.frequency[poles], f[modes], self.spread()[poles], self._alone()[poles],
+            np.where(ends, 0.0, missed),
+        )  # fmt: skip
+        return poles[test], modes[model], lonely
+
+    def _alone(self) -> np.ndarray:
+        """Price of a lonely pole, on the scale on which a pair costs δ²/σ²."""
+        return price_alone(self.strength) - 2 * np.log(self.spread())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
         """How strongly each mode shows, 1 = as the strongest: rms residue over likely places."""
-        if self.a is None or self.b is None:
+        if self.a is None or self.b is None or not len(modes):
             return np.ones(len(modes))
         seen = np.sqrt(((self.a @ state.phi[:, modes]) ** 2).mean(axis=0))
         hit = np.sqrt(((self.b @ state.phi[:, modes]) ** 2).mean(axis=0))
-        strength = seen * hit
-        return np.asarray(strength / strength.max())
+        return np.asarray(seen * hit / (seen * hit).max())
 
-    def deviation(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def deviation(
+        self, state: State, among: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ln(f_model / f_test) of every pair, with the pairs."""
-        test, model = self.pairs(state)
+        test, model, _ = self.pairs(state, among)
         f = np.sqrt(state.lam[model]) / (2 * np.pi)
         return np.log(f / self.frequency[test]), test, model
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) over its spread; a pole without a partner costs four spreads."""
-        delta, test, model = self.deviation(state)
-        n = len(self.frequency)
-        r, J = np.full(n, LONELY), np.zeros((n, len(state.dK)))
-        sd = np.sqrt(self.sd[test] ** 2 + self.scale**2)
-        r[test] = delta / sd
+        """ln(f_model / f_test) over its spread; lonely poles and modes at their price."""
+        test, model, lonely = self.pairs(state)
+        lam = state.lam[model]
+        delta = np.log(np.sqrt(lam) / (2 * np.pi) / self.frequency[test])
+        sd = self.spread()
+        r = np.append(np.sqrt(self._alone()), np.sqrt(lonely))
+        J = np.zeros((len(r), len(state.dK)))
+        r[test] = delta / sd[test]
         if gradient:
-            lam = state.lam[model]
             dlam = state.dK[:, model, model] - lam * state.dM[:, model, model]
-            J[test] = (dlam / (2 * lam) / sd).T
-        return r[self.use], J[self.use]
+            J[test] = (dlam / (2 * lam) / sd[test]).T
+        use = np.append(self.use, True)
+        return r[use], J[use]
 
     def only(self, use: np.ndarray) -> Self:
         """The same poles, others in use."""
@@ -197,9 +218,6 @@ class Poles:
     def Q(self, state: State, use: np.ndarray | None = None) -> float:
         """Mean |log10(f_model / f_test)|² over the paired poles in use."""
         use = self.use if use is None else use
-        delta, test, _ = self.deviation(state)
+        delta, test, _ = self.deviation(state, self.use | use)
         mine = use[test]
         return float(np.mean((delta[mine] / LN10) ** 2)) if mine.any() else float("nan")
-
-
-LONELY = 4.0  # whitened residual of a test pole without a partner

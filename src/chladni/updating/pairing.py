@@ -1,49 +1,68 @@
 """Which model mode belongs to which test pole, where no shapes were measured.
 
 Both lists are in order of frequency, so a pairing is a monotone path; a test pole or a model mode
-may be left alone at a price.  A model mode that the sensor cannot see is cheap to leave alone.
+may be left alone at a price.  The prices are -2 ln of probabilities: that a resonance of the test
+is none of the structure's, that a mode the sensors see well was missed.
 Needleman and Wunsch (1970), J. Mol. Biol. 48, 443-453 (the alignment).
 """
 
 import numpy as np
 
-WIDTH = 0.05  # ln f; a pair that far apart costs 1
-TEST_ALONE = 9.0
+STRANGER = 20.0  # -2 ln p of a strong pole that belongs to the rig, the room, the noise
+FAINT = 6.0  # the same of one that hardly stands out
+STRONG = -0.5  # log10 of the relative peak height from which a pole counts as strong
+MISSED = 12.0  # -2 ln p of overlooking a mode that shows as strongly as the strongest
+SEEN = 1.5  # decades of visibility over which that price falls to one
+
+
+def price_alone(strength: np.ndarray) -> np.ndarray:
+    """Price of leaving test poles alone, by peak height relative to the highest (n,)."""
+    share = np.clip(1 - STRONG + np.log10(np.maximum(strength, 1e-9)), 0, 1)
+    return np.asarray(FAINT + (STRANGER - FAINT) * share)
+
+
+def price_missed(visibility: np.ndarray) -> np.ndarray:
+    """Price of leaving model modes alone, by visibility relative to the strongest (m,)."""
+    share = np.clip(1 + np.log10(np.maximum(visibility, 1e-9)) / SEEN, 0, 1)
+    return np.asarray(1 + (MISSED - 1) * share)
 
 
 def paired(
-    test: np.ndarray, model: np.ndarray, visibility: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (in test, in model) of the cheapest monotone pairing.
+    test: np.ndarray, model: np.ndarray, sd: np.ndarray, alone: np.ndarray, missed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Positions (in test, in model) of the cheapest monotone pairing, and the modes' share of it.
+
+    Σ_pairs (ln f_m/f_t)²/σ² + Σ (alone of lonely poles) + Σ (missed of lonely modes)
 
     Parameters
     ----------
     test, model : (n,), (m,)   increasing frequencies [Hz]
-    visibility : (m,)          strength of each model mode at the sensors, 1 = strongest
+    sd : (n,)                  standard deviation of ln f of a pair
+    alone, missed : (n,), (m,) prices
 
-    >>> paired(np.array([10.0, 30.0]), np.array([10.1, 20.0, 30.2]), np.array([1, 0.01, 1]))
-    (array([0, 1]), array([0, 2]))
+    >>> test, model = np.array([10.0, 30.0]), np.array([10.1, 20.0, 30.2])
+    >>> paired(test, model, np.full(2, 0.01), np.full(2, 16.0), np.array([9.0, 1.0, 9.0]))
+    (array([0, 1]), array([0, 2]), 1.0)
     """
     n, m = len(test), len(model)
-    gap = np.log(model[None, :] / test[:, None]) / WIDTH
-    pair = gap**2 + 0.5 * np.log(1 + 0.02 / np.maximum(visibility, 1e-6))[None, :]
-    alone = 4.0 * np.clip(1 + np.log10(np.maximum(visibility, 1e-6)) / 2, 0.05, 1)
-    alone = np.where(model > test[-1] * (1 + WIDTH), 0.0, alone) if n else alone
+    pair = (np.log(model[None, :] / test[:, None]) / sd[:, None]) ** 2
     cost = np.full((n + 1, m + 1), np.inf)
     step = np.zeros((n + 1, m + 1), dtype=int)
-    cost[0] = np.concatenate([[0.0], np.cumsum(alone)])
-    step[0] = 2
+    cost[0], step[0] = np.concatenate([[0.0], np.cumsum(missed)]), 2
     for i in range(1, n + 1):
-        cost[i, 0], step[i, 0] = i * TEST_ALONE, 1
+        cost[i, 0], step[i, 0] = cost[i - 1, 0] + alone[i - 1], 1
         for j in range(1, m + 1):
             options = (
-                cost[i - 1, j - 1] + min(pair[i - 1, j - 1], 3 * TEST_ALONE),
-                cost[i - 1, j] + TEST_ALONE,
-                cost[i, j - 1] + alone[j - 1],
+                cost[i - 1, j - 1] + pair[i - 1, j - 1],
+                cost[i - 1, j] + alone[i - 1],
+                cost[i, j - 1] + missed[j - 1],
             )
-            step[i, j] = int(np.argmin(options))
+            step[i, j] = min(range(3), key=options.__getitem__)
             cost[i, j] = options[step[i, j]]
-    return _backtrack(step, n, m)
+    at_test, at_model = _backtrack(step, n, m)
+    lonely = np.ones(m, bool)
+    lonely[at_model] = False
+    return at_test, at_model, float(missed[lonely].sum())
 
 
 def _backtrack(step: np.ndarray, n: int, m: int) -> tuple[np.ndarray, np.ndarray]:
@@ -52,9 +71,5 @@ def _backtrack(step: np.ndarray, n: int, m: int) -> tuple[np.ndarray, np.ndarray
         if step[n, m] == 0:
             test.append(n - 1)
             model.append(m - 1)
-            n, m = n - 1, m - 1
-        elif step[n, m] == 1:
-            n -= 1
-        else:
-            m -= 1
+        n, m = n - (step[n, m] != 2), m - (step[n, m] != 1)
     return np.array(test[::-1], dtype=int), np.array(model[::-1], dtype=int)

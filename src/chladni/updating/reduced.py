@@ -18,6 +18,7 @@ from ..effects.components import COMPONENTS, component_matrices
 from ..effects.effect import Effect, count
 from ..effects.sheet import Sheet
 from ..errors import ModelError
+from ..fem.energy import mass_properties
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def reduce(sheet: Sheet, basis: np.ndarray) -> Reduced:
     mass = sheet.project(sheet.mass, basis)
     K = basis.T @ (system.K.real @ basis)
     M = basis.T @ (system.M @ basis)
-    rest = float(sheet.structure.assembly.masses.matrix[:, 0, 0].sum())
+    rest = mass_properties(sheet.structure.assembly)[0] - float(sheet.weight.sum())
     return Reduced(
         sheet, basis, {"": linear}, {"": cubic}, mass,
         _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),

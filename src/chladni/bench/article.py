@@ -1,0 +1,47 @@
+"""An article on the bench: its modes, a front end with noise, and the recording that comes out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dynamics.frf import FRF, transfer
+from ..dynamics.modes import ModalModel
+
+
+@dataclass(frozen=True)
+class Front:
+    """Measuring chain of an averaged FRF.
+
+    ``noise``: standard deviation of each line relative to its own magnitude; ``floor``: relative
+    to the rms of the channel over the band (electrical noise). Real and imaginary part share it.
+    """
+
+    noise: float = 0.01
+    floor: float = 0.001
+
+
+def measured(
+    modal: ModalModel,
+    phi_out: np.ndarray,
+    phi_in: np.ndarray,
+    frequency: np.ndarray,
+    front: Front,
+    rng: np.random.Generator,
+    outputs: tuple[str, ...],
+    inputs: tuple[str, ...],
+) -> FRF:
+    """Accelerance H = Σ_r -ω² φ_o φ_i / (ω_r² - ω² + 2iζ_r ω_r ω), with noise and its variance.
+
+    Parameters
+    ----------
+    phi_out, phi_in : (n_out, r), (n_in, r)   mode shapes at the sensors and shakers
+    frequency : (n_f,) Hz
+    """
+    s = 2j * np.pi * frequency
+    H = transfer(modal, phi_out, phi_in, s) * s[:, None, None] ** 2
+    rms = np.sqrt((np.abs(H) ** 2).mean(axis=0, keepdims=True))
+    variance = (front.noise * np.abs(H)) ** 2 + (front.floor * rms) ** 2
+    e = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2)
+    return FRF(
+        H + np.sqrt(variance) * e, frequency, outputs, inputs, "accelerance", variance=variance
+    )

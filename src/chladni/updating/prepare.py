@@ -1,0 +1,372 @@
+"""From a structure and a recording to a search: how the recording is read, and why.
+
+With known gain and places the damping-equalised FRFs are compared; where the gain is unknown *and*
+places are uncertain, or where no FRF exists, the natural frequencies.  What is held out is chosen
+here, before anything is fitted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.frf import FRF
+from ..ema.identification import Identified, equalised, identify
+from ..effects import catalogue
+from ..effects.effect import Effect
+from ..effects.mesh import jitter, mesh_error
+from ..effects.ordinary import PartScale, gain, scatter
+from ..errors import FileError
+from ..fem.assemble import Structure, structure
+from ..fem.energy import mass_properties
+from ..fem.locate import locate, rows_at
+from ..model.assembly import Assembly
+from .calibration import Weighing
+from .diagnosis import Search
+from .likelihood import Poles, Responses
+from .workbench import Workbench, workbench
+
+ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
+ZETA_Q = 0.02  # of the line on which Q is reported
+SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
+POSITION_UNCERTAIN = 5e-3  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Measured or driven dofs on the structure: grids, or free points on the nearest shell.
+
+    Attributes
+    ----------
+    labels : (k,) text
+    grids : (k,) int        id, 0 where the place is no grid
+    points : (k, 3)         [m]
+    directions : (k, 3)     unit vectors, basic frame
+    sd : (k,)               uncertainty of the place [m]
+    """
+
+    labels: tuple[str, ...]
+    grids: np.ndarray
+    points: np.ndarray
+    directions: np.ndarray
+    sd: np.ndarray
+
+    def rows(self, built: Structure) -> sp.csr_array:
+        """Rows over the free dofs of the structure (k, n)."""
+        out = sp.lil_array((len(self.labels), built.T.shape[1]))
+        at = np.flatnonzero(self.grids > 0)
+        if len(at):
+            out[at] = built.along(self.grids[at], self.directions[at])
+        free = np.flatnonzero(self.grids <= 0)
+        if len(free):
+            out[free] = _on_shell(built, self.points[free], self.directions[free])
+        return sp.csr_array(out)
+
+    def around(self, built: Structure) -> sp.csr_array:
+        """Rows at each place and four more, two standard deviations away in the sheet."""
+        rows = [self.rows(built)]
+        uncertain = np.flatnonzero(self.sd > 0)
+        for k in uncertain:
+            n = self.directions[k]
+            e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
+            e1 /= np.linalg.norm(e1)
+            e2 = np.cross(n, e1)
+            step = 1.4 * self.sd[k]
+            near = self.points[k] + step * np.array([e1, -e1, e2, -e2])
+            rows.append(_on_shell(built, near, np.tile(n, (4, 1))))
+        return sp.csr_array(sp.vstack(rows))
+
+
+def _on_shell(built: Structure, points: np.ndarray, directions: np.ndarray) -> sp.csr_array:
+    assembly = built.assembly
+    return rows_at(built, locate(assembly.points, assembly.shells.nodes, points), directions)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Everything a diagnosis is asked with (SI, Hz).
+
+    ``held_sensors`` and ``held_band`` are never fitted; None: chosen here.
+    """
+
+    assembly: Assembly
+    outputs: Places
+    inputs: Places
+    frf: FRF | None = None
+    frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
+    frequency_sd: np.ndarray | None = None  # [Hz]
+    weighing: Weighing | None = None
+    hangers: tuple[int, ...] = ()
+    band: tuple[float, float] = (0.0, np.inf)
+    exclude: tuple[tuple[float, float], ...] = ()
+    held_sensors: tuple[str, ...] | int | None = None
+    held_band: tuple[float, float] | None = None
+    gain_known: bool = True
+    parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()  # (field, parts) the user frees
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A search and what scores it.
+
+    Attributes
+    ----------
+    search : what the diagnosis works with
+    score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
+    held : samples held out, in the shape of ``score.use``
+    what : the held-out data in words
+    notes : how the recording was read, and why
+    """
+
+    search: Search
+    score: Responses | Poles
+    held: np.ndarray
+    what: str
+    notes: tuple[str, ...]
+    identified: Identified | None = None
+    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
+
+
+def prepare(question: Question) -> Prepared:
+    """Identify, decide how to compare, choose what is held out, build the workbench."""
+    uncertain = bool(
+        max(question.outputs.sd.max(initial=0), question.inputs.sd.max(initial=0))
+        > POSITION_UNCERTAIN
+    )
+    if question.frf is None or uncertain:
+        return _by_poles(question, uncertain)
+    return _by_responses(question)
+
+
+# -- responses ------------------------------------------------------------------------------------
+
+
+def _by_responses(question: Question) -> Prepared:
+    frf = question.frf
+    assert frf is not None
+    low, high = _band(question, frf)
+    held_band = question.held_band or _upper_part(question, low, high)
+    fit_top = min(high, held_band[0]) if question.held_band is None else high
+    reach = (low, max(high, held_band[1]))
+    found = identify(frf, _widened(frf, reach), use=_counted(frf, question.exclude))
+    top = reach[1]
+    built = structure(question.assembly)
+    rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
+    bench = workbench(
+        question.assembly, top, sp.csr_array(sp.vstack([rows_o, rows_i])), built=built
+    )
+    lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
+    held_sensors = _held_sensors(question)
+    data = []
+    for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
+        s = 2 * np.pi * f * (zeta + 1j)
+        use = np.outer((f >= low) & (f <= fit_top), ~held_sensors)
+        data.append(
+            Responses(
+                equalised(found, s), s, rows_o, rows_i, use, found.quantity
+            ).over(bench.model)
+        )
+    f = lines[1]
+    outside = (f >= held_band[0]) & (f <= held_band[1])
+    held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
+    nuisance = _nuisance(bench, built, top)
+    if not question.gain_known:
+        nuisance.append(gain(len(question.outputs.labels), 1.0))
+    search = _search(question, bench, data[0], nuisance, top)
+    names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
+    what = f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
+    notes = [
+        f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
+        f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
+        f"both sides were given {ZETA:.0%} damping to search and {ZETA_Q:.0%} to report Q "
+        "(damping equalisation), so that no modes need pairing and damping cannot pose as stiffness",
+    ]
+    if not question.gain_known:
+        notes.append("the gain is unknown: one real factor common to all channels is free")
+    notes += _mass_note(question)
+    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found)
+
+
+def _band(question: Question, frf: FRF) -> tuple[float, float]:
+    low = max(question.band[0], float(frf.frequency[frf.frequency > 0][0]))
+    high = min(question.band[1], float(frf.frequency[-1]))
+    if high <= low:
+        raise FileError(
+            f"the band {question.band[0]:g}-{question.band[1]:g} Hz holds no line of the recording "
+            f"({frf.frequency[0]:g}-{frf.frequency[-1]:g} Hz)"
+        )
+    return low, high
+
+
+def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
+    """The uppermost fifth of the band, held out where the user names none."""
+    return high - 0.2 * (high - low), high
+
+
+def _widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
+    """A little more than the band, so that modes at its ends are whole."""
+    width = 0.04 * (band[1] - band[0])
+    return max(float(frf.frequency[0]), band[0] - width), min(
+        float(frf.frequency[-1]), band[1] + width
+    )
+
+
+def _counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+    use = np.ones(len(frf.frequency), bool)
+    for a, b in exclude:
+        use &= (frf.frequency < a) | (frf.frequency > b)
+    return use
+
+
+def _lines(
+    band: tuple[float, float], exclude: Sequence[tuple[float, float]], zeta: float
+) -> np.ndarray:
+    """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""
+    f = np.exp(np.arange(np.log(band[0]), np.log(band[1]), 0.75 * zeta))
+    for a, b in exclude:
+        f = f[(f < a) | (f > b)]
+    return f
+
+
+def _held_sensors(question: Question) -> np.ndarray:
+    """Which outputs are held out: the named ones, or a fixed spread of a fifth of them."""
+    labels = question.outputs.labels
+    wanted = question.held_sensors
+    if isinstance(wanted, tuple):
+        return np.array([label in wanted for label in labels])
+    driven = np.array([g in set(question.inputs.grids.tolist()) for g in question.outputs.grids])
+    count = min(len(labels) // 5 if wanted is None else wanted, max(len(labels) - 2, 0))
+    order = np.random.default_rng(20250101).permutation(len(labels))
+    chosen = [k for k in order if not driven[k]][:count]
+    return np.isin(np.arange(len(labels)), chosen)
+
+
+# -- poles ----------------------------------------------------------------------------------------
+
+
+def _by_poles(question: Question, uncertain: bool) -> Prepared:
+    frequency, sd, strength, found, notes = _frequencies(question, uncertain)
+    top = float(frequency[-1]) * 1.15
+    built = structure(question.assembly)
+    bench = workbench(question.assembly, top, built=built, groups=48)
+    held = np.zeros(len(frequency), bool)
+    if question.held_band is not None:
+        held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
+    elif len(frequency) > 5:
+        held[-max(1, len(frequency) // 5) :] = True
+    rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
+    rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
+    band = question.band if question.frf is None else _band(question, question.frf)
+    data = Poles(
+        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
+    ).over(bench.model)
+    nuisance = _nuisance(bench, built, top)
+    search = _search(question, bench, data, nuisance, top)
+    what = f"the {int(held.sum())} highest of {len(held)} frequencies"
+    notes = (*notes, *_mass_note(question))
+    return Prepared(search, data, held, what, notes, found, ~held)
+
+
+def _frequencies(
+    question: Question, uncertain: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Identified | None, tuple[str, ...]]:
+    """Natural frequencies of the test, standard deviations [Hz], relative peak heights."""
+    frf = question.frf
+    if frf is None:
+        assert question.frequency is not None
+        sd = question.frequency_sd
+        f = np.asarray(question.frequency, float)
+        sd = np.full(len(f), np.nan) if sd is None else sd
+        inside = (f >= question.band[0]) & (f <= question.band[1])
+        order = np.argsort(f[inside])
+        sd = np.where(np.isnan(sd), 1e-3 * f, sd)
+        note = "no FRF exists: natural frequencies were compared"
+        return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
+    band = _band(question, frf)
+    found = identify(frf, _widened(frf, band), use=_counted(frf, question.exclude))
+    f = found.frequency
+    keep = _prominent(found, band)
+    why = []
+    if not question.gain_known:
+        why.append("the gain is unknown")
+    if uncertain:
+        why.append("the places of the sensors are uncertain")
+    note = (
+        f"{' and '.join(why).capitalize() or 'by wish'}, so natural frequencies were compared, not "
+        f"FRFs: {int(keep.sum())} modes of {found.order} identified between {band[0]:g} and "
+        f"{band[1]:g} Hz; model modes that the sensors can hardly see may stay without a partner"
+    )
+    peak = _peaks(found)[keep]
+    sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
+    return f[keep], sd, peak / peak.max(), found, (note,)
+
+
+LEAST_GAIN = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
+TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
+
+
+def _peaks(found: Identified) -> np.ndarray:
+    """Height of each resonance in the accelerance, |R| ω / ζ ... up to a constant (r,)."""
+    return np.asarray(
+        np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
+    )
+
+
+def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
+    """Poles of the band that matter: clear gain, usual damping, the strongest at its resonance."""
+    f, peak = found.frequency, _peaks(found)
+    keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
+    if not keep.any():
+        raise FileError(f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz")
+    usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
+    keep &= found.damping < max(0.005, 4 * usual)
+    for i in np.flatnonzero(keep):
+        close = np.abs(np.log(f / f[i])) < TWIN
+        keep[i] = not np.any(close & keep & (peak > peak[i]))
+    return keep
+
+
+# -- both -----------------------------------------------------------------------------------------
+
+
+def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:
+    """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
+    out: list[Effect] = [
+        scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
+    ]  # fmt: skip
+    if (mesh := mesh_error(built, top)) is not None:
+        out.append(mesh)
+    out.append(jitter(built, top))
+    return out
+
+
+def _search(
+    question: Question, bench: Workbench, data: Responses | Poles, nuisance: list[Effect], top: float
+) -> Search:
+    base = [*_ordinary(question, bench), *nuisance]
+    weight = mass_properties(question.assembly)[0]
+    sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
+    setup = catalogue.Setup(sensors, question.hangers, weight, top)
+    return Search(
+        bench, data, question.weighing, tuple(base), tuple(nuisance), setup, question.outputs.labels
+    )
+
+
+def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
+    """The parameters the user frees, or E and rho of every material and t of every part."""
+    from ..effects.ordinary import ordinary
+
+    chosen = [
+        ordinary(bench.sheet, name, [question.assembly.part(p) for p in parts])
+        for name, parts in question.parameters
+        if name in ("E", "rho", "t")
+    ]
+    return chosen or catalogue.defaults(bench.sheet)
+
+
+def _mass_note(question: Question) -> list[str]:
+    if question.weighing is None:
+        return ["no weighed mass was given: E and rho cannot be told apart, both stay near the deck"]
+    w = question.weighing
+    return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]
