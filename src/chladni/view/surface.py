@@ -131,6 +131,6 @@ def surface(assembly: Assembly, unit: str = "m") -> Surface:
         np.concatenate(parts).astype(np.int64),
         unit,
     )
-    if not len(assembly.points):
-        raise ModelError("there is nothing to draw: the deck has no grids")
+    if not len(seen.faces) + len(seen.lines):
+        raise ModelError("there is nothing to draw: no shells, solids, beams or springs")
     return seen

@@ -1,0 +1,139 @@
+"""The page: everything inside, everything escaped, every verdict a sentence."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from chladni.errors import FileError
+from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
+from chladni.report.page import write_page, write_sections
+from chladni.report.verdict import HEADING, sentence
+from chladni.view import plots
+
+EVIL = '<script>alert("x")</script>'
+DIAGNOSIS = {
+    "verdict": "missing physics",
+    "effects": [
+        {
+            "name": "hem-contact",
+            "claim": f"the hem holds {EVIL}",
+            "log_evidence": -120.3,
+            "where": {
+                "text": f"edge of {EVIL}",
+                "parts": [EVIL],
+                "grids": list(range(40)),
+                "point_m": [0.1, 0.2, 0.3],
+                "radius_m": 0.15,
+                "band_hz": [40.0, 160.0],
+                "channels": [EVIL],
+            },
+            "parameters": [
+                {"name": EVIL, "value": 3.1e9, "unit": "N/m2", "low": 2.2e9, "high": 4.4e9}
+            ],
+        }
+    ],
+    "alternatives": [{"name": EVIL, "log_evidence": -310.0, "why_not": EVIL}],
+    "fit": {
+        "Q_nominal": 0.2134,
+        "Q_calibrated": 0.1121,
+        "Q_with_effect": 0.01213,
+        "Q_floor": 0.0081,
+        "held_out": {
+            "Q_nominal": 0.2411,
+            "Q_calibrated": 0.131,
+            "Q_with_effect": 0.0151,
+            "what": EVIL,
+        },
+    },
+    "mass": {"weighed_kg": 10.508, "model_kg": 10.51},
+    "frequencies": [
+        {
+            "test_hz": 28.2,
+            "before_hz": 24.9,
+            "after_hz": 28.1,
+            "mac_before": 0.98,
+            "mac_after": None,
+        }
+    ],
+    "files": {"deck": f"{EVIL}.bdf", "report": "report.html"},
+}
+
+
+class Tags(HTMLParser):
+    """Counts tags and keeps what is loaded from elsewhere."""
+
+    def __init__(self):
+        super().__init__()
+        self.seen, self.loaded, self.links = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append(tag)
+        for name, value in attrs:
+            if name in ("src", "srcset", "data", "action"):
+                self.loaded.append(value)
+            if name == "href":
+                self.links.append(value)
+
+
+def read(path):
+    text, tags = path.read_text(encoding="utf-8"), Tags()
+    tags.feed(text)
+    return text, tags
+
+
+def test_text_of_decks_and_recordings_is_escaped(tmp_path):
+    """Whatever field a deck or a recording can fill: no tag comes out of it."""
+    more = [Section(EVIL, [Text([EVIL]), Table((EVIL,), [(EVIL,)]), Facts([(EVIL, EVIL)])])]
+    page = write_page(tmp_path, DIAGNOSIS, {}, [EVIL], more, command=EVIL, title=EVIL)
+    text, tags = read(page)
+    assert "script" not in tags.seen
+    assert text.count("&lt;script&gt;") >= 14
+    assert all(link.startswith("./") for link in tags.links)
+
+
+def test_page_is_self_contained(tmp_path):
+    figure = plots.waterfall(tmp_path / "w.png", {"a": 1.0, "b": 0.5})
+    page = write_page(tmp_path, DIAGNOSIS, {"waterfall": figure, "where": figure, "mine": figure})
+    text, tags = read(page)
+    assert tags.seen.count("img") == 3
+    assert all(src.startswith("data:image/png;base64,") for src in tags.loaded)
+    assert not re.search(r"https?://|@import|url\(", text)
+    assert "link" not in tags.seen
+
+
+def test_numbers_an_engineer_asks_for_are_there(tmp_path):
+    text, _ = read(write_page(tmp_path, DIAGNOSIS))
+    for due in ("0.2411", "0.0151", "-94 %", "3.1 GN/m² (2.2 to 4.4)", "-310", "10.51", "24.9"):
+        assert due in text, due
+
+
+@pytest.mark.parametrize("verdict", HEADING)
+def test_every_verdict_is_one_sentence(verdict):
+    for d in ({"verdict": verdict}, {**DIAGNOSIS, "verdict": verdict}):
+        said = sentence(d)
+        assert said[0].isupper()
+        assert said.endswith(".")
+        assert "None" not in said
+
+
+@pytest.mark.parametrize("d", [{}, {"verdict": "nothing missing", "effects": [], "fit": None}])
+def test_what_is_missing_is_left_out(tmp_path, d):
+    text, tags = read(write_page(tmp_path, d))
+    assert tags.seen.count("section") == 0
+    assert "None" not in text
+
+
+def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):
+    with pytest.raises(FileError, match=r"nix\.png"):
+        write_page(tmp_path, DIAGNOSIS, {"where": tmp_path / "nix.png"})
+    with pytest.raises(FileError, match="no picture"):
+        write_sections(tmp_path / "p.html", "x", [Section("a", [Picture(tmp_path / "a.exe")])])
+    assert not list(tmp_path.iterdir())
+
+
+def test_sections_without_content_are_left_out(tmp_path):
+    body = [Section("empty", []), Section("full", [Items(["one"])])]
+    text, _ = read(write_sections(tmp_path / "p.html", "t", body))
+    assert "full" in text
+    assert "empty" not in text

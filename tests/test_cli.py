@@ -1,0 +1,176 @@
+"""The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from chladni.cli.app import COMMANDS, application, guarded
+from chladni.errors import AccuracyError, FileError
+
+NEEDED = {  # extra arguments a command cannot do without
+    "frf": ["--input", "1:+Z", "--output", "9:+Z"],
+}
+
+
+def deck_text(n=6, side=0.3, t=1e-3):
+    """A free square steel plate of n by n CQUAD4, SI."""
+    lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", f"PSHELL,1,1,{t},1,,1"]
+    x = np.linspace(0, side, n + 1)
+    lines += [
+        f"GRID,{1 + j + (n + 1) * i},,{x[i]:.5f},{x[j]:.5f},0.0"
+        for i in range(n + 1)
+        for j in range(n + 1)
+    ]
+    for i in range(n):
+        for j in range(n):
+            a = 1 + j + (n + 1) * i
+            lines.append(f"CQUAD4,{1 + j + n * i},1,{a},{a + n + 1},{a + n + 2},{a + 1}")
+    return "\n".join([*lines, "ENDDATA", ""])
+
+
+@pytest.fixture
+def deck(tmp_path):
+    path = tmp_path / "plate.bdf"
+    path.write_text(deck_text())
+    return path
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+def test_modes(deck, tmp_path):
+    """Six rigid modes, then f = λ²/(2π a²) √(D/ρt) with λ² = 13.47 (Leissa 1973, free square)."""
+    done = call("modes", deck, "--count", 8, "--units", "SI", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "modes.json").read_text())
+    assert result["mass_kg"] == pytest.approx(7850 * 1e-3 * 0.09)
+    np.testing.assert_allclose(result["centre_of_gravity_m"], [0.15, 0.15, 0], atol=1e-9)
+    D = 2.1e11 * 1e-9 / 12 / (1 - 0.09)
+    f = 13.47 / (2 * np.pi * 0.09) * np.sqrt(D / 7.85)
+    assert max(result["frequency_hz"][:6]) < 0.01
+    assert result["frequency_hz"][6] == pytest.approx(f, rel=0.02)
+    np.testing.assert_allclose(result["generalized_mass"], 1, rtol=1e-8)
+    (share,) = (part["strain_energy"] for part in result["parts"].values())
+    np.testing.assert_allclose(share[6:], 1, rtol=1e-6)
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names == {"modes.json", "modes.vtu", "modes.png", "report.html"}
+
+
+def test_frf_peaks_at_its_modes(deck, tmp_path):
+    out = tmp_path / "out"
+    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
+    done = call("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    call("modes", deck, "--count", 7, "--units", "SI", "--out", out)
+    first = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        assert held["outputs"].tolist() == ["1:+Z", "49:n"]
+        assert str(held["quantity"]) == "accelerance"
+        peak = held["frequency_hz"][np.abs(held["values"][:, 0, 0]).argmax()]
+    assert peak == pytest.approx(first, abs=0.1)
+
+
+def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
+    """On a plate in z = 0 the normal is Z up to sign, and H is reciprocal."""
+    labels = ["--input", "1:+Z", "--input", "9:n", "--output", "1:+Z", "--output", "9:n"]
+    assert call("frf", deck, *labels, "--out", tmp_path / "out").exit_code == 0
+    with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
+        H = held["values"]
+    np.testing.assert_allclose(H, H.swapaxes(1, 2), rtol=1e-6, atol=1e-9 * np.abs(H).max())
+
+
+def test_render(deck, tmp_path):
+    out = tmp_path / "out"
+    options = ["--modes", "7-9", "--gif", 7, "--thickness", "--energy", 8]
+    done = call("render", deck, *options, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
+    assert {p.name for p in out.iterdir()} == due | {"report.html"}
+
+
+BAD = {
+    "missing": None,
+    "empty": b"",
+    "binary": bytes(range(256)) * 20,
+    "text": "one fine day\n" * 30,
+    "no grids": "BEGIN BULK\nMAT1,1,2.1+11,,0.3,7850.\nENDDATA\n",
+    "no elements": "BEGIN BULK\nGRID,1,,0.,0.,0.\nENDDATA\n",
+    "unknown property": deck_text().replace("PSHELL,1,", "PSHELL,7,"),
+    "unknown grid": deck_text().replace("CQUAD4,1,1,1,", "CQUAD4,1,1,999,"),
+    "no thickness": deck_text().replace("PSHELL,1,1,0.001,", "PSHELL,1,1,,"),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("fault", BAD)
+def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
+    path, content = tmp_path / "bad.bdf", BAD[fault]
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    done = call(command, path, *NEEDED.get(command, []), "--out", tmp_path / "runs" / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    said = done.stderr.strip()
+    assert said.startswith("chladni: ")
+    assert "\n" not in said
+    assert "Traceback" not in said
+    assert not list((tmp_path / "runs").iterdir()), "half a run was left"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
+    done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "case.toml" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
+        (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
+        (["modes", "--units", "cubits"], "mm-t-s"),
+        (["render", "--modes", "a-b"], "--modes"),
+        (["render", "--modes", "0-3"], "from 1"),
+        (["render", "--gif", "100000"], "100000"),
+    ],
+)
+def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
+    command, *options = arguments
+    done = call(command, deck, *options, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+def test_out_must_be_a_folder(deck):
+    assert call("modes", deck, "--out", deck).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("raised", "code"),
+    [
+        (FileError("a"), 2),
+        (AccuracyError("a"), 3),
+        (OSError(13, "no", "f"), 2),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_exit_codes(raised, code):
+    import typer
+
+    def command():
+        raise raised
+
+    with pytest.raises(typer.Exit) as caught:
+        guarded(command)()
+    assert caught.value.exit_code == code
+
+
+def test_help_lists_every_command():
+    said = call("--help").output
+    assert all(name in said for name in COMMANDS)

@@ -1,0 +1,55 @@
+"""The question to VTK is put to a child, once; a crash there is an answer."""
+
+import pytest
+
+from chladni.errors import FileError
+from chladni.view import probe
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("CHLADNI_GRAPHICS", raising=False)
+    probe.window.cache_clear()
+    yield
+    probe.window.cache_clear()
+
+
+def test_a_child_that_crashes_means_no(monkeypatch):
+    monkeypatch.setattr(probe, "_CHILD", "import os; os.abort()")
+    assert not probe.opens("vtkEGLRenderWindow")
+    assert probe.window() is None
+    assert not probe.prepare()
+
+
+def test_the_answer_is_asked_for_once(monkeypatch):
+    asked = []
+    monkeypatch.setattr(probe, "opens", lambda name: asked.append(name) or len(asked) == 2)
+    assert probe.window() == probe.WINDOWS["egl"]
+    probe.window.cache_clear()
+    assert probe.window() == probe.WINDOWS["egl"]
+    assert asked == list(probe.WINDOWS.values())
+
+
+def test_another_machine_or_version_is_asked_again(monkeypatch):
+    monkeypatch.setattr(probe, "opens", lambda name: True)
+    probe.window()
+    monkeypatch.setattr(probe, "_machine", lambda: "another")
+    monkeypatch.setattr(probe, "opens", lambda name: False)
+    probe.window.cache_clear()
+    assert probe.window() is None
+
+
+def test_a_wish_overrides_and_a_wrong_one_is_refused(monkeypatch):
+    monkeypatch.setenv("CHLADNI_GRAPHICS", "egl")
+    assert probe.window() == probe.WINDOWS["egl"]
+    monkeypatch.setenv("CHLADNI_GRAPHICS", "glide")
+    probe.window.cache_clear()
+    with pytest.raises(FileError, match="osmesa, egl, matplotlib"):
+        probe.window()
+
+
+def test_a_broken_cache_is_no_obstacle(monkeypatch):
+    monkeypatch.setattr(probe, "opens", lambda name: True)
+    (probe.cache_folder() / "graphics.json").write_text("{half")
+    assert probe.window() == probe.WINDOWS["osmesa"]

@@ -1,0 +1,85 @@
+"""Topology that can be counted: rims, skins, folds."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chladni.errors import ShapeError
+from chladni.model.plates import box, folded_panel, plate
+from chladni.view.camera import best_view
+from chladni.view.surface import Surface, skin, surface
+
+
+def block(n):
+    """Hexahedra of a unit cube cut n times each way."""
+    x = np.linspace(0, 1, n + 1)
+    points = np.stack(np.meshgrid(x, x, x, indexing="ij"), -1).reshape(-1, 3)
+    k = np.arange((n + 1) ** 3).reshape(n + 1, n + 1, n + 1)
+    lower = [k[:-1, :-1, :-1], k[1:, :-1, :-1], k[1:, 1:, :-1], k[:-1, 1:, :-1]]
+    upper = [k[:-1, :-1, 1:], k[1:, :-1, 1:], k[1:, 1:, 1:], k[:-1, 1:, 1:]]
+    return points, np.stack(lower + upper, -1).reshape(-1, 8)
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_skin_of_a_cube_is_its_surface(n):
+    """6 n² faces, total area 6, and Σ a = 0 as for every closed surface."""
+    points, hexahedra = block(n)
+    faces, _, owner = skin(hexahedra, np.zeros(len(hexahedra), int))
+    areas = Surface(points, faces).areas()
+    assert len(faces) == 6 * n**2 == len(owner)
+    np.testing.assert_allclose(np.linalg.norm(areas, axis=1).sum(), 6)
+    np.testing.assert_allclose(areas.sum(axis=0), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [6, 4])
+def test_skin_of_wedge_and_tetrahedron_is_closed(kind):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1.0]])
+    nodes = np.arange(kind)[None]
+    faces, _, _ = skin(nodes, np.zeros(1, int))
+    np.testing.assert_allclose(Surface(points, faces).areas().sum(axis=0), 0, atol=1e-15)
+
+
+@given(st.integers(1, 7), st.integers(1, 7))
+def test_outline_of_a_plate_is_its_rim(nx, ny):
+    assert len(surface(plate(1.0, 0.7, nx, ny, 1e-3)).outline()) == 2 * (nx + ny)
+
+
+def test_outline_of_a_box_is_its_twelve_edges():
+    edges = surface(box(0.3, 0.2, 0.1, h=0.05)).outline()
+    assert len(edges) == 4 * (6 + 4 + 2)
+
+
+def test_outline_shows_where_parts_meet():
+    """Two parts in one plane have a line between them, one part has none."""
+    points = np.array([[x, y, 0.0] for x in range(3) for y in range(2)])
+    quads = np.array([[0, 2, 3, 1], [2, 4, 5, 3]])
+    one, two = Surface(points, quads), Surface(points, quads, part=np.array([0, 1]))
+    assert len(two.outline()) == len(one.outline()) + 1
+
+
+def test_values_of_wrong_shape_are_refused():
+    with pytest.raises(ShapeError, match="due is"):
+        Surface(np.zeros((3, 2)))
+
+
+@given(st.integers(0, 10_000))
+def test_a_plate_is_seen_nearly_face_on(seed):
+    """The normal of a turned plate is within the tilt (24 and 17 degrees) of the line of sight."""
+    Q, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
+    flat = surface(plate(1.0, 0.7, 5, 4, 1e-3))
+    turned = Surface(flat.points @ Q.T, flat.faces)
+    camera = best_view(turned)
+    assert abs(camera.toward @ Q[:, 2]) > np.cos(np.radians(24 + 17 + 5))
+
+
+@pytest.mark.parametrize("structure", [box(), folded_panel(), plate(1, 2, 3, 4, 1e-3)])
+def test_camera_is_a_right_handed_frame_that_holds_everything(structure):
+    seen = surface(structure)
+    camera = best_view(seen)
+    frame = np.stack([camera.right, camera.up, camera.toward])
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1)
+    u0, u1, v0, v1 = camera.window
+    uv = camera.project(seen.points)
+    assert np.all((uv > [u0, v0]) & (uv < [u1, v1]))
