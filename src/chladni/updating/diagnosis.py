@@ -129,7 +129,7 @@ def _fit(
 
 
 SCALES = np.geomspace(0.003, 0.2, 25)
-WIDE = 0.06  # scale at which starts are compared
+WIDE = (0.06, 0.02)  # scales at which starts are compared
 SCALE_SD = 0.5  # of ln(scale) about its prior median
 
 
@@ -137,9 +137,23 @@ def _fit_poles(
     model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
 ) -> Fit:
     """Alternate the fit with the most probable scale of what no model reaches."""
+    options = []
+    for road in ROADS:
+        there = x
+        for scale in road:
+            there = fit(model, effects, replace(data, scale=scale), weighing, there, max_steps=8).x
+        options.append(_settled(model, effects, data, weighing, there))
+    return min(options, key=lambda f: f.S)
+
+
+ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
+
+
+def _settled(
+    model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
+) -> Fit:
+    """Scale and parameters in turn until the evidence stays."""
     best = None
-    for scale in (0.08, 0.04, 0.02):  # wide first: the pairing must settle
-        x = fit(model, effects, replace(data, scale=scale), weighing, x, max_steps=12).x
     for _ in range(4):
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), weighing, x)
@@ -235,24 +249,31 @@ def _candidates(search: Search, null: Trial) -> list[Candidate]:
     return out
 
 
-def _scores(search: Search, base: Baseline, effect: Effect, starts: list[np.ndarray]) -> np.ndarray:
-    """Score of an effect at each start about a baseline, the base profiled out."""
+def _scores(
+    search: Search, base: Baseline, effect: Effect, starts: list[np.ndarray]
+) -> np.ndarray:
+    """Score of an effect at each start about a baseline (n_ways, n_starts).
+
+    Responses are scored once, with the base profiled out; poles at a wide and at a narrow scale.
+    """
     model = search.bench.model
     if any(change.field.startswith("Q") for change in effect.fields(starts[0])):
         model = model.with_components()
-    out = np.full(len(starts), np.inf)
+    data = search.data
+    wide = [replace(data, scale=scale) for scale in WIDE] if isinstance(data, Poles) else []
+    out = np.full((max(1, len(wide)), len(starts)), np.inf)
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
     for k, start in enumerate(starts):
         try:
             state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, start]), False)
         except ModelError:
             continue
-        if isinstance(search.data, Poles):
-            z = (start - [p.mean for p in effect.parameters]) / [p.sd for p in effect.parameters]
-            r, _ = replace(search.data, scale=WIDE).residual(state, False)
-            out[k] = r @ r + z @ z
-            continue
-        r, _ = search.data.residual(state, False)
-        out[k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
+        for way, poles in enumerate(wide):
+            r, _ = poles.residual(state, False)
+            out[way, k] = r @ r + (((start - mean) / sd) ** 2).sum()
+        if not wide:
+            r, _ = data.residual(state, False)
+            out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
     return out
 
 
@@ -276,9 +297,9 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
         base, starts = bases[-1], effect.starts()
         several = 1
         if isinstance(search.data, Poles) and len(effect.parameters) > 2:
-            starts, several = [*starts, *_draws(effect, 1024)], 12  # pairing makes many valleys
-        scores = _scores(search, base, effect, starts)
-        out += [(effect, starts[k], base.x) for k in np.argsort(scores)[:several]]
+            starts, several = [*starts, *_draws(effect, 2048)], 6  # pairing makes many valleys
+        for scores in _scores(search, base, effect, starts):
+            out += [(effect, starts[k], base.x) for k in np.argsort(scores)[:several]]
     return out
 
 
@@ -417,7 +438,7 @@ def _best_of(
 
 def _best_start(search: Search, base: Baseline, effect: Effect) -> tuple[float, np.ndarray]:
     starts = effect.starts()
-    scores = _scores(search, base, effect, starts)
+    scores = _scores(search, base, effect, starts)[0]
     return float(scores.min()), starts[int(np.argmin(scores))]
 
 

@@ -304,6 +304,8 @@ def _frequencies(
 
 LEAST_GAIN = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
 TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
+SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
+FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
 
 
 def _peaks(found: Identified) -> np.ndarray:
@@ -322,8 +324,9 @@ def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
     usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
     keep &= found.damping < max(0.005, 4 * usual)
     for i in np.flatnonzero(keep):
-        close = np.abs(np.log(f / f[i])) < TWIN
-        keep[i] = not np.any(close & keep & (peak > peak[i]))
+        apart = np.abs(np.log(f / f[i]))
+        over = ((apart < TWIN) & (peak > peak[i])) | ((apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i]))
+        keep[i] = not np.any(over & keep) and peak[i] > FAINTEST * peak[keep].max()
     return keep
 
 
