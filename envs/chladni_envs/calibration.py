@@ -81,7 +81,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
             self.recorded = self.question.predict(self.np_random.uniform(-0.8, 0.8, self.p))
         else:
             self.recorded = self.question.recorded
-        self.delta = self.deviation(self.x)
+        self._judge()
         self.start = self.Q
         return self._observation(), self._info()
 
@@ -90,7 +90,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         self.steps += 1
         before = self.Q
         self.x = np.clip(self.x + STRIDE * np.clip(np.asarray(action, float), -1, 1), -1, 1)
-        self.delta = self.deviation(self.x)
+        self._judge()
         terminated = bool(self.Q < DONE)
         truncated = bool(not terminated and self.steps >= self.max_steps)
         reward = float(np.log10(before / self.Q))
@@ -100,10 +100,10 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         """δ = log10(H_model / H_recorded) (n_f, n_out) complex."""
         return np.log(self.question.predict(x) / self.recorded) / np.log(10)
 
-    @property
-    def Q(self) -> float:
-        """Mean |δ|², floored at 1e-12."""
-        return max(float(np.mean(np.abs(self.delta) ** 2)), 1e-12)
+    def _judge(self) -> None:
+        """δ at the present x, and Q = mean |δ|², floored at 1e-12."""
+        self.delta = self.deviation(self.x)
+        self.Q = max(float(np.vdot(self.delta, self.delta).real / self.delta.size), 1e-12)
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Recording and model at the first output (height, width, 3) uint8."""
@@ -123,7 +123,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         return {"score": float(np.log10(self.start / self.Q)), "Q": self.Q, "x": self.x.copy()}
 
 
-def plate_question(modes: int = 8, lines: int = 160) -> Question:
+def plate_question(modes: int = 8, lines: int = 96) -> Question:
     """Mobility of a simply supported plate with E and ρ off by up to 20 %, a mass, a spring.
 
     In its nominal modes K = E/E_0 diag ω² + k φ_s φ_sᵀ and M = ρ/ρ_0 I + m φ_m φ_mᵀ.

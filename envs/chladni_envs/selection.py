@@ -56,6 +56,8 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         """Nothing freed; a new problem unless one was given."""
         super().reset(seed=seed)
         self.problem = self.given or drawn(self.np_random, self.p)
+        J = self.problem.jacobian
+        self._unit = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
         self.freed, self.steps, self.score, self.over = np.zeros(self.p, bool), 0, 0.0, False
         return self._observation(), self._info()
 
@@ -87,7 +89,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
 
     def _observation(self) -> np.ndarray:
         problem, freed = self.problem, self.freed
-        J = problem.jacobian / np.maximum(np.linalg.norm(problem.jacobian, axis=0), 1e-300)
+        J = self._unit
         left = problem.residual + problem.jacobian @ problem.fitted(freed)
         out = np.zeros((4, self.p))
         out[0] = freed
