@@ -9,7 +9,7 @@ import typer
 
 from ..errors import AccuracyError, ChladniError
 
-COMMANDS = ("modes", "frf", "render")  # each a module here with a function ``run``
+COMMANDS = ("modes", "frf", "render", "identify", "report")  # each a module here with ``run``
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
 
 

@@ -16,7 +16,7 @@ from ..report.words import number
 from .model import Model, load_model
 from .run import Out, Run, Units, started
 
-_UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
+UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
 
 
 def run(
@@ -34,8 +34,8 @@ def run(
 ) -> None:
     """Frequency responses between degrees of freedom, with what higher modes contribute."""
     low, high = limits(band)
-    if quantity not in _UNIT:
-        raise LabelError(f"no quantity {quantity!r}; there are {', '.join(_UNIT)}")
+    if quantity not in UNIT:
+        raise LabelError(f"no quantity {quantity!r}; there are {', '.join(UNIT)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units)
@@ -100,7 +100,7 @@ def _page(job: Run, found: FRF) -> None:
             name = f"frf_{answer}_from_{drive}.png".replace(":", "_").replace("+", "p")
             title, curve = f"{answer} from {drive}", (found.frequency, found.values[:, i, j])
             path = job.keep(name, title)
-            plots.frf(path, {"model": curve}, title, _UNIT[found.quantity])
+            plots.frf(path, {"model": curve}, title, UNIT[found.quantity])
             pictures.append(Picture(path))
     peak = np.abs(found.values).max(axis=0)
     at = found.frequency[np.abs(found.values).argmax(axis=0)]
@@ -109,7 +109,7 @@ def _page(job: Run, found: FRF) -> None:
         for i, answer in enumerate(found.outputs)
         for j, drive in enumerate(found.inputs)
     ]
-    heads = ("output", "input", f"largest [{_UNIT[found.quantity]}]", "at [Hz]")
+    heads = ("output", "input", f"largest [{UNIT[found.quantity]}]", "at [Hz]")
     f = found.frequency
     job.lead = f"{len(rows)} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
     job.section("Responses", [*pictures, Table(heads, rows, ("output", "input"))])

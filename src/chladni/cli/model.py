@@ -76,7 +76,7 @@ def load_model(source: Path, units: str | None = None) -> Model:
         If there is no such file, or it is no deck and no case.
     """
     if not source.exists():
-        raise FileError(f"no file or folder {source}{_beside(source)}")
+        raise FileError(f"no file or folder {source}{beside(source)}")
     if is_case(source):
         from ..case import load_case
 
@@ -106,7 +106,7 @@ def is_case(source: Path) -> bool:
     return source.is_dir() or source.suffix == ".toml"
 
 
-def _beside(source: Path) -> str:
+def beside(source: Path) -> str:
     """The names nearest to the one that is missing, else those of its kind."""
     if not source.parent.is_dir():
         return f"; there is no folder {source.parent} either"

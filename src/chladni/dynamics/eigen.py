@@ -1,20 +1,29 @@
 """Undamped modes K φ = ω² M φ of large sparse systems, proved complete by a Sturm count."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import LinAlgError, eigh
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
+from .dissection import Fronts, analyse
 from .factor import Backend, Factor, factorise, inertia
 from .lanczos import Ritz, block_lanczos
 from .modes import ModalModel
+from .multifrontal import NotDefinite
 from .system import System
 
 _DENSE = 300  # dofs; below, LAPACK is as fast
 _GUESS = 1e-8  # of the median K_ii/M_ii: where a shift lies well for 10³ to 10⁶ dofs
+_FAR, _NEAR = 1.0, 1e-7  # σ/λ_k between which a shift serves
+_SPARE = 2  # modes beyond those asked for, to find a gap for the count
+_SHARP = 1e-4  # error of a Ritz value good enough to tell a gap
 _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
+_LOOSE = 1e-6  # Ritz error of a mode handed out (frequencies are as good as its square)
+_FINITE = 1e-11  # θ/θ_max below which a massless motion is meant
 
 
 def normal_modes(
@@ -24,7 +33,7 @@ def normal_modes(
     band: float | None = None,
     shift: float | None = None,
     points: np.ndarray | None = None,
-    backend: Backend | None = None,
+    backend: Backend = "multifrontal",
     proof: bool = True,
 ) -> ModalModel:
     """The lowest modes, K φ_r = ω_r² M φ_r with Φᵀ M Φ = I, undamped.
@@ -39,8 +48,8 @@ def normal_modes(
     band : float, optional      or all up to this frequency [Hz] (both: the fewer)
     shift : float, optional     σ [rad²/s²], negative; default from the scale of the problem
     points : (n, 3), optional   place of each row's node [m]: a better elimination order
-    backend : str, optional     of :func:`factorise`
-    proof : bool                False leaves the Sturm count out (a third of the time)
+    backend : str               of :func:`factorise`
+    proof : bool                False leaves the Sturm count out (a quarter of the time)
 
     Raises
     ------
@@ -49,113 +58,171 @@ def normal_modes(
     AccuracyError
         If modes are missing, not mass-orthonormal, or no eigenvectors.
     """
-    problem = _Problem(system, points, backend)
     n = len(system.dofs)
+    limit = np.inf if band is None else (2 * np.pi * band) ** 2
+    K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
     if n <= _DENSE or (count is not None and 3 * count > n):
-        lam, phi = _dense(problem, count, band)
+        lam, phi = _dense(K, M, system.dofs)
     else:
-        lam, phi = _sparse(problem, count, band, shift, proof)
-    if (gap := _gap(phi, problem.M)) > _ORTHONORMAL:
+        order = analyse(abs(K) + abs(M), points, system.dofs[:, 0])
+        problem = _Problem(K, M, system.dofs, backend, order)
+        wanted = problem.below(limit) if count is None and band is not None else count or 20
+        lam, phi = _sparse(problem, wanted, limit, shift, proof)
+    keep = (lam <= limit) & (np.arange(len(lam)) < (len(lam) if count is None else count))
+    lam, phi = lam[keep], np.asfortranarray(phi[:, keep])
+    if (gap := _gap(phi, M)) > _ORTHONORMAL:
         raise AccuracyError(f"modes are not mass-orthonormal: |ΦᵀMΦ - I| = {gap:.1e}")
     frequency = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
     return ModalModel(frequency, np.zeros(len(lam)), phi, system.dofs)
 
 
+@dataclass(frozen=True, eq=False)
 class _Problem:
-    """K, M real and compressed, with the order information that goes along."""
+    """K and M, real, and the elimination order that serves every K - σM."""
 
-    def __init__(self, system: System, points: np.ndarray | None, backend: Backend | None) -> None:
-        self.K, self.M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
-        self.dofs, self.points, self.backend = system.dofs, points, backend
-
-    def shifted(self, sigma: float) -> sp.csr_array:
-        """K - σ M."""
-        return self.K - sigma * self.M
+    K: sp.csr_array
+    M: sp.csr_array
+    dofs: np.ndarray
+    backend: Backend
+    order: Fronts
 
     def factor(self, sigma: float) -> Factor:
-        """Positive definite factorisation of K - σ M.
-
-        Raises
-        ------
-        ModelError
-            Naming a dof with neither stiffness nor mass, if that is the reason.
-        """
-        A = self.shifted(sigma)
-        empty = np.flatnonzero(A.diagonal() <= 0)
-        if len(empty):
-            names = ", ".join(label(*self.dofs[r]) for r in empty[:3])
-            raise ModelError(f"no stiffness and no mass at {len(empty)} dofs: {names} ...")
-        return factorise(A, self.points, nodes=self.dofs[:, 0], backend=self.backend)
+        """Positive definite factorisation of K - σM; who is at fault is named."""
+        A = sp.csr_array(self.K - sigma * self.M)
+        try:
+            return factorise(A, backend=self.backend, fronts=self.order)
+        except NotDefinite as error:
+            at = label(*self.dofs[error.row])
+            raise ModelError(
+                f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): "
+                "a part hangs on nothing, or a stiffness is negative"
+            ) from error
 
     def below(self, s: float) -> int:
         """How many eigenvalues are below s: the negative ones of K - s M (Sylvester)."""
-        return inertia(self.shifted(s), self.points, nodes=self.dofs[:, 0])[0]
+        for nudge in (0.0, 1e-7, -1e-7):
+            try:
+                return inertia(self.K - s * (1 + nudge) * self.M, fronts=self.order)[0]
+            except AccuracyError:
+                continue
+        raise AccuracyError(f"no Sturm count at {np.sqrt(abs(s)) / (2 * np.pi):.6g} Hz")
 
 
-def _guess(problem: _Problem) -> float:
-    """σ = -1e-8 median(K_ii/M_ii) over translations: one unit everywhere, blind to the scale."""
-    k, m = problem.K.diagonal(), problem.M.diagonal()
-    translation = (problem.dofs[:, 1] <= 3) & (m > 0) & (k > 0)
-    use = translation if translation.any() else (m > 0) & (k > 0)
+def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
+    """Median K_ii/M_ii of the translations [rad²/s²]: one unit everywhere, blind to the scale.
+
+    Raises
+    ------
+    ModelError
+        If a degree of freedom has neither stiffness nor mass; the sentence names some.
+    """
+    k, m = K.diagonal(), M.diagonal()
+    if len(empty := np.flatnonzero((k <= 0) & (m <= 0))):
+        names = ", ".join(label(*dofs[r]) for r in empty[:3])
+        raise ModelError(f"{len(empty)} dofs have neither stiffness nor mass: {names}, ...")
+    both = (m > 0) & (k > 0)
+    use = both & (dofs[:, 1] <= 3)
+    use = use if use.any() else both
     if not use.any():
-        raise ModelError("no degree of freedom has both stiffness and mass")
-    return -_GUESS * float(np.median(k[use] / m[use]))
+        raise ModelError("no degree of freedom has both stiffness and mass: there are no modes")
+    return float(np.median(k[use] / m[use]))
 
 
-def _dense(
-    problem: _Problem, count: int | None, band: float | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """LAPACK; massless dofs through M φ = θ (K - σM) φ, θ = 1/(λ - σ), where λ = ∞ is θ = 0."""
-    K, M = problem.K.toarray(), problem.M.toarray()
+def _dense(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All modes by LAPACK; where M is singular, M φ = θ (K - σM) φ has λ = ∞ at θ = 0."""
+    ratio = _median_ratio(K, M, dofs)
     try:
-        lam, phi = eigh(K, M)
+        return eigh(K.toarray(), M.toarray())
     except LinAlgError:
-        lam, phi = _dense_massless(K, M, _guess(problem) / _GUESS * 1e-4)
-    keep = np.arange(len(lam)) < (len(lam) if count is None else count)
-    if band is not None:
-        keep &= lam <= (2 * np.pi * band) ** 2
-    return lam[keep], phi[:, keep]
-
-
-def _dense_massless(K: np.ndarray, M: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+        sigma = -1e-4 * ratio
     try:
-        theta, X = eigh(M, K - sigma * M)
+        theta, X = eigh(M.toarray(), (K - sigma * M).toarray())
     except LinAlgError as error:
-        raise ModelError("a motion has neither stiffness nor mass") from error
-    theta, X = theta[::-1], X[:, ::-1]
-    finite = theta > 1e-11 * theta[0]
+        raise ModelError("K - σM is not positive definite: a part hangs on nothing") from error
+    finite = np.flatnonzero(theta > _FINITE * theta[-1])[::-1]
     return sigma + 1 / theta[finite], X[:, finite] / np.sqrt(theta[finite])
 
 
 def _sparse(
-    problem: _Problem, count: int | None, band: float | None, shift: float | None, proof: bool
+    problem: _Problem, k: int, limit: float, shift: float | None, proof: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lanczos, then the proof; modes the proof finds missing are looked for among the rest."""
-    limit = np.inf if band is None else (2 * np.pi * band) ** 2
-    if band is not None:
-        count = min(problem.below(limit), count or len(problem.dofs))
-        shift = -1e-3 * limit if shift is None else shift
-    k = min(20 if count is None else count, len(problem.dofs))
+    """The k lowest modes, those beyond ``limit`` not cared for."""
     if k == 0:
         return np.zeros(0), np.zeros((len(problem.dofs), 0))
-    sigma, factor, ritz = _converged(problem, k, shift)
+    sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
+    sigma, factor, ritz = _converged(problem, k, sigma)
+    k = min(k, len(ritz.theta))
     lam, phi = sigma + 1 / ritz.theta[:k], ritz.vectors(k)
+    if proof and len(ritz.theta) > k:
+        s, known = _gap_above(sigma + 1 / ritz.theta, ritz.error, k)
+        if (due := problem.below(s)) != known:
+            lam, phi = _completed(problem, factor, sigma, lam, phi, s, due)
     _check_residual(problem, factor, sigma, lam, phi)
-    return lam, phi
+    return lam[:k], phi[:, :k]
 
 
 def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, Factor, Ritz]:
-    """Lanczos from a shift that suits: a guess is renewed when it proves far from λ_k."""
-    sigma = _guess(problem) if shift is None else shift
-    factor = problem.factor(sigma)
-    ritz = block_lanczos(factor.solve, problem.M, k)
+    """Lanczos from a shift that suits; a guessed one is renewed when it lies far from the modes."""
+    sigma = shift
+    if sigma is None:
+        sigma = -_GUESS * _median_ratio(problem.K, problem.M, problem.dofs)
+    for _ in range(2):
+        factor = problem.factor(sigma)
+        ritz = block_lanczos(factor.solve, problem.M, k + _SPARE)
+        known = ritz.theta[ritz.error < 1e-2]
+        top = sigma + 1 / known[-1] if len(known) else 0.0
+        if shift is not None or _NEAR * top < -sigma < _FAR * top:
+            break
+        sigma = -1e-3 * top if top > 0 else 1e3 * sigma
+    if np.any(ritz.error[:k] > _LOOSE):
+        raise AccuracyError(
+            f"{np.sum(ritz.error[:k] > _LOOSE)} of {k} modes did not converge from the shift "
+            f"{sigma:.2e} rad²/s²; give one nearer to the modes (negative, about -λ/1000)"
+        )
     return sigma, factor, ritz
+
+
+def _gap_above(lam: np.ndarray, error: np.ndarray, k: int) -> tuple[float, int]:
+    """A value in the widest gap above the k-th mode that Ritz values can tell, how many below."""
+    sharp = np.flatnonzero(error > _SHARP)
+    last = max(int(sharp[0]) if len(sharp) else len(lam), k + 1)
+    gaps = np.diff(lam[k - 1 : last]) / np.abs(lam[k:last])
+    i = k + int(np.argmax(gaps))
+    return float(lam[i - 1] + lam[i]) / 2, i
+
+
+def _completed(
+    problem: _Problem,
+    factor: Factor,
+    sigma: float,
+    lam: np.ndarray,
+    phi: np.ndarray,
+    s: float,
+    due: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """All ``due`` modes below s: those missing are looked for beside the found ones.
+
+    A block of eight sees eight of a multiple eigenvalue; the next round sees the next eight.
+    """
+    for attempt in range(1, 5):
+        if (missing := due - int(np.sum(lam < s))) <= 0:
+            break
+        ritz = block_lanczos(factor.solve, problem.M, missing, locked=phi, seed=attempt)
+        good = np.flatnonzero(ritz.error[:missing] < _LOOSE)
+        lam = np.r_[lam, sigma + 1 / ritz.theta[good]]
+        phi = np.hstack([phi, ritz.vectors(missing)[:, good]])
+        order = np.argsort(lam, kind="stable")
+        lam, phi = lam[order], phi[:, order]
+    if missing:
+        hz = np.sqrt(max(s, 0.0)) / (2 * np.pi)
+        raise AccuracyError(f"{due} modes lie below {hz:.6g} Hz, {due - missing} were found")
+    return lam, phi
 
 
 def _check_residual(
     problem: _Problem, factor: Factor, sigma: float, lam: np.ndarray, phi: np.ndarray
 ) -> None:
-    """|(K - σM)⁻¹ M Φ θ⁻¹ g - Φ g|_M / |Φ g|_M for random g: all modes in one solve."""
+    """|A⁻¹M Φ θ⁻¹ g - Φ g|_M / |g| for random g, A = K - σM, θ = 1/(λ - σ): all modes at once."""
     g = np.random.default_rng(1).standard_normal((len(lam), 4))
     r = factor.solve(problem.M @ (phi @ (g * (lam - sigma)[:, None]))) - phi @ g
     size = np.sqrt(np.einsum("ij,ij->j", r, problem.M @ r) / np.einsum("ij,ij->j", g, g)).max()

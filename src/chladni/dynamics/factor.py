@@ -1,22 +1,21 @@
 """Sparse symmetric factorisations behind one face: several right sides, several back-ends."""
 
-from typing import Literal, Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import SuperLU as _SuperLU
 from scipy.sparse.linalg import splu
 
-Backend = Literal["cholmod", "multifrontal", "superlu"]
+from ..errors import AccuracyError, LabelError, ModelError
+from .dissection import Fronts
+from .multifrontal import Multifrontal, NotDefinite
+
+Backend = Literal["multifrontal", "cholmod", "superlu"]
+_BACKWARD = 1e-11  # |A x - b| / (|A| |x| + |b|) a factorisation without global pivoting must keep
 
 
 class Factor(Protocol):
-    """A = L Lᵀ (or L D Lᵀ, or L U), ready to solve.
-
-    Attributes
-    ----------
-    nnz : int  entries kept
-    """
+    """A in factors, ready to solve."""
 
     @property
     def nnz(self) -> int:
@@ -31,22 +30,31 @@ class Factor(Protocol):
 class SuperLUFactor:
     """L U without symmetry: the last resort, real or complex, definite or not.
 
-    Ordering on AᵀA's cheaper cousin Aᵀ + A and diagonal pivots keep a symmetric pattern sparse;
-    without ``diag_pivot_thresh=0`` pivoting undoes the ordering.
+    Minimum degree on Aᵀ + A and diagonal pivots keep a symmetric pattern sparse; without
+    ``diag_pivot_thresh=0`` pivoting undoes the order
+    (Demmel et al. 1999, SIAM J. Matrix Anal. 20).
     """
 
-    def __init__(self, A: sp.sparray) -> None:
-        self._lu: _SuperLU = splu(
-            sp.csc_array(A),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+    def __init__(self, A: sp.sparray, threshold: float = 0.0) -> None:
+        try:
+            self._lu = splu(
+                sp.csc_array(A),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=threshold,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise ModelError(f"the matrix cannot be factorised: {error}") from error
 
     @property
     def nnz(self) -> int:
         """Entries of L and U."""
         return int(self._lu.nnz)
+
+    @property
+    def positive(self) -> bool:
+        """No pivot says that A is not positive definite."""
+        return bool(np.all(self._lu.U.diagonal() > 0))
 
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B."""
@@ -57,9 +65,12 @@ class CholmodFactor:
     """CHOLMOD's supernodal Cholesky, ordered by METIS (Chen et al. 2008); needs scikit-sparse."""
 
     def __init__(self, A: sp.sparray) -> None:
-        from sksparse.cholmod import cholesky
+        from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
 
-        self._factor = cholesky(sp.csc_matrix(A), mode="supernodal", ordering_method="metis")
+        try:
+            self._factor = cholesky(sp.csc_matrix(A), mode="supernodal", ordering_method="metis")
+        except CholmodNotPositiveDefiniteError as error:
+            raise NotDefinite(int(np.argmin(A.diagonal()))) from error
 
     @property
     def nnz(self) -> int:
@@ -77,33 +88,83 @@ def factorise(
     *,
     nodes: np.ndarray | None = None,
     definite: bool = True,
-    backend: Backend | None = None,
+    backend: Backend = "multifrontal",
+    fronts: Fronts | None = None,
 ) -> Factor:
     """A factorisation of a symmetric matrix A (n, n) with ``solve`` and ``nnz``.
+
+    Multifrontal Cholesky needs nothing beyond SciPy and is the fastest where CHOLMOD sits on a
+    reference BLAS, as in Debian (benchmarks/README.md); "cholmod" takes scikit-sparse.
 
     Parameters
     ----------
     points : (n, 3), optional  place of each row, the same for all dofs of a node; orders better
     nodes : (n,) int, optional rows that belong together (``dofs[:, 0]``)
     definite : bool            False: real or complex symmetric, not positive definite
-    backend : str, optional    default: CHOLMOD where installed, then multifrontal Cholesky
+    fronts : Fronts, optional  the order, known from a matrix of the same pattern
 
     Raises
     ------
     ModelError
-        If A should be positive definite and is not.
+        If A should be positive definite and is not, or is singular.
+    LabelError
+        If there is no such back-end, or it is not installed.
     """
-    return SuperLUFactor(A)
+    if backend not in get_args(Backend):
+        raise LabelError(f"no back-end {backend!r}; there are {', '.join(get_args(Backend))}")
+    if not definite:
+        return SuperLUFactor(A) if backend == "superlu" else _indefinite(A, points, nodes, fronts)
+    if backend == "multifrontal":
+        return Multifrontal(A, points, nodes, fronts=fronts)
+    return _cholmod(A) if backend == "cholmod" else _superlu(A)
+
+
+def _cholmod(A: sp.sparray) -> CholmodFactor:
+    try:
+        return CholmodFactor(A)
+    except ImportError as error:
+        raise LabelError('back-end "cholmod" needs scikit-sparse: chladni[cholmod]') from error
+
+
+def _superlu(A: sp.sparray) -> SuperLUFactor:
+    factor = SuperLUFactor(A)
+    if not factor.positive:
+        raise NotDefinite(int(np.argmin(A.diagonal())))
+    return factor
+
+
+def _indefinite(
+    A: sp.sparray, points: np.ndarray | None, nodes: np.ndarray | None, fronts: Fronts | None
+) -> Factor:
+    """Fronts with pivoting inside them; where that proves too weak, pivoting over the whole."""
+    factor = Multifrontal(A, points, nodes, definite=False, fronts=fronts)
+    return factor if backward_error(A, factor) < _BACKWARD else SuperLUFactor(A, threshold=0.1)
+
+
+def backward_error(A: sp.sparray, factor: Factor) -> float:
+    """|A x - b| / (|A| |x| + |b|) in the maximum norm for x = A⁻¹ b with a random b."""
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    x = factor.solve(b.astype(A.dtype))
+    size = np.abs(A).sum(axis=1).max() * np.abs(x).max() + np.abs(b).max()
+    error = np.abs(A @ x - b).max() / size
+    return float(error) if np.isfinite(error) else np.inf
 
 
 def inertia(
-    A: sp.sparray, points: np.ndarray | None = None, *, nodes: np.ndarray | None = None
+    A: sp.sparray,
+    points: np.ndarray | None = None,
+    *,
+    nodes: np.ndarray | None = None,
+    fronts: Fronts | None = None,
 ) -> tuple[int, int]:
-    """Numbers of negative and positive eigenvalues of a symmetric A (Sylvester's law)."""
-    pivots = splu(
-        sp.csc_array(A),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    ).U.diagonal()
-    return int(np.sum(pivots < 0)), int(np.sum(pivots > 0))
+    """Numbers of negative and positive eigenvalues of a real symmetric A (Sylvester's law).
+
+    Raises
+    ------
+    AccuracyError
+        If A is so near to singular that the signs of its pivots prove nothing.
+    """
+    factor = Multifrontal(A, points, nodes, definite=False, fronts=fronts)
+    if (error := backward_error(A, factor)) > _BACKWARD:
+        raise AccuracyError(f"pivots prove no inertia: backward error {error:.1e}")
+    return factor.negative, A.shape[0] - factor.negative

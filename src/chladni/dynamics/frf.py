@@ -10,6 +10,7 @@ from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError
+from .dissection import analyse
 from .factor import factorise
 from .modes import ModalModel
 from .system import System
@@ -246,10 +247,11 @@ def direct_frf(
     frequency = np.asarray(frequency, dtype=float)
     load = unit_columns(len(system.dofs), rows_in)
     K = system.K * (1 + 1j * structural)
+    order = analyse(abs(K) + abs(system.M) + abs(system.V), points, system.dofs[:, 0])
     H = np.empty((len(frequency), len(rows_out), len(rows_in)), dtype=complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         Z = K - omega**2 * system.M + 1j * omega * system.V
-        factor = factorise(Z, points, nodes=system.dofs[:, 0], definite=False)
+        factor = factorise(Z, definite=False, fronts=order)
         H[k] = factor.solve(load.astype(complex))[rows_out]
     outputs, inputs = (
         tuple(text_of(*system.dofs[r]) for r in rows) for rows in (rows_out, rows_in)

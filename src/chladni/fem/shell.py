@@ -97,7 +97,9 @@ def stiffness(
     Qm, Qb, Qc : (m, 3, 3) or (3, 3)
         Plane stiffness of membrane, bending (times 12 I/t³) and coupling (MID4's sign: curvature
         counted as Nastran does, ε(z) = ε - z χ) in the material frame [Pa].
-    S : (m, 2, 2)           transverse shear stiffness in the element frame [N/m]
+    S : (m, 2, 2) or (m, 2, 2, 2)
+        Transverse shear stiffness in the element frame; where two are given, that of the mean of
+        γ over the element and that of what varies within it [N/m].
     drill : (m,)            s, stiffness against rz other than the membrane's spin [N/m]
     reference : (m, 3, 3) or (3, 3)
         Membrane stiffness for which the bubbles of the quadrilateral are condensed; Qm where not
@@ -111,9 +113,9 @@ def stiffness(
     def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
         t_g = t[rows] @ N.T
         weights = (t_g, t_g**3 / 12, -(t_g**2))
-        return _section(part, weights, *_of(rows, Qm, Qb, Qc, S, drill))
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(S), drill))
 
-    return _integrated(geo, Qm if reference is None else reference, section)
+    return _integrated(geo, Qm if reference is None else reference, section, _excess(S))
 
 
 def thickness_derivative(
@@ -135,7 +137,7 @@ def thickness_derivative(
     Parameters
     ----------
     change : (m, 4)         δt at the corners [m]; np.eye(4)[k] gives ∂K/∂t_k
-    dS : (m, 2, 2)          change of S for this δt, SectionArrays.shear_by_thickness [N/m]
+    dS : as S               change of S for this δt, SectionArrays.shear_by_thickness [N/m]
     ddrill : (m,)           change of s, SectionArrays.drill_by_thickness [N/m]
     """
     change = np.broadcast_to(change, t.shape)
@@ -143,9 +145,9 @@ def thickness_derivative(
     def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
         t_g, d_g = t[rows] @ N.T, change[rows] @ N.T
         weights = (d_g, t_g**2 * d_g / 4, -2 * t_g * d_g)
-        return _section(part, weights, *_of(rows, Qm, Qb, Qc, dS, ddrill))
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(dS), ddrill))
 
-    return _integrated(geo, Qm if reference is None else reference, section)
+    return _integrated(geo, Qm if reference is None else reference, section, _excess(dS))
 
 
 def mass(
@@ -229,8 +231,9 @@ def _integrated(
     geo: ShellGeometry,
     reference: np.ndarray | None,
     section: Callable[[Rows, ShellGeometry, np.ndarray], np.ndarray],
+    excess: np.ndarray | None,
 ) -> np.ndarray:
-    """∫ Bᵀ C B dA with C (m, g, 9, 9) from section(rows, geometry, N)."""
+    """∫ Bᵀ C B dA + A γ̄ᵀ dS γ̄, C (m, g, 9, 9) from section(rows, geometry, N), dS the excess."""
     K = np.zeros((len(geo), 24, 24))
     for rows in _chunks(geo):
         part = geo[rows]
@@ -238,7 +241,22 @@ def _integrated(
         C = section(rows, part, e.N) * e.weight[:, :, None, None]
         m = len(part)
         K[rows] = e.B.reshape(m, -1, 24).swapaxes(1, 2) @ (C @ e.B).reshape(m, -1, 24)
+        if excess is not None:
+            share = e.weight / part.area[:, None]
+            mean = np.einsum("mg,mgik->mik", share, e.B[:, :, SHEAR])
+            stress = excess[rows] * part.area[:, None, None] @ mean
+            K[rows] += mean.swapaxes(1, 2) @ stress
     return K
+
+
+def _varying(S: np.ndarray | None) -> np.ndarray | None:
+    """Shear stiffness of all of γ, before the mean's excess is added."""
+    return S if S is None or S.ndim == 3 else S[:, 1]
+
+
+def _excess(S: np.ndarray | None) -> np.ndarray | None:
+    """What the mean of γ has beyond that, usually negative (m, 2, 2)."""
+    return None if S is None or S.ndim == 3 else S[:, 0] - S[:, 1]
 
 
 def _section(

@@ -26,6 +26,7 @@ def fill(
     holes: Sequence[np.ndarray] = (),
     lines: Sequence[np.ndarray] = (),
     rings: int = 2,
+    closest: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and quads (m, 4) of the region within `outer` and outside the `holes`.
 
@@ -35,6 +36,7 @@ def fill(
     size : mesh size [m]
     lines : polylines of feature points (folds); cell edges follow them
     rings : rows of points parallel to the borders before the square grid takes over
+    closest : feature points farther apart than this are kept though the size is larger [m]
 
     Raises
     ------
@@ -42,7 +44,7 @@ def fill(
         If a border segment is lost, naming the place: the border is too close to itself.
     """
     borders = [counterclockwise(loop) for loop in (outer, *holes)]
-    points, folds = _feature_points(borders, lines, size)
+    points, folds = _feature_points(borders, lines, size, min(_FEATURE * size, closest))
     fixed = len(points)
     for step in range(1, rings + 1):
         points = _with_ring(points, borders, step, size)
@@ -54,7 +56,7 @@ def fill(
 
 
 def _feature_points(
-    borders: Sequence[np.ndarray], lines: Sequence[np.ndarray], size: float
+    borders: Sequence[np.ndarray], lines: Sequence[np.ndarray], size: float, gap: float
 ) -> tuple[np.ndarray, set[tuple[int, int]]]:
     """Border and feature points, and the pairs of rows that follow a feature line."""
     points = np.vstack(borders)
@@ -64,7 +66,7 @@ def _feature_points(
         far = dense.query(line)[0] > 0.4 * size
         kept = []
         for place in line[far]:
-            if ((points - place) ** 2).sum(axis=1).min() > (_FEATURE * size) ** 2:
+            if ((points - place) ** 2).sum(axis=1).min() > gap**2:
                 kept.append(len(points))
                 points = np.vstack([points, place])
         folds |= {(min(e), max(e)) for e in zip(kept, kept[1:] + kept[:1], strict=True)}

@@ -42,7 +42,7 @@ class TailgateDesign:
     # the skin: centre line, crown, outline, window
     height: float = 1.022
     slope: tuple[float, float, float, float] = (-4.0, 14.0, 52.0, 60.0)  # [degrees] along s
-    bend: tuple[float, float] = (0.480, 0.07)  # place and half width of the bend at the waist
+    bend: tuple[float, float] = (0.480, 0.095)  # place and half width of the bend at the waist
     radius: tuple[float, float] = (2.6, 2.2)  # crown across, bottom and top
     outline: tuple[Corner, ...] = (
         (-0.478, 0.0, 0.090),
@@ -108,7 +108,7 @@ class TailgateDesign:
     # reinforcements
     upper: tuple[float, float, float, float] = (0.130, 0.600, 0.008, 0.008)  # |y|, s, insets
     hinge: tuple[float, float, float, float, float] = (0.462, 0.968, 0.012, 0.014, 0.0022)
-    lower: tuple[float, float, float, float] = (0.488, 0.548, 0.280, 0.470)  # |y| and s, from-to
+    lower: tuple[float, float, float, float] = (0.488, 0.546, 0.318, 0.478)  # |y| and s, from-to
     latch: tuple[float, float, float] = (0.095, 0.042, 0.112)  # half width, s from-to
     bracket: tuple[float, float, float] = (0.110, 0.345, 0.482)
     bracket_depth: float = 0.058

@@ -30,6 +30,7 @@ UPPER, LOWER, LATCH, BRACKET = (
     "latch reinforcement",
     "wiper motor bracket",
 )
+FOLD_GAP = 0.009  # folds this far apart are meshed as two at any size
 LEFT, RIGHT = " left", " right"  # sheets of one part; y is positive on the left
 
 
@@ -136,7 +137,7 @@ def inner_panel(skin: Skin, edge: Borders) -> Sheet:
     out.add(strip(rows, closed=True), skin.inner)
     out.add(strip(window, closed=True), skin.inner)
     out.add(strip(frame, closed=False), skin.inner)
-    out.add(fill(loop, h, holes, _inner_features(skin)), skin.inner)
+    out.add(fill(loop, h, holes, _inner_features(skin), closest=FOLD_GAP), skin.inner)
     return out.sheet(INNER, skin.at)
 
 
@@ -217,15 +218,17 @@ def outer_lower_panel(skin: Skin, edge: Borders) -> Sheet:
     half, s0, s1, _, w = d.plate
     y = np.arange(-0.5, 0.5 + h / 2, h)
     at, _, width = d.crease
+    recess = [(w, w), (w / 2, w / 2), (0.0, 0.003)]  # foot, middle and top of its wall
     lines = [
-        resampled(rectangle(-half - w, s0 - w, half + w, s1 + w, w), h),
-        resampled(rectangle(-half, s0, half, s1, 0.003), h),
+        *(resampled(rectangle(-half - x, s0 - x, half + x, s1 + x, r), h) for x, r in recess),
         *(np.column_stack([y, np.full(len(y), at + k * width)]) for k in (-1, 0, 1)),
     ]
     out = Patches()
     _folded(out, skin, arc)
     out.add(strip(rows, closed=False), skin.outer_lower)
-    out.add(fill(np.vstack([rows[-1][:-1], top[:-1]]), h, (), lines), skin.outer_lower)
+    out.add(
+        fill(np.vstack([rows[-1][:-1], top[:-1]]), h, (), lines, closest=FOLD_GAP), skin.outer_lower
+    )
     return out.sheet(OUTER_LOWER, skin.at)
 
 

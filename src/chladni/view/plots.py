@@ -21,6 +21,8 @@ _STYLES: dict[str, dict[str, Any]] = {
     "test": {"color": TEST, "lw": 2.3, "alpha": 0.8, "zorder": 3},
     "before": {"color": BEFORE, "lw": 1.2, "ls": (0, (4, 2)), "zorder": 2},
     "after": {"color": AFTER, "lw": 1.1, "zorder": 4},
+    "identified": {"color": AFTER, "lw": 1.1, "zorder": 4},
+    "model": {"color": AFTER, "lw": 1.3, "zorder": 4},
 }
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 

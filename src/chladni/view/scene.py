@@ -7,6 +7,7 @@ and returns its path. Lengths are in metres, the scale bar says so in the unit t
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -143,14 +144,24 @@ def sensors(
 
 
 def location(
-    path: Path | str, seen: Surface, point: np.ndarray, radius: float = 0.0, text: str = ""
+    path: Path | str,
+    seen: Surface,
+    point: np.ndarray | None = None,
+    radius: float = 0.0,
+    text: str = "",
+    faces: np.ndarray | None = None,
 ) -> Path:
-    """A place on the structure: a cross, the circle of its uncertainty, a sentence."""
+    """A place on the structure: a cross, the circle of its uncertainty [m], a sentence.
+
+    ``faces`` (m,) bool are coloured: the parts or elements that are meant.
+    """
     figure, ax = _sheet(camera := best_view(seen))
-    draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
-    _circle(ax, camera, np.asarray(point), radius)
+    values = None if faces is None else np.where(faces, 0.55, np.nan)
+    draw(ax, seen, camera, Paint(values, (0.0, 1.0), "Reds", len(seen.faces) < _MANY))
+    if point is not None:
+        _circle(ax, camera, np.asarray(point), radius)
     if text:
-        ax.set_title(text, **paper.TITLE, wrap=True)
+        ax.set_title(fill(text, 72), **paper.TITLE)
     _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 

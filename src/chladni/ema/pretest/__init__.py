@@ -11,6 +11,8 @@ from .actuators import shaking as shaking
 from .deletion import Deletion as Deletion
 from .deletion import deletion as deletion
 from .deletion import effective_independence as effective_independence
+from .deletion import first_max as first_max
+from .deletion import first_min as first_min
 from .deletion import greedy as greedy
 from .deletion import qr_ranking as qr_ranking
 from .exchange import best_layout as best_layout
@@ -54,5 +56,6 @@ from .quality import visibility as visibility
 from .quality import with_visible_modes as with_visible_modes
 from .rules import Rules as Rules
 from .rules import too_near as too_near
+from .running import Walk as Walk
 from .search import annealed as annealed
 from .search import evolved as evolved

@@ -1,7 +1,7 @@
 """What a layout must obey: fixed and forbidden places, minimum distance, regions; all as masks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -69,7 +69,7 @@ class Rules:
             )
         self._check_near(n, fixed)
         self._check_regions(n, n_sensors, fixed, ~forbidden)
-        return Rules(fixed, forbidden, self.near, self.region, self.most, self.least)
+        return replace(self, fixed=fixed, forbidden=forbidden)
 
     def _check_near(self, n: int, fixed: np.ndarray) -> None:
         if self.near is None:

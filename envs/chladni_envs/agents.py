@@ -1,0 +1,136 @@
+"""Agents, functions ``(observation, info) -> action``: the known methods as players.
+
+``efi`` and ``greedy`` read the observation alone. The searches see the whole problem, work out a
+layout first and then walk to it: they are made for one environment by a call, ``exchange(env)``,
+after its reset where that changes the candidates.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from chladni.ema import pretest
+from chladni.errors import ShapeError
+
+from .actuators import ActuatorPlacementEnv
+from .calibration import STRIDE, CalibrationEnv
+from .placement import SensorPlacementEnv
+
+Agent = Callable[[np.ndarray, dict[str, Any]], Any]
+
+
+def efi(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+    """Kammer's: delete the least independent candidate."""
+    return np.int64(pretest.first_min(np.where(info["action_mask"] == 1, observation, np.inf)))
+
+
+def greedy(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+    """Add the candidate that is worth most now."""
+    return np.int64(pretest.first_max(np.where(info["action_mask"] == 1, observation, -np.inf)))
+
+
+def at_random(seed: int = 0) -> Agent:
+    """An agent that takes any legal action."""
+    rng = np.random.default_rng(seed)
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        return np.int64(rng.choice(np.flatnonzero(info["action_mask"])))
+
+    return agent
+
+
+def towards(layout: np.ndarray, env: gym.Env[Any, Any]) -> Agent:
+    """An agent that walks to a given layout."""
+    assert isinstance(env.action_space, gym.spaces.Discrete)
+    target = np.zeros(int(env.action_space.n), dtype=np.bool_)
+    target[np.asarray(layout, dtype=np.int64)] = True
+    deleting = isinstance(env.unwrapped, SensorPlacementEnv) and not env.unwrapped.grow
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        wanted = info["action_mask"] == 1
+        return np.int64(np.flatnonzero(wanted & (target != deleting))[0])
+
+    return agent
+
+
+def _problem(env: gym.Env[Any, Any]) -> tuple[pretest.Candidates, int, pretest.Rules]:
+    inner = env.unwrapped
+    if not isinstance(inner, SensorPlacementEnv):
+        raise ShapeError("this agent places sensors; make it for SensorPlacement-v0")
+    rules = inner.walk.rules
+    within = replace(rules, forbidden=rules.forbidden | ~inner.walk.reachable)
+    return inner.candidates, inner.n_sensors, within
+
+
+def exchange(env: gym.Env[Any, Any], *, pairs: bool = True) -> Agent:
+    """Effective independence, then exchange of one and of two sensors."""
+    c, n_sensors, rules = _problem(env)
+    pairs = pairs and c.rows.shape[2] == 1
+    return towards(pretest.best_layout(c, n_sensors, rules=rules, pairs=pairs), env)
+
+
+def annealing(env: gym.Env[Any, Any], *, seed: int = 0, steps: int = 4000) -> Agent:
+    """Simulated annealing over swaps."""
+    c, n_sensors, rules = _problem(env)
+    return towards(pretest.annealed(c, n_sensors, seed=seed, steps=steps, rules=rules), env)
+
+
+def genetic(env: gym.Env[Any, Any], *, seed: int = 0, generations: int = 60) -> Agent:
+    """Evolution of random keys."""
+    c, n, rules = _problem(env)
+    return towards(pretest.evolved(c, n, seed=seed, generations=generations, rules=rules), env)
+
+
+def best_actuators(env: gym.Env[Any, Any]) -> Agent:
+    """The actuators of the lowest condition number together."""
+    inner = env.unwrapped
+    if not isinstance(inner, ActuatorPlacementEnv):
+        raise ShapeError("this agent places actuators; make it for ActuatorPlacement-v0")
+    return towards(pretest.best_actuators(inner.shaker, inner.n_actuators, inner.allowed), env)
+
+
+def held_back(threshold: float = 0.1) -> Agent:
+    """Free the parameter that explains most of the misfit, while it explains more than a share."""
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
+        explained = np.where(info["action_mask"][:-1] == 1, observation[2], -np.inf)
+        k = pretest.first_max(explained)
+        return np.int64(k if explained[k] > threshold else len(explained))
+
+    return agent
+
+
+def gauss_newton(env: gym.Env[Any, Any], *, damping: float = 1e-3) -> Agent:
+    """Levenberg-Marquardt steps on δ, derivatives by central differences."""
+    inner = env.unwrapped
+    if not isinstance(inner, CalibrationEnv):
+        raise ShapeError("this agent calibrates; make it for Calibration-v0")
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        delta = inner.deviation(x).ravel()
+        return np.concatenate([delta.real, delta.imag])
+
+    def agent(observation: np.ndarray, info: dict[str, Any]) -> np.ndarray:
+        x, h = info["x"], 1e-5
+        J = np.stack(
+            [(residual(x + h * e) - residual(x - h * e)) / (2 * h) for e in np.eye(len(x))]
+        )
+        A = J @ J.T
+        step = -np.linalg.solve(A + damping * np.diag(np.diag(A)), J @ residual(x))
+        step /= max(1.0, float(np.abs(step).max()) / STRIDE)
+        return np.asarray(step / STRIDE, dtype=np.float32)
+
+    return agent
+
+
+def play(env: gym.Env[Any, Any], agent: Agent, *, seed: int | None = None) -> dict[str, Any]:
+    """One episode; the last info, with the sum of rewards as ``return``."""
+    observation, info = env.reset(seed=seed)
+    total, over = 0.0, False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(agent(observation, info))
+        total, over = total + float(reward), terminated or truncated
+    return {**info, "return": total}

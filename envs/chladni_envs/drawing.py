@@ -1,0 +1,64 @@
+"""Pictures of an environment's state as pixels, drawn without a display."""
+
+from typing import Any
+
+import numpy as np
+
+
+def places(n: int, points: np.ndarray | None) -> np.ndarray:
+    """Two coordinates (n, 2) to draw at: the two broadest axes of the points, or a circle."""
+    if points is None:
+        angle = 2 * np.pi * np.arange(n) / n
+        return np.column_stack([np.cos(angle), np.sin(angle)])
+    broad = np.sort(np.argsort(-np.ptp(points, axis=0), kind="stable")[:2])
+    return np.asarray(points)[:, broad]
+
+
+def layout(
+    xy: np.ndarray, chosen: np.ndarray, legal: np.ndarray, title: str, size: float = 4.0
+) -> np.ndarray:
+    """Places as dots: chosen ones filled, legal ones outlined, the rest faint (h, w, 3) uint8."""
+    figure, ax = _sheet(size, title)
+    ax.scatter(*xy[~chosen & ~legal].T, s=8, c="0.8", linewidths=0)
+    ax.scatter(*xy[legal & ~chosen].T, s=22, facecolors="none", edgecolors="0.5", linewidths=0.8)
+    ax.scatter(*xy[chosen].T, s=30, c="#1f4e79", linewidths=0)
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_axis_off()
+    return _pixels(figure)
+
+
+def bars(values: np.ndarray, marked: np.ndarray, title: str, size: float = 4.0) -> np.ndarray:
+    """Values as bars, the marked ones dark (h, w, 3) uint8."""
+    figure, ax = _sheet(size, title)
+    colours = ["#1f4e79" if m else "0.75" for m in marked]
+    ax.bar(np.arange(len(values)), values, color=colours)
+    ax.axhline(0, color="0.3", linewidth=0.8)
+    ax.set_xticks(np.arange(len(values)))
+    return _pixels(figure)
+
+
+def curves(x: np.ndarray, pairs: list[tuple[np.ndarray, str]], title: str) -> np.ndarray:
+    """Curves over a frequency axis [Hz], logarithmic magnitude (h, w, 3) uint8."""
+    figure, ax = _sheet(4.0, title)
+    for (y, label), style in zip(pairs, ("0.3", "#b5432a"), strict=False):
+        ax.semilogy(x, y, color=style, label=label, linewidth=1.2)
+    ax.set_xlabel("Hz")
+    ax.legend(frameon=False, fontsize=8)
+    return _pixels(figure)
+
+
+def _sheet(size: float, title: str) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(size, 0.8 * size), dpi=80, layout="constrained")
+    ax = figure.add_subplot()
+    ax.set_title(title, fontsize=9)
+    return figure, ax
+
+
+def _pixels(figure: Any) -> np.ndarray:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]

@@ -1,0 +1,54 @@
+"""What the environments play on when no case is given: small structures with known modes."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """Modes at places where something may be mounted.
+
+    Attributes
+    ----------
+    points : (n, 2) or (n, 3)  places [m]
+    phi : (n, r)               mass-normalised shapes along each place's direction [1/√kg]
+    frequency, damping : (r,)  [Hz], fraction of critical
+    labels : tuple of str      what the places are called
+    """
+
+    points: np.ndarray
+    phi: np.ndarray
+    frequency: np.ndarray
+    damping: np.ndarray
+    labels: tuple[str, ...] = field(default=())
+
+
+def plate(
+    nx: int = 8,
+    ny: int = 8,
+    modes: int = 8,
+    *,
+    length: float = 0.6,
+    width: float = 0.5,
+    thickness: float = 1e-3,
+    zeta: float = 0.01,
+) -> Specimen:
+    """A simply supported steel plate: ω_mn = √(D/ρt) ((mπ/a)² + (nπ/b)²), φ = 2/√(ρtab) sin sin.
+
+    Leissa, Vibration of Plates (NASA SP-160, 1969), 4.1. Places on a grid of nx by ny inside the
+    edges; the lowest ``modes`` modes.
+    """
+    E, nu, rho = 210e9, 0.3, 7850.0
+    x = np.linspace(0, length, nx + 2)[1:-1]
+    y = np.linspace(0, width, ny + 2)[1:-1]
+    X, Y = (g.ravel() for g in np.meshgrid(x, y, indexing="ij"))
+    m, n = (g.ravel() for g in np.meshgrid(np.arange(1, 13), np.arange(1, 13), indexing="ij"))
+    flexural = np.sqrt(E * thickness**2 / (12 * (1 - nu**2) * rho))
+    omega = flexural * ((m * np.pi / length) ** 2 + (n * np.pi / width) ** 2)
+    low = np.argsort(omega, kind="stable")[:modes]
+    phi = np.sin(np.outer(X, m[low] * np.pi / length)) * np.sin(np.outer(Y, n[low] * np.pi / width))
+    phi *= 2 / np.sqrt(rho * thickness * length * width)
+    labels = tuple(f"{k + 1}:+Z" for k in range(len(X)))
+    points = np.column_stack([X, Y])
+    return Specimen(points, phi, omega[low] / (2 * np.pi), np.full(modes, zeta), labels)

@@ -1,0 +1,202 @@
+"""Nested dissection of a symmetric sparsity pattern, by place where places are known.
+
+George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are gathered into nodes first (six dofs, one
+vertex), vertices are split at medians of their coordinates, and the smaller shore of each cut is
+the separator. Where nobody knows the places, distances in the graph to a few far vertices make
+some: pivot multidimensional scaling (Brandes and Pich 2007).
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
+
+from ..errors import ShapeError
+
+_LEAF = 24  # vertices eliminated as one dense block
+_HUB = 10  # times the mean degree: such a vertex belongs to the last separator
+_LANDMARKS = 8
+_CUTS = (0.5, 0.42, 0.58)
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Elimination order by fronts, children before parents.
+
+    Attributes
+    ----------
+    order : (n,)         rows of the matrix as they are eliminated
+    start : (f + 1,)     first pivot of each front, in the new numbering
+    boundary : f arrays  rows (new numbers, rising) a front updates beyond its own
+    children : f tuples  fronts whose update a front takes in
+    """
+
+    order: np.ndarray
+    start: np.ndarray
+    boundary: tuple[np.ndarray, ...]
+    children: tuple[tuple[int, ...], ...]
+
+    @property
+    def nnz(self) -> int:
+        """Entries of the lower triangular factor."""
+        a = np.diff(self.start)
+        b = np.array([len(rows) for rows in self.boundary])
+        return int(np.sum(a * (a + 1) // 2 + a * b))
+
+
+def analyse(
+    A: sp.csr_array, points: np.ndarray | None = None, nodes: np.ndarray | None = None
+) -> Fronts:
+    """Fronts of a symmetric pattern (n, n).
+
+    Parameters
+    ----------
+    points : (n, 3), optional   place of each row
+    nodes : (n,) int, optional  rows of one node carry the same number; default: each its own
+    """
+    n = A.shape[0]
+    for name, given in {"points": points, "nodes": nodes}.items():
+        if given is not None and len(given) != n:
+            raise ShapeError(f"{len(given)} {name} given, one for each of {n} rows is needed")
+    vertex = np.arange(n) if nodes is None else np.unique(nodes, return_inverse=True)[1]
+    G = quotient(A, vertex)
+    places = scaled(G) if points is None else _mean(np.asarray(points, float), vertex)
+    pivots, children = _dissected(G, places)
+    return _symbolic(G, vertex, pivots, children)
+
+
+def quotient(A: sp.csr_array, vertex: np.ndarray) -> sp.csr_array:
+    """Graph of the nodes: an edge where any of their rows are coupled, and the diagonal."""
+    A = sp.csr_array(A)
+    N = int(vertex.max()) + 1
+    row = np.repeat(vertex, np.diff(A.indptr))
+    ones = np.ones(A.nnz + N, np.int8)
+    own = np.arange(N)
+    ij = np.r_[row, own], np.r_[vertex[A.indices], own]
+    G = sp.coo_array((ones, ij), shape=(N, N)).tocsr()
+    G.data[:] = 1
+    return G
+
+
+def _mean(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    total = np.zeros((int(vertex.max()) + 1, points.shape[1]))
+    np.add.at(total, vertex, points)
+    return total / np.bincount(vertex)[:, None]
+
+
+def scaled(G: sp.csr_array) -> np.ndarray:
+    """Coordinates (N, 3) in which hop distance is near to distance (pivot MDS)."""
+    N = G.shape[0]
+    nearest, far, D = np.full(N, np.inf), 0, []
+    for _ in range(min(_LANDMARKS, N)):
+        d = dijkstra(G, unweighted=True, indices=far)
+        d[np.isinf(d)] = 2 * d[np.isfinite(d)].max() + 2  # another component: far away
+        D.append(d)
+        nearest = np.minimum(nearest, d)
+        far = int(np.argmax(nearest))
+    C = np.array(D).T ** 2
+    C = C - C.mean(axis=0) - C.mean(axis=1, keepdims=True) + C.mean()
+    _, V = np.linalg.eigh(C.T @ C)
+    return np.asarray(C @ V[:, ::-1][:, :3])
+
+
+def _dissected(
+    G: sp.csr_array, places: np.ndarray
+) -> tuple[list[np.ndarray], list[tuple[int, ...]]]:
+    """Pivot vertices of every front and its children, in postorder."""
+    pivots: list[np.ndarray] = []
+    children: list[tuple[int, ...]] = []
+    degree = np.diff(G.indptr)
+    hub = degree > max(_HUB * degree.mean(), 4 * _LEAF)
+    E = sp.coo_array(G)
+    u, v = E.coords
+    use = (u != v) & ~hub[u] & ~hub[v]
+    local = np.zeros(G.shape[0], np.int64)
+
+    def visit(ids: np.ndarray, u: np.ndarray, v: np.ndarray) -> tuple[int, ...]:
+        if len(ids) <= _LEAF:
+            return front(ids, ())
+        local[ids] = np.arange(len(ids))
+        side = _split(places[ids], local[u], local[v])
+        parts = [(ids[side == k], (side[local[u]] == k) & (side[local[v]] == k)) for k in (0, 1)]
+        below = [visit(part, u[inner], v[inner]) for part, inner in parts]
+        return front(ids[side == 2], below[0] + below[1])
+
+    def front(ids: np.ndarray, below: tuple[int, ...]) -> tuple[int, ...]:
+        if len(ids) == 0:  # nothing between the halves: both go to whoever is above
+            return below
+        pivots.append(ids)
+        children.append(below)
+        return (len(pivots) - 1,)
+
+    top = visit(np.flatnonzero(~hub), u[use], v[use])
+    front(np.flatnonzero(hub), top)
+    return pivots, children
+
+
+def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
+    m, extent = len(x), np.ptp(x, axis=0)
+    axes = [a for a in np.argsort(-extent) if extent[a] > 0.3 * extent.max()]
+    best, cost = None, np.inf
+    for axis in axes:
+        rank = np.argsort(np.argsort(x[:, axis], kind="stable"))
+        for low in _halves(x[:, axis], rank):
+            cross = low[u] & ~low[v]
+            for shore in (u[cross], v[cross]):
+                separator = np.bincount(shore, minlength=m) > 0
+                balance = abs(2 * np.sum(low & ~separator) / m - 1)
+                if (price := separator.sum() * (1 + balance)) < cost:
+                    best, cost = np.where(separator, 2, np.where(low, 0, 1)), price
+    assert best is not None
+    return best
+
+
+def _halves(x: np.ndarray, rank: np.ndarray) -> list[np.ndarray]:
+    """Candidate lower halves: at planes x < c near the median, where ties allow; else by rank."""
+    m = len(x)
+    ordered = np.sort(x)
+    cuts = [x < ordered[int(q * m)] for q in (_CUTS if m > 8 * _LEAF else _CUTS[:1])]
+    fair = [low for low in cuts if 0.3 * m <= low.sum() <= 0.7 * m]
+    return fair or [rank < m // 2]
+
+
+def _symbolic(
+    G: sp.csr_array, vertex: np.ndarray, pivots: list[np.ndarray], children: list[tuple[int, ...]]
+) -> Fronts:
+    """Boundary of a front: neighbours of its pivots and its children's boundaries, less pivots."""
+    order = np.concatenate(pivots)
+    new = np.empty_like(order)
+    new[order] = np.arange(len(order))
+    first = np.cumsum([0, *map(len, pivots)])
+    boundary: list[np.ndarray] = []
+    for i, (ids, below) in enumerate(zip(pivots, children, strict=True)):
+        seen = [new[_neighbours(G, ids)], *(boundary[c] for c in below)]
+        rows = np.unique(np.concatenate(seen))
+        boundary.append(rows[rows >= first[i + 1]])
+    size = np.bincount(vertex)[order]  # rows of each vertex, in the new order
+    begin = np.cumsum(np.r_[0, size])
+    return Fronts(
+        np.argsort(new[vertex], kind="stable"),
+        begin[first],
+        tuple(_ranges(begin[rows], size[rows]) for rows in boundary),
+        tuple(children),
+    )
+
+
+def _neighbours(G: sp.csr_array, ids: np.ndarray) -> np.ndarray:
+    return G.indices[_ranges(G.indptr[ids], np.diff(G.indptr)[ids])]
+
+
+def _ranges(begin: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """begin_k, begin_k + 1, ... of each length, in one array."""
+    ends = np.cumsum(length)
+    return np.arange(ends[-1] if len(ends) else 0) + np.repeat(begin - ends + length, length)
+
+
+def runs(rows: np.ndarray) -> list[slice]:
+    """Slices of positions over which the numbers are consecutive."""
+    cuts = np.flatnonzero(np.diff(rows) != 1) + 1
+    return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(rows)])]

@@ -1,0 +1,175 @@
+"""Answers of a structure to loads: static, enforced, harmonic, and motion of its base.
+
+Loads and motions are (6n, k) over all points in the basic frame, six motions a point, one column a
+load case; dependent dofs may carry loads, which Tᵀ hands on to those they depend on.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dofs import COMPONENTS
+from ..dynamics.factor import factorise
+from ..dynamics.frf import FRF, Residual, transfer
+from ..dynamics.modes import ModalModel
+from ..errors import LabelError, ModelError
+from ..model.assembly import Assembly
+from .assemble import Structure, _families, structure
+from .energy import rigid_motions
+
+
+def static(built: Structure, load: np.ndarray) -> np.ndarray:
+    """Displacements u = T K⁻¹ Tᵀ f (6n, k) [m, rad] under loads f (6n, k) [N, N m].
+
+    Raises
+    ------
+    ModelError
+        If the structure can move without strain.
+    """
+    return np.asarray(built.T @ _solved(built.system.K, built.T.T @ load, built.system.dofs))
+
+
+def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+    """K⁻¹ f, refined once; refused where K is singular to working precision."""
+    try:
+        factor = factorise(K, nodes=dofs[:, 0])
+    except ModelError as fault:
+        raise ModelError(f"the structure can move freely, hold it by supports: {fault}") from fault
+    q = factor.solve(f)
+    q = q + factor.solve(f - K @ q)
+    gap, scale = np.abs(K @ q - f).max(initial=0), np.abs(f).max(initial=0)
+    if not gap <= 1e-6 * scale:
+        raise ModelError(
+            f"the structure can move freely, hold it by supports: of {scale:.1e} N {gap:.1e} N "
+            f"find no resistance"
+        )
+    return np.asarray(q)
+
+
+def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
+    """Weight f = M R a (6n, k) [N] of every mass in fields a (3 or 6, k) [m/s², rad/s²].
+
+    In gravity g it is a = g; on a base accelerated by b it is a = -b. Rows 4-6 turn about the
+    origin.
+    """
+    a = np.asarray(acceleration, dtype=float)
+    field = rigid_motions(assembly)[:, : len(a)] @ a
+    return np.asarray(_families(assembly, True)[0] @ field)
+
+
+def enforced(
+    assembly: Assembly, dofs: np.ndarray, values: np.ndarray, load: np.ndarray | None = None
+) -> np.ndarray:
+    """Displacements (6n, k) with some dofs q_s moved: K_ff q_f = (Tᵀ f)_f - K_fs q_s.
+
+    Parameters
+    ----------
+    dofs : (s, 2) int     row of points and component 1-6 in displacement frames, supports or not
+    values : (s, k)       [m, rad]
+    load : (6n, k)        forces besides [N, N m]
+
+    Raises
+    ------
+    LabelError
+        If a dof to be moved depends on others, or has no stiffness.
+    """
+    dofs = np.asarray(dofs, dtype=np.int64)
+    held = assembly.supports
+    moved = np.isin(8 * held[:, 0] + held[:, 1], 8 * dofs[:, 0] + dofs[:, 1])
+    built = structure(replace(assembly, supports=held[~moved]))
+    s = _at(built, dofs)
+    f = np.setdiff1d(np.arange(len(built.system.dofs)), s)
+    q = np.zeros((len(built.system.dofs), np.shape(values)[1]))
+    q[s] = values
+    force = -(built.system.K @ q)
+    if load is not None:
+        force = force + built.T.T @ load
+    q[f] = _solved(sp.csr_array(built.system.K[f][:, f]), force[f], built.system.dofs[f])
+    return np.asarray(built.T @ q)
+
+
+def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
+    """Rows of the system at (row of points, component)."""
+    key = 8 * built.system.dofs[:, 0] + built.system.dofs[:, 1]
+    want = 8 * built.assembly.ids[dofs[:, 0]] + dofs[:, 1]
+    order = np.argsort(key)
+    at = order[np.minimum(np.searchsorted(key, want, sorter=order), len(key) - 1)]
+    if np.any(missing := key[at] != want):
+        point, component = built.assembly.ids[dofs[missing][0, 0]], dofs[missing][0, 1]
+        raise LabelError(
+            f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, "
+            f"or nothing stiff is there"
+        )
+    return np.asarray(at)
+
+
+def harmonic(
+    built: Structure, load: np.ndarray, frequency: np.ndarray, pick: sp.sparray | np.ndarray
+) -> np.ndarray:
+    """Receptance p (K (1 + i g) + i K_loss + i ω V - ω² M)⁻¹ Tᵀ f, without modes [m].
+
+    Parameters
+    ----------
+    load : (6n, k)           may be complex [N]
+    frequency : (n_f,)       [Hz]
+    pick : (n_out, n_free)   outputs over the free dofs, as ``Structure.rows`` gives them
+
+    Returns
+    -------
+    (n_f, n_out, k) complex
+    """
+    system, f = built.hysteretic(), (built.T.T @ load).astype(complex)
+    H = np.empty((len(frequency), pick.shape[0], f.shape[1]), dtype=complex)
+    for k, omega in enumerate(2 * np.pi * np.asarray(frequency, dtype=float)):
+        Z = sp.csr_array(system.K + 1j * omega * system.V - omega**2 * system.M)
+        H[k] = pick @ factorise(Z, nodes=system.dofs[:, 0], definite=False).solve(f)
+    return H
+
+
+def base_response(
+    built: Structure,
+    modal: ModalModel,
+    axis: int,
+    frequency: np.ndarray,
+    dofs: np.ndarray,
+    *,
+    residual: Residual | None = None,
+) -> FRF:
+    """Acceleration per acceleration of the base, T = r - ω² H(ω) (-Tᵀ M r), all supports moving.
+
+    Parameters
+    ----------
+    modal : modes of the structure held at its supports, with damping
+    axis : int               1, 2 or 3: translation of every support along a basic axis
+    frequency : (n_f,)       [Hz]
+    dofs : (n_out, 2) int    point id and component 1-6 of the outputs
+    residual : Residual      of the modes left out, for these outputs and this load
+    """
+    rigid = rigid_motions(built.assembly)[:, axis - 1 : axis]
+    load = inertia_load(built.assembly, -np.eye(3)[:, axis - 1 : axis])
+    pick = built.rows(dofs)
+    s = 2j * np.pi * np.asarray(frequency, dtype=float)
+    phi_in = (built.T.T @ load).T @ modal.shapes
+    H = transfer(modal, pick @ modal.shapes, phi_in, s, residual=residual)
+    carried = motion_at(built.assembly, dofs, rigid)
+    outputs = tuple(f"{p}:+{COMPONENTS[c - 1]}" for p, c in np.asarray(dofs).tolist())
+    values = carried[None] + (s**2)[:, None, None] * H
+    return FRF(
+        values,
+        np.asarray(frequency),
+        outputs,
+        (f"base:+{COMPONENTS[axis - 1]}",),
+        "transmissibility",
+    )
+
+
+def motion_at(assembly: Assembly, dofs: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Components of u (6n, k) at (point id, component 1-6) in displacement frames (n_out, k)."""
+    dofs = np.asarray(dofs, dtype=np.int64)
+    at, component = assembly.rows(dofs[:, 0]), dofs[:, 1] - 1
+    first = 6 * at + 3 * (component // 3)
+    axes = np.eye(3)[component % 3]
+    if assembly.axes is not None:
+        axes = assembly.axes[at, component % 3]
+    return np.einsum("oi,oik->ok", axes, u[first[:, None] + np.arange(3)])

@@ -1,0 +1,175 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.errors import LabelError, ModelError
+from chladni.fem import solve
+from chladni.fem.assemble import structure
+from chladni.model.assembly import Assembly, Beams, Masses, RigidBody, Scalars
+from chladni.model.properties import BeamSection, Isotropic, Part
+
+E, I, A, RHO, L, N = 210e9, 4e-9, 2e-4, 7850.0, 1.5, 6
+SECTION = BeamSection(Isotropic(E, 0.3, RHO), A, I, I, 0.0, 2 * I)
+CLAMPED = np.array([(0, c) for c in range(1, 7)])
+
+
+def cantilever(**more):
+    nodes = np.stack([np.arange(N), np.arange(1, N + 1)], axis=1)
+    beams = Beams(
+        np.arange(N), nodes, np.zeros(N, int), np.tile([0, 1.0, 0], (N, 1)), np.zeros((N, 2, 3)),
+        np.zeros((N, 2, 6), bool),
+    )  # fmt: skip
+    points = np.linspace(0, L, N + 1)[:, None] * np.array([1.0, 0, 0])
+    made = Assembly(
+        np.arange(1, N + 2), points, (Part(1, "b", SECTION),), beams=beams, supports=CLAMPED
+    )
+    return replace(made, **more)
+
+
+def oscillator(k=1e4, m=2.0, c=3.0, **more):
+    """One mass along X on a spring and a damper to ground through a held base point."""
+    one = np.array([1])
+    pair = np.array([[1, 0]])
+    both = np.array([[1, 1]])
+    held = [(0, c) for c in range(1, 7)] + [(1, c) for c in range(2, 7)]
+    made = Assembly(
+        np.array([1, 2]),
+        np.zeros((2, 3)),
+        (),
+        springs=Scalars(one, pair, both, np.array([k]), np.zeros(1)),
+        dampers=Scalars(one, pair, both, np.array([c]), np.zeros(1)),
+        masses=Masses(one, np.array([1]), m * np.diag([1.0, 1, 1, 0, 0, 0])[None]),
+        supports=np.array(held),
+    )
+    return replace(made, **more)
+
+
+def unit_load(n, at, cases=1):
+    f = np.zeros((6 * n, cases))
+    f[at, 0] = 1
+    return f
+
+
+def test_several_load_cases_at_once():
+    """Tip force and tip moment: P L³/3EI and M L²/2EI, and Maxwell's reciprocity."""
+    f = np.zeros((6 * (N + 1), 2))
+    f[6 * N + 1, 0] = f[6 * N + 5, 1] = 1
+    u = solve.static(structure(cantilever()), f)
+    assert u[6 * N + 1, 0] == pytest.approx(L**3 / (3 * E * I))
+    assert u[6 * N + 1, 1] == pytest.approx(L**2 / (2 * E * I))
+    assert u[6 * N + 1, 1] == pytest.approx(u[6 * N + 5, 0])
+
+
+def test_weight_bends_a_cantilever():
+    """ρ A g L⁴ / 8EI, nearly, with the weight lumped at six points; all of it is there."""
+    made = cantilever()
+    f = solve.inertia_load(made, np.array([[0.0], [-9.81], [0]]))
+    assert f[1::6].sum() == pytest.approx(-RHO * A * L * 9.81)
+    u = solve.static(structure(made), f)
+    assert u[6 * N + 1, 0] == pytest.approx(-RHO * A * 9.81 * L**4 / (8 * E * I), rel=1e-9)
+
+
+def test_spinning_loads_grow_with_radius():
+    """Angular acceleration about Z: Σ moment = -I_zz α; field and mass from the same motion."""
+    made = cantilever(coupled_mass=False)
+    a = np.zeros((6, 1))
+    a[5] = 2.0
+    f = solve.inertia_load(made, a).reshape(-1, 6)
+    lumps = np.array([0.5, 1, 1, 1, 1, 1, 0.5]) * RHO * A * L / N
+    assert_allclose(f[:, 1], 2 * lumps * made.points[:, 0])
+
+
+def test_settled_support():
+    """A moved clamp carries the free beam along rigidly, without strain."""
+    u = solve.enforced(cantilever(), CLAMPED, np.array([[0.1, 0.2, 0, 0, 0, 0.3]]).T)
+    due = 0.2 + 0.3 * cantilever().points[:, 0]
+    assert_allclose(u.reshape(-1, 6)[:, 1], due, rtol=1e-9)
+
+
+def test_moved_dof_that_is_no_support():
+    """The tip pushed by d needs 3 E I d / L³ and takes the cubic shape."""
+    u = solve.enforced(cantilever(), np.array([(N, 2)]), np.array([[0.01]]))
+    x = cantilever().points[:, 0] / L
+    assert_allclose(u.reshape(-1, 6)[:, 1], 0.01 * x**2 * (3 - x) / 2, atol=1e-12)
+
+
+def test_moved_dof_with_a_load_besides():
+    """Superposition: enforced with a load is enforced alone plus the load on a propped beam."""
+    made, tip = cantilever(), np.array([(N, 2)])
+    f = unit_load(N + 1, 6 * 3 + 1)
+    both = solve.enforced(made, tip, np.array([[0.01]]), f)
+    alone = solve.enforced(made, tip, np.array([[0.01]]))
+    propped = replace(made, supports=np.vstack([CLAMPED, tip]))
+    assert_allclose(both - alone, solve.static(structure(propped), f), atol=1e-12)
+
+
+def test_dependent_dof_cannot_be_moved():
+    tied = cantilever(rigid=(RigidBody(1, N - 1, (N,), ((1, 2, 3, 4, 5, 6),)),))
+    with pytest.raises(LabelError, match=f"{N + 1}:.Y"):
+        solve.enforced(tied, np.array([(N, 2)]), np.array([[0.01]]))
+
+
+def test_free_structure_is_refused():
+    free = cantilever(supports=np.zeros((0, 2), int))
+    with pytest.raises(ModelError, match="free"):
+        solve.static(structure(free), unit_load(N + 1, 6 * N + 1))
+
+
+def test_oscillator_receptance():
+    """1 / (k - ω² m + i ω c)."""
+    k, m, c = 1e4, 2.0, 3.0
+    f = np.array([0.0, 5.0, 11.25, 40.0])
+    built = structure(oscillator(k, m, c))
+    H = solve.harmonic(built, unit_load(2, 6), f, built.rows(np.array([[2, 1]])))
+    w = 2 * np.pi * f
+    assert_allclose(H[:, 0, 0], 1 / (k - w**2 * m + 1j * w * c), rtol=1e-12)
+
+
+def test_hysteretic_losses():
+    """Of the whole (G) and of the spring: k (1 + i g + i η)."""
+    made = oscillator(c=0.0, structural_damping=0.04)
+    made = replace(made, springs=replace(made.springs, damping=np.array([0.03])))
+    built = structure(made)
+    H = solve.harmonic(built, unit_load(2, 6), np.array([3.0]), built.rows(np.array([[2, 1]])))
+    w = 2 * np.pi * 3
+    assert H[0, 0, 0] == pytest.approx(1 / (1e4 * (1 + 0.07j) - w**2 * 2))
+
+
+def test_transmissibility_of_an_oscillator():
+    """T = 1 + ω² / (ω_n² - ω² + 2iζω_nω), damped in its motion relative to the base."""
+    built = structure(oscillator(c=0.0))
+    zeta, f = 0.02, np.array([1.0, 11.0, 30.0])
+    modal = normal_modes(built.system).with_damping(zeta)
+    T = solve.base_response(built, modal, 1, f, np.array([[2, 1], [1, 1]]))
+    w, wn = 2 * np.pi * f, np.sqrt(1e4 / 2)
+    relative = w**2 / (wn**2 - w**2 + 2j * zeta * wn * w)
+    assert_allclose(T.values[:, 0, 0], 1 + relative)
+    assert_allclose(T.values[:, 1, 0], 1)  # the base itself
+    assert T.inputs == ("base:+X",)
+
+
+def test_base_excitation_equals_a_large_mass():
+    """A mass of 1e6 the structure's on the clamp, pushed, gives the same accelerations."""
+    made = cantilever()
+    f, outputs = np.array([3.0, 20.0, 77.0]), np.array([[N + 1, 2], [3, 2]])
+    built = structure(made)
+    T = solve.base_response(built, normal_modes(built.system), 2, f, outputs)
+    big = 1e6 * RHO * A * L
+    heavy = Masses(np.array([1]), np.array([0]), big * np.eye(6)[None])
+    guided = np.array([(0, c) for c in (1, 3, 4, 5, 6)])
+    loose = structure(replace(made, masses=heavy, supports=guided))
+    x = solve.harmonic(loose, big * unit_load(N + 1, 1), f, loose.rows(outputs))
+    acceleration = -((2 * np.pi * f) ** 2)[:, None, None] * x
+    assert_allclose(T.values, acceleration, rtol=2e-5)
+
+
+def test_motion_is_read_in_displacement_frames():
+    c, s = np.cos(0.3), np.sin(0.3)
+    turn = np.tile([[c, s, 0], [-s, c, 0], [0, 0, 1]], (N + 1, 1, 1))
+    made = cantilever(axes=turn)
+    u = np.arange(6.0 * (N + 1))[:, None]
+    seen = solve.motion_at(made, np.array([[2, 1], [2, 5]]), u)
+    assert_allclose(seen[:, 0], [c * 6 + s * 7, -s * 9 + c * 10])
