@@ -59,7 +59,8 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
         epsilon, omega = triangle.membrane(geo.corners)
         kappa, gamma = triangle.plate(geo.corners)
     else:
-        sheet = POISSON_03 if reference is None else reference
+        sheet = POISSON_03 if reference is None else np.asarray(reference)
+        sheet = np.where(sheet[..., :1, :1] == 0, POISSON_03, sheet)  # plates without membrane
         epsilon, omega = _quad_membrane(geo.corners, turned(sheet, geo.turn))
         kappa, gamma = _quad_plate(geo.corners)
     weight, N = _quadrature(geo)
