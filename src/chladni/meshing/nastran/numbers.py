@@ -69,20 +69,26 @@ def integers(text: np.ndarray, blank: int) -> tuple[np.ndarray, int]:
     return np.where(empty, blank, values), bad
 
 
-def _fixed(value: float, width: int) -> list[str]:
-    """Fixed-point spellings, the longest first."""
-    texts = (f"{value:.{digits}f}" for digits in range(width, -1, -1))
-    texts = (t if "." in t else t + "." for t in texts)
-    return [t.replace("0.", ".", 1) if t.lstrip("-").startswith("0.") else t for t in texts]
+def _fixed(value: float, width: int) -> tuple[str, int]:
+    """(fixed-point spelling, its significant digits)."""
+    size = abs(value)
+    whole = len(str(int(size))) if size >= 1 else 0
+    decimals = width - whole - 1 - (value < 0)
+    text = f"{value:.{max(decimals, 0)}f}"
+    text = text if "." in text else text + "."
+    if whole == 0:
+        text = text.replace("0.", ".", 1)
+    zeros = 0 if size >= 1 or size == 0 else -int(np.floor(np.log10(size))) - 1
+    return text, (whole + decimals - zeros if len(text) <= width else 0)
 
 
-def _exponent(value: float, width: int) -> list[str]:
-    """Nastran's short exponents, 1.234-5, the longest first."""
-    out = []
-    for digits in range(width, -1, -1):
-        mantissa, power = f"{value:.{digits}e}".split("e")
-        out.append((mantissa if "." in mantissa else mantissa + ".") + f"{int(power):+d}")
-    return out
+def _exponent(value: float, width: int) -> tuple[str, int]:
+    """(Nastran's short exponent spelling, 1.234-5, its significant digits)."""
+    power = f"{int(f'{value:.17e}'.split('e')[1]):+d}"
+    digits = width - len(power) - 2 - (value < 0)
+    mantissa, power = f"{value:.{max(digits, 0)}e}".split("e")
+    text = (mantissa if "." in mantissa else mantissa + ".") + f"{int(power):+d}"
+    return text, (digits + 1 if len(text) <= width else 0)
 
 
 def _shortest(text: str) -> str:
@@ -102,16 +108,13 @@ def real(value: float, width: int = 8) -> str:
     '.001234567'
     """
     value = float(value)
-    best, error = "", np.inf
-    for spellings in (_fixed(value, width), _exponent(value, width)):
-        for text in spellings:
-            short = _shortest(text)
-            if len(short) <= width:
-                off = abs(parse_real(short) - value)
-                if off < error or (off == error and len(short) < len(best)):
-                    best, error = short, off
-                break
-    return best
+    plain = f"{value:.6g}"
+    if plain == f"{value:.{width}g}" and "e" not in plain and len(plain) < width:
+        text = plain if "." in plain else plain + "."
+        return text.replace("0.", ".", 1) if value and abs(value) < 1 else text
+    fixed, exponent = _fixed(value, width), _exponent(value, width)
+    text, digits = fixed if fixed[1] >= exponent[1] else exponent
+    return _shortest(text if digits > 0 else exponent[0])
 
 
 def parse_real(text: str) -> float:
