@@ -138,6 +138,17 @@ def test_hysteretic_losses():
     assert H[0, 0, 0] == pytest.approx(1 / (1e4 * (1 + 0.07j) - w**2 * 2))
 
 
+def test_losses_of_the_material():
+    """A loss factor η of the beam's material makes a static answer 1 / (1 + i η) of itself."""
+    lossy = BeamSection(Isotropic(E, 0.3, RHO, damping=0.1), A, I, I, 0.0, 2 * I)
+    tip, load = np.array([[N + 1, 2]]), unit_load(N + 1, 6 * N + 1)
+    u = []
+    for section in (SECTION, lossy):
+        built = structure(cantilever(parts=(Part(1, "b", section),)))
+        u.append(solve.harmonic(built, load, np.array([0.0]), built.rows(tip))[0, 0, 0])
+    assert u[1] == pytest.approx(u[0] / (1 + 0.1j))
+
+
 def test_transmissibility_of_an_oscillator():
     """T = 1 + ω² / (ω_n² - ω² + 2iζω_nω), damped in its motion relative to the base."""
     built = structure(oscillator(c=0.0))
