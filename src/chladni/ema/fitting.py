@@ -1,0 +1,249 @@
+"""Common poles of many responses, on any frequency grid.
+
+H(s) = s^q [Σ_r R_r / (s - p_r) + R̄_r / (s - p̄_r) + L / s² + U], s = iω, q the number of
+derivatives (0 receptance, 1 mobility, 2 accelerance). The residues and the residual terms L, U
+(modes below and above the band) are linear and are eliminated (Golub and Pereyra 1973, variable
+projection; Jacobian of Kaufman 1975); the poles are found by relaxed vector fitting
+(Gustavsen and Semlyen 1999, Gustavsen 2006) and polished by Levenberg-Marquardt.
+
+Nothing here assumes evenly spaced lines. Frequencies are scaled to the top of the band.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Responses ready to be fitted.
+
+    Attributes
+    ----------
+    s : (n_f,) complex      iω over the top of the band
+    y : (n_f, n_c) complex  one column a channel
+    w : (n_f, n_c)          √2 / σ, zero where a sample does not count
+    q : int                 derivatives
+    """
+
+    s: np.ndarray
+    y: np.ndarray
+    w: np.ndarray
+    q: int
+
+    @property
+    def common(self) -> np.ndarray:
+        """Root mean square weight of every line (n_f,)."""
+        return np.sqrt(np.maximum((self.w**2).mean(axis=1), _TINY))
+
+    @property
+    def samples(self) -> int:
+        """Real numbers that count."""
+        return 2 * int(np.count_nonzero(self.w))
+
+
+def stacked(z: np.ndarray) -> np.ndarray:
+    """Real over imaginary part (2 n_f, ...)."""
+    return np.concatenate([z.real, z.imag])
+
+
+def basis(s: np.ndarray, p: np.ndarray, q: int, power: int = 1) -> np.ndarray:
+    """Columns s^q [1/(s-p)^k + 1/(s-p̄)^k] and s^q [i/(s-p)^k - i/(s-p̄)^k], pair by pair.
+
+    (n_f, 2 r) complex; their real coefficients are real and imaginary part of the residue.
+    """
+    a, b = (s[:, None] - p) ** -power, (s[:, None] - p.conj()) ** -power
+    columns = np.stack([a + b, 1j * (a - b)], axis=-1).reshape(len(s), -1)
+    return s[:, None] ** q * columns
+
+
+def residual_terms(s: np.ndarray, q: int) -> np.ndarray:
+    """Columns s^q / s² and s^q: what lies below and above the band (n_f, 2)."""
+    return np.stack([s ** (q - 2.0), s ** float(q)], axis=-1)
+
+
+def linear(s: np.ndarray, p: np.ndarray, q: int) -> np.ndarray:
+    """All linear columns: residues, then the residual terms (n_f, 2 r + 2)."""
+    return np.concatenate([basis(s, p, q), residual_terms(s, q)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Best residues for given poles.
+
+    Attributes
+    ----------
+    p : (r,) complex
+    x : (2 r + 2, n_c)    real coefficients of `linear`
+    e : (n_f, n_c)        weighted complex residual w (y - Φ x)
+    gain : (r,)           how much χ² would rise without each pole, the other poles fixed
+    """
+
+    p: np.ndarray
+    x: np.ndarray
+    e: np.ndarray
+    gain: np.ndarray
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of the whitened residual."""
+        return float((np.abs(self.e) ** 2).sum())
+
+    @property
+    def residues(self) -> np.ndarray:
+        """(r, n_c) complex."""
+        pairs = self.x[:-2].reshape(len(self.p), 2, -1)
+        return np.asarray(pairs[:, 0] + 1j * pairs[:, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Slope:
+    """Gauss-Newton system of the poles, residues eliminated: JᵀJ and Jᵀr over (Re p, Im p)."""
+
+    H: np.ndarray
+    g: np.ndarray
+
+
+def _orthonormal(data: Data, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Q R of the columns under the common weight, columns scaled to one beforehand."""
+    B = stacked(data.common[:, None] * A)
+    scale = np.maximum(np.linalg.norm(B, axis=0), _TINY)
+    Q, R = np.linalg.qr(B / scale)
+    return Q, R * scale
+
+
+def solve(data: Data, p: np.ndarray, slope: bool = False) -> tuple[Fit, Slope | None]:
+    """Residues by weighted least squares, channel by channel, in one orthonormal basis.
+
+    With Q R = g Φ for the common weight g, every channel's normal matrix Qᵀ v² Q (v = w / g) is
+    close to the identity, so that the normal equations lose nothing.
+    """
+    A = linear(data.s, p, data.q)
+    n = A.shape[1]
+    both = np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1) if slope else A
+    Q, R = _orthonormal(data, both)
+    R1, R2 = R[:n, :n], R[n:, n:]
+    v = np.concatenate([data.w / data.common[:, None]] * 2)
+    t = stacked(data.common[:, None] * data.y)
+    n_c, r = data.y.shape[1], len(p)
+    x, gain = np.empty((n, n_c)), np.zeros(r)
+    H, g = np.zeros((2 * r, 2 * r)), np.zeros(2 * r)
+    ridge = 1e-12 * np.eye(n)
+    inverse = solve_triangular(R1, np.eye(n))
+    for c in range(n_c):
+        V, u = v[:, c, None] * Q, v[:, c] * t[:, c]
+        G = V.T @ V
+        factor = cho_factor(G[:n, :n] + ridge, check_finite=False)
+        a = cho_solve(factor, V[:, :n].T @ u, check_finite=False)
+        x[:, c] = inverse @ a
+        gain += _gains(inverse, factor, x[:, c], r)
+        if slope:
+            rest = V[:, n:].T @ (u - V[:, :n] @ a)
+            S = G[n:, n:] - G[n:, :n] @ cho_solve(factor, G[:n, n:], check_finite=False)
+            T = _turn(x[: 2 * r, c].reshape(r, 2))
+            M = (R2.T @ S @ R2).reshape(r, 2, r, 2)
+            M = np.einsum("kma,kmln->kaln", T, M)
+            H += np.einsum("kaln,lnb->kalb", M, T).reshape(2 * r, 2 * r)
+            g += np.einsum("kma,km->ka", T, (R2.T @ rest).reshape(r, 2)).ravel()
+    e = data.w * (data.y - A @ x)
+    return Fit(p, x, e, gain), Slope(H, g) if slope else None
+
+
+def _turn(ab: np.ndarray) -> np.ndarray:
+    """(r, 2, 2): coefficients of the derivative columns for dp = 1 and dp = i, R = a + ib."""
+    a, b = ab.T
+    return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], axis=1)
+
+
+def _gains(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndarray:
+    """Wald's xᵀ C⁻¹ x of every residue: rise of χ² when its pole is left out (r,)."""
+    root = solve_triangular(factor[0], inverse[: 2 * r].T, trans="T", check_finite=False)
+    k = 2 * np.arange(r)
+    a, d = (root[:, k] ** 2).sum(0), (root[:, k + 1] ** 2).sum(0)
+    b = (root[:, k] * root[:, k + 1]).sum(0)
+    u, v = x[k], x[k + 1]
+    return np.asarray((d * u**2 - 2 * b * u * v + a * v**2) / np.maximum(a * d - b * b, _TINY))
+
+
+def polish(
+    data: Data, p: np.ndarray, largest: float = 0.1, iterations: int = 20, tol: float = 0.1
+) -> tuple[Fit, Slope]:
+    """Levenberg-Marquardt on the poles until a step lets χ² fall by less than ``tol``.
+
+    ``largest`` is the highest damping ratio a pole may take.
+    """
+    fit, slope = _solved(data, bounded(p, largest))
+    damping, taken = 1e-3, 0
+    while taken < iterations and damping < 1e5:
+        trial, its_slope = _solved(data, bounded(fit.p + _step(slope, damping), largest))
+        if trial.chi2 > fit.chi2:
+            damping *= 30
+            continue
+        fall = fit.chi2 - trial.chi2
+        damping, taken = max(damping / 10, 1e-7), taken + 1
+        fit, slope = trial, its_slope
+        if fall < tol:
+            break
+    return fit, slope
+
+
+def _solved(data: Data, p: np.ndarray) -> tuple[Fit, Slope]:
+    fit, slope = solve(data, p, slope=True)
+    assert slope is not None
+    return fit, slope
+
+
+def _step(slope: Slope, damping: float) -> np.ndarray:
+    """Marquardt's step of every pole, complex (r,)."""
+    d = np.maximum(np.diag(slope.H), 1e-12 * np.diag(slope.H).max(initial=_TINY))
+    dp = np.linalg.solve(slope.H + damping * np.diag(d), slope.g)
+    return np.asarray(dp[0::2] + 1j * dp[1::2])
+
+
+def bounded(p: np.ndarray, largest: float) -> np.ndarray:
+    """Poles in the upper left quadrant with 1e-6 <= ζ <= largest."""
+    size = np.abs(p)
+    zeta = np.clip(np.abs(p.real) / np.maximum(size, _TINY), 1e-6, largest)
+    return np.asarray(size * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+
+
+def relocated(data: Data, p: np.ndarray) -> np.ndarray:
+    """One relaxed vector-fitting step: the zeros of σ(s), (σ H)(s) and σ with the poles p.
+
+    Gustavsen (2006), IEEE Trans. Power Delivery 21(3), eqs. 5-11.
+    """
+    g = data.common[:, None]
+    Q, _ = _orthonormal(data, linear(data.s, p, data.q))
+    sigma = np.concatenate([basis(data.s, p, 0), np.ones((len(data.s), 1))], axis=1)
+    scale = np.linalg.norm(stacked(sigma), axis=0)
+    sigma = sigma / scale
+    n = sigma.shape[1]
+    G, weight = np.zeros((n, n)), 0.0
+    for c in range(data.y.shape[1]):
+        B = stacked(g * data.y[:, c, None] * sigma)
+        B -= Q @ (Q.T @ B)
+        G += B.T @ B
+        weight += float((np.abs(g[:, 0] * data.y[:, c]) ** 2).sum())
+    relax = sigma.real.sum(axis=0) * np.sqrt(weight) / len(data.s)
+    G += np.outer(relax, relax)
+    ridge = 1e-14 * np.trace(G) / n * np.eye(n)
+    x = np.linalg.solve(G + ridge, relax * np.sqrt(weight)) / scale
+    return _zeros(p, x[:-1], x[-1])
+
+
+def _zeros(p: np.ndarray, c: np.ndarray, d: float) -> np.ndarray:
+    """Zeros of d + Σ C/(s-p) + C̄/(s-p̄), upper half plane, reflected into the left half."""
+    r = len(p)
+    A = np.zeros((2 * r, 2 * r))
+    k = 2 * np.arange(r)
+    A[k, k] = A[k + 1, k + 1] = p.real
+    A[k, k + 1], A[k + 1, k] = p.imag, -p.imag
+    b = np.zeros(2 * r)
+    b[k] = 2.0
+    d = d if abs(d) > 1e-8 else 1e-8
+    z = np.linalg.eigvals(A - np.outer(b, c) / d)
+    z = z[z.imag > 0]
+    return -np.abs(z.real) + 1j * z.imag
