@@ -12,11 +12,13 @@ def card(name: str, values: Sequence[Value], tolerance: float = 1e-6) -> list[st
 
     >>> card("PSHELL", [101, 7, 0.8, 7, None, 7])
     ['PSHELL       101       7      .8       7               7']
-    >>> card("PSHELL", [101, 7, 0.8123456789])
-    ['PSHELL*              101               7     .8123456789', '*']
+    >>> card("PSHELL", [101, 7, -0.008123456789])
+    ['PSHELL*              101               7  -.008123456789', '*']
     """
-    small = all(numbers.fits(v, 8, tolerance) for v in values)
-    return lines(name, [numbers.field(v, 8 if small else 16) for v in values], large=not small)
+    texts = [numbers.fitted(v, 8, tolerance) for v in values]
+    if None in texts:
+        return lines(name, [numbers.field(v, 16) for v in values], large=True)
+    return lines(name, [t for t in texts if t is not None], large=False)
 
 
 def lines(name: str, texts: Sequence[str], large: bool) -> list[str]:

@@ -1,7 +1,10 @@
 """Numbers as Nastran writes them: "1.5-3", "1.", "1.D+3", ".5"; whole columns at once."""
 
+import re
+
 import numpy as np
 
+_BARE_EXPONENT = re.compile(r"([0-9.])([+-])")
 _DIGIT_OR_DOT = np.zeros(256, bool)
 _DIGIT_OR_DOT[list(b"0123456789.")] = True
 
@@ -118,25 +121,36 @@ def real(value: float, width: int = 8) -> str:
 
 
 def parse_real(text: str) -> float:
-    """Value of one Nastran real; nan where the text is none."""
-    values, bad = reals(np.array([text.strip().upper().encode()]), 0.0)
-    return float("nan") if bad >= 0 else float(values[0])
+    """Value of one Nastran real; nan where the text is none.
+
+    >>> parse_real("1.5-3"), parse_real("2.D+3"), parse_real("x")
+    (0.0015, 2000.0, nan)
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        word = _BARE_EXPONENT.sub(r"\1E\2", text.strip().upper().replace("D", "E"))
+        try:
+            value = float(word)
+        except ValueError:
+            return float("nan")
+    return value if np.isfinite(value) else float("nan")
 
 
 def field(value: float | int | str | None, width: int = 8) -> str:
     """A field's text: reals as precise as the width allows, integers and words as they are."""
     if value is None:
         return ""
-    if isinstance(value, str | int | np.integer) and not isinstance(value, bool):
-        return str(value)
-    return real(float(value), width)
+    if isinstance(value, float):  # numpy's float64 is one
+        return real(value, width)
+    return str(value)
 
 
-def fits(value: float | int | str | None, width: int = 8, tolerance: float = 1e-6) -> bool:
-    """True where so many columns hold the value to the relative tolerance."""
+def fitted(value: float | int | str | None, width: int, tolerance: float) -> str | None:
+    """A field's text; None where so many columns do not hold it to the relative tolerance."""
     text = field(value, width)
     if len(text) > width:
-        return False
-    if isinstance(value, float | np.floating):
-        return abs(parse_real(text) - value) <= tolerance * abs(value)
-    return True
+        return None
+    if isinstance(value, float):
+        return text if abs(parse_real(text) - value) <= tolerance * abs(value) else None
+    return text
