@@ -168,9 +168,9 @@ def test_point_on_the_line_of_others_may_translate():
     assert (T @ x[q])[0] == pytest.approx(2)
 
 
-def refused(rigid, *words):
+def refused(rigid, *words, **more):
     with pytest.raises(ModelError) as caught:
-        transformation(structure(rigid))
+        transformation(structure(rigid, **more))
     for word in words:
         assert word in str(caught.value)
 
@@ -178,6 +178,12 @@ def refused(rigid, *words):
 def test_dof_dependent_twice_names_both():
     two = [RigidBody(7, 0, (2,), (ALL,)), Average(8, 2, (3,), ((3, ALL, 1.0),))]
     refused(two, "30:+Z", "rigid element 7", "RBE3 8")
+
+
+def test_support_on_a_dependent_dof_is_refused():
+    """One of the two would be ignored in silence."""
+    held = np.array([(2, 3)])
+    refused([RigidBody(7, 0, (2,), (ALL,))], "30:+Z", "element 7", "support", supports=held)
 
 
 def test_cycle_names_its_elements():

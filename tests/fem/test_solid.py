@@ -4,6 +4,7 @@ from numpy.testing import assert_allclose
 
 from chladni.errors import ModelError
 from chladni.fem import solid
+from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, Orthotropic, Part, SolidSection
 
@@ -197,6 +198,13 @@ def test_assembly_uses_the_section():
     assert nodes.shape == (1, 8)
     assert_allclose(K, stiffness(CUBE[None], modes=0))
     assert M[0, ::3, ::3].sum() == pytest.approx(7850)
+
+
+def test_losses_of_the_material():
+    """K_loss = η K of the block's material."""
+    lossy = Isotropic(210e9, 0.3, 7850.0, damping=0.05)
+    built = structure(box(8, SolidSection(lossy)))
+    assert_allclose(built.loss.toarray(), 0.05 * built.system.K.toarray(), atol=1)
 
 
 def test_faults_name_the_element():

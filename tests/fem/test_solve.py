@@ -138,6 +138,17 @@ def test_hysteretic_losses():
     assert H[0, 0, 0] == pytest.approx(1 / (1e4 * (1 + 0.07j) - w**2 * 2))
 
 
+def test_losses_of_the_material():
+    """A loss factor η of the beam's material makes a static answer 1 / (1 + i η) of itself."""
+    lossy = BeamSection(Isotropic(E, 0.3, RHO, damping=0.1), A, I, I, 0.0, 2 * I)
+    tip, load = np.array([[N + 1, 2]]), unit_load(N + 1, 6 * N + 1)
+    u = []
+    for section in (SECTION, lossy):
+        built = structure(cantilever(parts=(Part(1, "b", section),)))
+        u.append(solve.harmonic(built, load, np.array([0.0]), built.rows(tip))[0, 0, 0])
+    assert u[1] == pytest.approx(u[0] / (1 + 0.1j))
+
+
 def test_transmissibility_of_an_oscillator():
     """T = 1 + ω² / (ω_n² - ω² + 2iζω_nω), damped in its motion relative to the base."""
     built = structure(oscillator(c=0.0))
@@ -164,6 +175,26 @@ def test_base_excitation_equals_a_large_mass():
     x = solve.harmonic(loose, big * unit_load(N + 1, 1), f, loose.rows(outputs))
     acceleration = -((2 * np.pi * f) ** 2)[:, None, None] * x
     assert_allclose(T.values, acceleration, rtol=2e-5)
+
+
+def test_driven_oscillator():
+    """x / x_b = (k + i ω c) / (k + i ω c - ω² m), the base moved."""
+    f, base, out = np.array([2.0, 11.0, 30.0]), np.array([[0, 1]]), np.array([[2, 1], [1, 1]])
+    x = solve.driven(oscillator(c=40.0), base, np.array([[0.5]]), f, out)
+    w = 2 * np.pi * f
+    pull = 1e4 + 40j * w
+    assert_allclose(x[:, 0, 0], 0.5 * pull / (pull - 2 * w**2))
+    assert_allclose(x[:, 1, 0], 0.5)
+
+
+def test_driven_by_all_modes_is_driven_directly():
+    """The absolute modal sum is exact with every mode; amplitudes may change with the line."""
+    made, f, out = cantilever(), np.array([20.0, 90.0]), np.array([[N + 1, 2], [3, 6]])
+    values = np.array([[[0.01], [0.002j]], [[0.03j], [0.001]]])
+    dofs = np.array([(0, 2), (0, 6)])
+    direct = solve.driven(made, dofs, values, f, out)
+    modal = solve.driven(made, dofs, values, f, out, normal_modes(structure(made).system))
+    assert_allclose(modal, direct, rtol=1e-7, atol=1e-9 * np.abs(direct).max())
 
 
 def test_motion_is_read_in_displacement_frames():

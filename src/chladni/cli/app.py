@@ -9,7 +9,14 @@ import typer
 
 from ..errors import AccuracyError, ChladniError
 
-COMMANDS = ("modes", "frf", "render", "identify", "report")  # each a module here with ``run``
+COMMANDS = (  # each a module here with a function ``run``
+    "modes",
+    "frf",
+    "render",
+    "plan",
+    "identify",
+    "report",
+)
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
 
 

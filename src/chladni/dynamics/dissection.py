@@ -139,7 +139,7 @@ def _dissected(
 def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
     m, extent = len(x), np.ptp(x, axis=0)
-    axes = [a for a in np.argsort(-extent) if extent[a] > 0.3 * extent.max()]
+    axes = [a for a in np.argsort(-extent) if extent[a] >= 0.3 * extent.max()]
     best, cost = None, np.inf
     for axis in axes:
         rank = np.argsort(np.argsort(x[:, axis], kind="stable"))

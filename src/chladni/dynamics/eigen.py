@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import LinAlgError, eigh
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
@@ -23,7 +23,9 @@ _SHARP = 1e-4  # error of a Ritz value good enough to tell a gap
 _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
 _LOOSE = 1e-6  # Ritz error of a mode handed out (frequencies are as good as its square)
-_FINITE = 1e-11  # θ/θ_max below which a massless motion is meant
+_FINITE = 1e-9  # θ/θ_max below which a massless motion is meant
+_FIRM = 1e-6  # of the median K_ii/M_ii: shift of small systems
+_ROUNDING = 1e-12
 
 
 def normal_modes(
@@ -62,7 +64,7 @@ def normal_modes(
     limit = np.inf if band is None else (2 * np.pi * band) ** 2
     K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
     if n <= _DENSE or (count is not None and 3 * count > n):
-        lam, phi = _dense(K, M, system.dofs)
+        lam, phi = _dense(K, M, system.dofs, count)
     else:
         order = analyse(abs(K) + abs(M), points, system.dofs[:, 0])
         problem = _Problem(K, M, system.dofs, backend, order)
@@ -128,17 +130,31 @@ def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
     return float(np.median(k[use] / m[use]))
 
 
-def _dense(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All modes by LAPACK; where M is singular, M φ = θ (K - σM) φ has λ = ∞ at θ = 0."""
+def _dense(
+    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modes by LAPACK: a few from M φ = θ (K - σM) φ, which is sharp below, all from K φ = λ M φ.
+
+    Massless rows follow the others, φ_s = -K_ss⁻¹ K_sm φ_m, and have no modes of their own.
+    """
     ratio = _median_ratio(K, M, dofs)
+    k, m, massless = K.toarray(), M.toarray(), M.diagonal() == 0
+    T = np.eye(len(dofs))[:, ~massless]
     try:
-        return eigh(K.toarray(), M.toarray())
-    except LinAlgError:
-        sigma = -1e-4 * ratio
-    try:
-        theta, X = eigh(M.toarray(), (K - sigma * M).toarray())
+        T[massless] = -cho_solve(cho_factor(k[massless][:, massless]), k[massless][:, ~massless])
+        k, m = T.T @ k @ T, m[~massless][:, ~massless]
+        lam, phi = _few(k, m, -_FIRM * ratio, count) if count else eigh(k, m)
     except LinAlgError as error:
         raise ModelError("K - σM is not positive definite: a part hangs on nothing") from error
+    if lam[0] < -max(_GUESS * ratio, _ROUNDING * lam[-1]):
+        raise ModelError(f"a stiffness is negative: the lowest λ is {lam[0]:.2e} rad²/s²")
+    return lam, T @ phi
+
+
+def _few(K: np.ndarray, M: np.ndarray, sigma: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Up to ``count`` lowest modes, θ = 1/(λ - σ); M may be singular, there λ = ∞ is θ = 0."""
+    n = len(K)
+    theta, X = eigh(M, K - sigma * M, subset_by_index=(max(n - count, 0), n - 1))
     finite = np.flatnonzero(theta > _FINITE * theta[-1])[::-1]
     return sigma + 1 / theta[finite], X[:, finite] / np.sqrt(theta[finite])
 

@@ -102,7 +102,7 @@ class FRF:
             raise LabelError(f"no way from {self.quantity} to {quantity!r}; only among {[*_ORDER]}")
         n = _ORDER[quantity] - _ORDER[self.quantity]
         omega = 2 * np.pi * self.frequency[:, None, None]
-        factor = (1j * (omega if n > 0 else np.where(omega > 0, omega, np.nan))) ** n
+        factor = 1j**n * (omega if n > 0 else np.where(omega > 0, omega, np.nan)) ** n
         variance = None if self.variance is None else self.variance * np.abs(factor) ** 2
         return replace(self, values=self.values * factor, quantity=quantity, variance=variance)
 

@@ -129,7 +129,7 @@ class Multifrontal:
             where[begin:end] = np.arange(end - begin)
             where[rows] = np.arange(end - begin, end - begin + len(rows))
             F = _gathered(lower, begin, end, where, len(rows))
-            for c in children:
+            for c in (c for c in children if c in updates):
                 _extend_add(F, where[fronts.boundary[c]], updates.pop(c))
             parts.append(self._front(F, i))
             if len(rows):

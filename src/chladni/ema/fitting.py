@@ -176,16 +176,14 @@ def polish(
     ``largest`` is the highest damping ratio a pole may take.
     """
     fit, slope = _solved(data, bounded(p, largest))
-    damping = 1e-3
-    for _ in range(iterations):
+    damping, taken = 1e-3, 0
+    while taken < iterations and damping < 1e5:
         trial, its_slope = _solved(data, bounded(fit.p + _step(slope, damping), largest))
         if trial.chi2 > fit.chi2:
             damping *= 30
-            if damping > 1e4:
-                break
             continue
         fall = fit.chi2 - trial.chi2
-        damping = max(damping / 10, 1e-7)
+        damping, taken = max(damping / 10, 1e-7), taken + 1
         fit, slope = trial, its_slope
         if fall < tol:
             break

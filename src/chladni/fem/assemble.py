@@ -130,20 +130,28 @@ def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrice
     if any(map(len, assembly.solids)):
         from . import solid
 
-        for nodes, K_e, M_e in solid.stiffness_and_mass(assembly):
+        losses = solid.loss_factors(assembly)
+        for eta, (nodes, K_e, M_e) in zip(losses, solid.stiffness_and_mass(assembly), strict=True):
             K, M = (blocks(with_rotations(A), nodes, n) for A in (K_e, M_e))
-            yield M, None, K, None
+            yield M, None, K, _lossy(eta, with_rotations(K_e), nodes, n)
     if len(assembly.beams):
         from . import beam
 
         nodes, K_e, M_e = beam.stiffness_and_mass(assembly)
-        yield blocks(M_e, nodes, n), None, blocks(K_e, nodes, n), None
+        loss = _lossy(beam.loss_factors(assembly), K_e, nodes, n)
+        yield blocks(M_e, nodes, n), None, blocks(K_e, nodes, n), loss
     lumps = ("springs", "dampers", "scalar_masses", "bushes", "masses")
     if any(len(getattr(assembly, name)) for name in lumps):
         from . import spring
 
         K, V, M, loss = spring.matrices(assembly)
         yield M, V, K, loss
+
+
+def _lossy(eta: np.ndarray, K: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array | None:
+    """Σ η_e K_e of the elements whose material has losses; None where none has."""
+    at = np.flatnonzero(eta)
+    return blocks(eta[at, None, None] * K[at], nodes[at], n) if len(at) else None
 
 
 def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:

@@ -29,6 +29,11 @@ def stiffness_and_mass(assembly: Assembly) -> tuple[np.ndarray, np.ndarray, np.n
     return beams.nodes, T.transpose(0, 2, 1) @ K @ T, T.transpose(0, 2, 1) @ M @ T
 
 
+def loss_factors(assembly: Assembly) -> np.ndarray:
+    """Structural damping of every beam's material (m,) [-]."""
+    return np.array([s.material.damping for s in _sections(assembly)], dtype=float)
+
+
 def _sections(assembly: Assembly) -> list[BeamSection]:
     """The section of every beam."""
     found = []

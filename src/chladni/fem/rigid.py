@@ -36,10 +36,12 @@ def transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
     Raises
     ------
     ModelError
-        If a dof depends twice, or on itself; the sentence names grid, component and elements.
+        If a dof depends twice, on itself, or is held by a support too; the sentence names grid,
+        component and elements.
     """
     n = 6 * len(assembly.ids)
     rows = dependencies(assembly)
+    _refuse_held(assembly, rows)
     G = _followed(assembly, rows, n)
     kept = np.ones(n, dtype=bool)
     kept[rows.dof] = False
@@ -136,6 +138,18 @@ def _refuse_double(assembly: Assembly, rows: Rows) -> None:
         raise ModelError(
             f"{_label(assembly, rows.dof[pair[0]])} depends twice: through {one} and {other}; "
             f"{len(again)} such dofs in all"
+        )
+
+
+def _refuse_held(assembly: Assembly, rows: Rows) -> None:
+    """Raise if a dependent dof has a support: one of the two would be ignored."""
+    held = 6 * assembly.supports[:, 0] + assembly.supports[:, 1] - 1
+    both = np.flatnonzero(np.isin(rows.dof, held))
+    if len(both):
+        raise ModelError(
+            f"{_label(assembly, rows.dof[both[0]])} is held by a support and depends on others "
+            f"through {_name(assembly, rows.owner[both[0]])}; hold the points it depends on "
+            f"instead ({len(both)} such dofs)"
         )
 
 

@@ -20,10 +20,11 @@ from . import triangle
 from .shell_geometry import ShellGeometry as ShellGeometry
 from .shell_geometry import geometry as geometry
 from .shell_membrane import N as QUAD_N
-from .shell_membrane import jacobians
+from .shell_membrane import jacobians, middle_slope
 from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
+VARYING_SPIN = 0.1  # squared: share of the drilling stiffness for what varies of ω - rz
 CHUNK = 512  # elements a pass: what fits the cache
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
 MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
@@ -36,7 +37,7 @@ class Strains:
 
     Attributes
     ----------
-    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] in the element frame
+    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] (see _damped) in the element frame
     weight : (m, g)       dA [m²]
     N : (g, 4)            shape functions, for values given at corners
     """
@@ -59,7 +60,8 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
         epsilon, omega = triangle.membrane(geo.corners)
         kappa, gamma = triangle.plate(geo.corners)
     else:
-        sheet = POISSON_03 if reference is None else reference
+        sheet = POISSON_03 if reference is None else np.asarray(reference)
+        sheet = np.where(sheet[..., :1, :1] == 0, POISSON_03, sheet)  # plates without membrane
         epsilon, omega = _quad_membrane(geo.corners, turned(sheet, geo.turn))
         kappa, gamma = _quad_plate(geo.corners)
     weight, N = _quadrature(geo)
@@ -69,6 +71,7 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     B[:, :, SHEAR, :, 2:5] = gamma.reshape(len(geo), -1, 2, 4, 3)
     B[:, :, DRILL, :, :2] = omega.reshape(len(geo), -1, 1, 4, 2)
     B[:, :, 8, :, 5] = -N
+    B[:, :, DRILL] = _damped(B[:, :, DRILL], weight)
     B = B.reshape(len(geo), -1, 24) @ _to_element(geo)
     return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
 
@@ -249,6 +252,17 @@ def _integrated(
     return K
 
 
+def _damped(B: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The mean over the element and a tenth of what varies.
+
+    Drilling stiffness is there to carry twist from element to element (MacNeal-Harder's twisted
+    beam, Raasch's hook), which the mean does; held at every point it locks coarse doubly curved
+    shells (hemisphere, 8 x 8: 3 % low; this way 1 % high as MacNeal's element).
+    """
+    mean = np.einsum("mg,mg...->m...", weight / weight.sum(axis=1, keepdims=True), B)[:, None]
+    return np.asarray(mean + VARYING_SPIN * (B - mean))
+
+
 def _varying(S: np.ndarray | None) -> np.ndarray | None:
     """Shear stiffness of all of γ, before the mean's excess is added."""
     return S if S is None or S.ndim == 3 else S[:, 1]
@@ -292,16 +306,20 @@ def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
 
 
 def _to_element(geo: ShellGeometry) -> np.ndarray:
-    """Motion at the mid-surface in the element frame from that of the nodes: (m, 24, 24).
+    """Motion of the flattened mid-surface in the element frame from the nodes': (m, 24, 24).
 
-    u' = R (u + r x link n), r' = R r; R (r x n) = (r·y, -r·x, 0).
+    u' = R u + (d R r - z w) x n with d the offset, z the warp and w = (w,y -w,x) the turn of the
+    element, from the corners' deflections; a b for b x n = (b_y, -b_x, 0).
     """
     T = np.zeros((len(geo), 4, 6, 4, 6))
-    x, y = geo.frames[:, 0], geo.frames[:, 1]
+    x, y, n = (geo.frames[:, k] for k in range(3))
     for k in range(4):
         T[:, k, :3, k, :3] = T[:, k, 3:, k, 3:] = geo.frames
-        T[:, k, 0, k, 3:] = geo.link[:, k, None] * y
-        T[:, k, 1, k, 3:] = -geo.link[:, k, None] * x
+        T[:, k, 0, k, 3:] = geo.offset[:, None] * y
+        T[:, k, 1, k, 3:] = -geo.offset[:, None] * x
+    if geo.warp.any():
+        slope = middle_slope(geo.corners)
+        T[:, :, :2, :, :3] += np.einsum("mk,mij,ml->mkijl", geo.warp, slope, n)
     return T.reshape(len(geo), 24, 24)
 
 

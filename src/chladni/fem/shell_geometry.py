@@ -1,10 +1,11 @@
-"""Where flat four- and three-node shells lie: frames, flattened corners, links to the nodes.
+"""Where flat four- and three-node shells lie: frames, flattened corners, way to the nodes.
 
 A quadrilateral's plane is the mean plane of its corners (normal along the cross product of the
 diagonals, x along their bisector, as Nastran's CQUAD4); a triangle's x runs along side 1-2. The
-corners of a warped quadrilateral lie alternately above and below the plane; rigid links carry
-their motion to it, so that a rigid motion of the nodes strains nothing (MacNeal, Finite Elements:
-Their Design and Performance, 1994, section 8.3).
+corners of a warped quadrilateral lie alternately above and below the plane. Forces in the plane
+are carried to them with the couple balanced by normal forces at the four corners, not by moments
+(MacNeal, Computers and Structures 8, 1978, 175-183), so that a rigid motion of the nodes strains
+nothing and membrane forces do not turn nodes.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ class ShellGeometry:
     nodes : (m, 4) int       rows of points; a triangle repeats its third
     frames : (m, 3, 3)       rows are the unit vectors x, y, n of the element frame
     corners : (m, 4, 2)      flattened corners from the element's middle [m]
-    link : (m, 4)            from each node along n to the mid-surface (minus warp, plus offset) [m]
+    warp : (m, 4)            height of each node along n above the plane [m]
     offset : (m,)            of the mid-surface along n (Nastran's ZOFFS) [m]
     triangle : (m,) bool
     area : (m,)              of the flattened element [m²]
@@ -36,7 +37,7 @@ class ShellGeometry:
     nodes: np.ndarray
     frames: np.ndarray
     corners: np.ndarray
-    link: np.ndarray
+    warp: np.ndarray
     offset: np.ndarray
     triangle: np.ndarray
     area: np.ndarray
@@ -56,7 +57,7 @@ class ShellGeometry:
 
 
 def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
-    """Frames, flattened corners and rigid links of every shell.
+    """Frames, flattened corners and warp of every shell.
 
     Parameters
     ----------
@@ -80,7 +81,7 @@ def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
         nodes=shells.nodes,
         frames=frames,
         corners=corners,
-        link=shells.offset[:, None] - local[:, :, 2],
+        warp=np.ascontiguousarray(local[:, :, 2]),
         offset=shells.offset,
         triangle=triangle,
         area=area,

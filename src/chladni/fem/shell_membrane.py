@@ -38,6 +38,12 @@ def gradients(inverse: np.ndarray) -> np.ndarray:
     return np.asarray(inverse @ np.stack([derivatives(*point) for point in GAUSS]))
 
 
+def middle_slope(corners: np.ndarray) -> np.ndarray:
+    """∂N/∂x and ∂N/∂y in the middle (m, 2, 4)."""
+    _, inverse = invert(np.einsum("dc,mci->mdi", derivatives(0, 0), corners))
+    return np.asarray(inverse @ derivatives(0, 0))
+
+
 def symmetric(grad: np.ndarray) -> np.ndarray:
     """(ux,x  uy,y  ux,y + uy,x) from a field's nodal ux uy: (..., 2, k) -> (..., 3, 2k)."""
     B = np.zeros((*grad.shape[:-2], 3, 2 * grad.shape[-1]))

@@ -36,6 +36,15 @@ def stiffness_and_mass(assembly: Assembly) -> list[tuple[np.ndarray, np.ndarray,
     return out
 
 
+def loss_factors(assembly: Assembly) -> list[np.ndarray]:
+    """Structural damping of every solid's material, one (m,) a group [-]."""
+    out = []
+    for solids in assembly.solids:
+        sections, which = _sections(assembly, solids)
+        out.append(np.array([s.material.damping for s in sections])[which])
+    return out
+
+
 def _sections(assembly: Assembly, solids: Solids) -> tuple[list[SolidSection], np.ndarray]:
     """The sections in use, and which of them each element has."""
     used, which = np.unique(solids.part, return_inverse=True)

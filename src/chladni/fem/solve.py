@@ -4,12 +4,13 @@ Loads and motions are (6n, k) over all points in the basic frame, six motions a 
 load case; dependent dofs may carry loads, which Tᵀ hands on to those they depend on.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..dofs import COMPONENTS
+from ..dofs import COMPONENTS, rows
 from ..dynamics.factor import factorise
 from ..dynamics.frf import FRF, Residual, transfer
 from ..dynamics.modes import ModalModel
@@ -74,12 +75,7 @@ def enforced(
     LabelError
         If a dof to be moved depends on others, or has no stiffness.
     """
-    dofs = np.asarray(dofs, dtype=np.int64)
-    held = assembly.supports
-    moved = np.isin(8 * held[:, 0] + held[:, 1], 8 * dofs[:, 0] + dofs[:, 1])
-    built = structure(replace(assembly, supports=held[~moved]))
-    s = _at(built, dofs)
-    f = np.setdiff1d(np.arange(len(built.system.dofs)), s)
+    built, s, f = _split(assembly, dofs)
     q = np.zeros((len(built.system.dofs), np.shape(values)[1]))
     q[s] = values
     force = -(built.system.K @ q)
@@ -89,13 +85,84 @@ def enforced(
     return np.asarray(built.T @ q)
 
 
+def _split(assembly: Assembly, dofs: np.ndarray) -> tuple[Structure, np.ndarray, np.ndarray]:
+    """The structure with these dofs free, and its rows that are moved (s) and the others (f)."""
+    dofs, held = np.asarray(dofs, dtype=np.int64), assembly.supports
+    moved = np.isin(8 * held[:, 0] + held[:, 1], 8 * dofs[:, 0] + dofs[:, 1])
+    built = structure(replace(assembly, supports=held[~moved]))
+    s = _at(built, dofs)
+    return built, s, np.setdiff1d(np.arange(len(built.system.dofs)), s)
+
+
+def driven(
+    assembly: Assembly,
+    dofs: np.ndarray,
+    values: np.ndarray,
+    frequency: np.ndarray,
+    outputs: np.ndarray,
+    modal: ModalModel | None = None,
+) -> np.ndarray:
+    """Motion where dofs vibrate with given amplitudes, Z_ff q_f = -Z_fs q_s (n_f, n_out, k) [m].
+
+    Parameters
+    ----------
+    dofs : (s, 2) int        row of points and component 1-6 that are moved, supports or not
+    values : (n_f, s, k)     their complex displacements, or (s, k) for all lines [m]
+    frequency : (n_f,)       [Hz]
+    outputs : (n_out, 2)     point id and component 1-6
+    modal : ModalModel       of the structure with the moved dofs held, damped: the sum over these
+                             modes of the absolute motion, as SOL 111 does it with SPCD; without it
+                             the equations are solved line by line
+    """
+    built, s, f = _split(assembly, dofs)
+    free = built.system.dofs[f]
+    answer = _line_by_line(free) if modal is None else _by_modes(modal, free)
+    omega = 2 * np.pi * np.asarray(frequency, dtype=float)
+    u_s = np.broadcast_to(values, (len(omega), *np.shape(values)[-2:]))
+    pick, whole = built.rows(outputs), built.hysteretic()
+    H = np.empty((len(omega), len(outputs), u_s.shape[2]), dtype=complex)
+    for k, w in enumerate(omega):
+        Z = sp.csr_array(whole.K + 1j * w * whole.V - w**2 * whole.M)
+        q = np.zeros((len(built.system.dofs), u_s.shape[2]), dtype=complex)
+        q[s] = u_s[k]
+        q[f] = answer(w, sp.csr_array(Z[f][:, f]), -(Z[f] @ q))
+        H[k] = pick @ q
+    return H
+
+
+Answer = Callable[[float, sp.csr_array, np.ndarray], np.ndarray]
+
+
+def _line_by_line(dofs: np.ndarray) -> Answer:
+    """Z⁻¹ f."""
+    return lambda _, Z, f: factorise(Z, nodes=dofs[:, 0], definite=False).solve(f)
+
+
+def _by_modes(modal: ModalModel, dofs: np.ndarray) -> Answer:
+    """Σ φ φᵀ f / (ω_r² - ω² + 2 i ζ_r ω_r ω)."""
+    phi, w_r = _shapes_at(modal, dofs), 2 * np.pi * modal.frequency
+
+    def answer(w: float, _: sp.csr_array, f: np.ndarray) -> np.ndarray:
+        line = w_r**2 - w**2 + 2j * modal.damping * w_r * w
+        return np.asarray(phi @ (phi.T @ f / line[:, None]))
+
+    return answer
+
+
+def _shapes_at(modal: ModalModel, dofs: np.ndarray) -> np.ndarray:
+    """Rows of Φ at (point id, component)."""
+    at = rows(dofs, modal.dofs)
+    if np.any(at < 0):
+        point, component = dofs[np.argmax(at < 0)]
+        raise LabelError(f"the modes have no {point}:+{COMPONENTS[component - 1]}")
+    return np.asarray(modal.shapes[at])
+
+
 def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
     """Rows of the system at (row of points, component)."""
-    key = 8 * built.system.dofs[:, 0] + built.system.dofs[:, 1]
-    want = 8 * built.assembly.ids[dofs[:, 0]] + dofs[:, 1]
-    order = np.argsort(key)
-    at = order[np.minimum(np.searchsorted(key, want, sorter=order), len(key) - 1)]
-    if np.any(missing := key[at] != want):
+    wanted = np.column_stack([built.assembly.ids[dofs[:, 0]], dofs[:, 1]])
+    at = rows(wanted, built.system.dofs)
+    if np.any(missing := at < 0):
         point, component = built.assembly.ids[dofs[missing][0, 0]], dofs[missing][0, 1]
         raise LabelError(
             f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, "

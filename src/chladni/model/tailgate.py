@@ -14,7 +14,7 @@ from .connections_bolts import accelerometers
 from .mesher_sheets import Sheet
 from .properties import Part, ShellSection
 from .tailgate_design import STEEL, TailgateDesign
-from .tailgate_formed import corner_thickness, nominal, thickness_field
+from .tailgate_formed import corner_thickness, forming, nominal
 from .tailgate_joints import Frame, hem_strings, middle_string, screwed, tied_holes, welded
 from .tailgate_parts import pressings, without_side
 from .tailgate_shape import Skin
@@ -111,9 +111,10 @@ def with_formed(
     if not skin.design.formed:
         return assembly
     t = assembly.shells.thickness.copy()
-    fields = {p.name: thickness_field(skin, p.name) for p in assembly.parts}
+    made = {p.name: forming(skin, p.name) for p in assembly.parts}
     for name, sheet in sheets.items():
-        t[rows[name]] = corner_thickness(fields[without_side(name)], sheet.plan[sheet.quads])
+        field = made[without_side(name)].thickness
+        t[rows[name]] = corner_thickness(field, sheet.plan[sheet.quads])
     return replace(assembly, shells=replace(assembly.shells, thickness=t))
 
 

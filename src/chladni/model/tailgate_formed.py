@@ -12,6 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from .mesher_formed import FormedMesh
+from .mesher_graded import graded, loops
+from .mesher_pairing import paired
+from .mesher_sheets import MAIN, Sheet
 from .tailgate_design import TailgateDesign
 from .tailgate_parts import (
     BRACKET,
@@ -21,12 +25,14 @@ from .tailgate_parts import (
     OUTER_LOWER,
     OUTER_UPPER,
     UPPER,
+    pressings,
     without_side,
 )
 from .tailgate_shape import Skin
 
 STEP = 2.5e-3  # of the grid on which curvature is taken [m]
 BENT, STRETCHED = 40.0, 0.35  # κ [1/m] and stretch that count as much
+COARSEST = 22e-3  # size of the forming mesh where the sheet is flat [m]
 MOST = 0.38  # thinning no sheet survives
 STRENGTH = {  # a, per part
     INNER: 0.33,
@@ -116,23 +122,49 @@ def _box(skin: Skin, name: str) -> tuple[np.ndarray, np.ndarray]:
         low = np.array([low[0], d.split - d.tongue[0]])
     elif part == OUTER_LOWER:
         high = np.array([high[0], d.split])
-    return low - 0.02, high + 0.02
+    return np.asarray(low - 0.02), np.asarray(high + 0.02)
 
 
-def thickness_field(skin: Skin, name: str) -> Callable[[np.ndarray], np.ndarray]:
-    """t(y, s) [m] of a sheet after forming, as a function of planform points (n, 2 or 3)."""
-    part = without_side(name)
+@dataclass(frozen=True, eq=False)
+class Forming:
+    """What forming did to one part, over the planform; pairs are stored once, for y > 0.
+
+    Attributes
+    ----------
+    gauge : float          of the blank [m]
+    strength : float       a of this part
+    kappa : Field          curvature [1/m]
+    indicator : Field
+    paired : bool          left and right parts share the fields
+    """
+
+    gauge: float
+    strength: float
+    kappa: Field
+    indicator: Field
+    paired: bool
+
+    def _stored(self, plan: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.abs(plan[:, 0]), plan[:, 1]]) if self.paired else plan[:, :2]
+
+    def thickness(self, plan: np.ndarray) -> np.ndarray:
+        """t(y, s) = t₀ (1 - min(a i, 0.38)) [m] at planform points (n, 2 or 3)."""
+        thinning = self.strength * self.indicator.at(self._stored(plan))
+        return np.asarray(self.gauge * (1 - np.minimum(thinning, MOST)))
+
+    def size(self, plan: np.ndarray, finest: float) -> np.ndarray:
+        """Size of the forming mesh [m]: 22 mm where flat, down to `finest` where κ > 30 1/m."""
+        bent = np.minimum(1, self.kappa.at(self._stored(plan)) / 30)
+        return COARSEST - (COARSEST - finest) * bent
+
+
+def forming(skin: Skin, part: str) -> Forming:
+    """What forming does to a part; a folded flange has its rim's thickness."""
     kappa, stretch = curvature(skin, part)
     bent = (kappa.values / (kappa.values + BENT)) ** 1.35
     indicator = replace(kappa, values=0.95 * bent + 0.05 * stretch.values / STRETCHED)
     gauge = nominal(skin.design)[part]
-    paired = part in (UPPER, LOWER)
-
-    def thickness(plan: np.ndarray) -> np.ndarray:
-        left = np.column_stack([np.abs(plan[:, 0]), plan[:, 1]]) if paired else plan[:, :2]
-        return gauge * (1 - np.minimum(STRENGTH[part] * indicator.at(left), MOST))
-
-    return thickness
+    return Forming(gauge, STRENGTH[part], kappa, indicator, part in (UPPER, LOWER))
 
 
 def nominal(d: TailgateDesign) -> dict[str, float]:
@@ -158,3 +190,35 @@ def corner_thickness(field: Callable[[np.ndarray], np.ndarray], cells: np.ndarra
     weight = np.array([near**2, near * far, far**2, near * far])
     places = np.stack([np.einsum("c,nci->ni", np.roll(weight, k), cells) for k in range(4)], axis=1)
     return field(places.reshape(-1, cells.shape[-1])).reshape(len(cells), 4)
+
+
+def forming_mesh(skin: Skin, finest: float = 5.5e-3) -> FormedMesh:
+    """All pressings, hems unfolded, on a graded mesh of their own with formed thickness."""
+    fine = replace(skin, design=replace(skin.design, size=0.010))
+    made = {part: forming(skin, part) for part in STRENGTH}
+    sheets = [
+        _formed_sheet(skin, sheet, made[without_side(name)], finest)
+        for name, sheet in pressings(fine).items()
+    ]
+    parts = list(STRENGTH)
+    ids = [parts.index(without_side(name)) + 1 for name in pressings(fine)]
+    start = np.cumsum([0] + [len(x) for x, _, _ in sheets])
+    return FormedMesh(
+        np.arange(1, start[-1] + 1),
+        np.vstack([x for x, _, _ in sheets]),
+        np.vstack([cells + n for (_, cells, _), n in zip(sheets, start[:-1], strict=True)]),
+        np.concatenate([np.full(len(c), k) for (_, c, _), k in zip(sheets, ids, strict=True)]),
+        np.vstack([t for _, _, t in sheets]),
+        dict(enumerate(parts, start=1)),
+    )
+
+
+def _formed_sheet(
+    skin: Skin, sheet: Sheet, made: Forming, finest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 3), cells (m, 4) and corner thickness (m, 4) of one pressing."""
+    border = loops(sheet.quads[sheet.zone == MAIN], sheet.plan[:, :2])
+    plan, T = graded(border, lambda at: made.size(at, finest), COARSEST, finest)
+    points = skin.at(np.column_stack([plan, depth_field(skin, sheet.name)(plan)]))
+    cells = paired(plan, T, set())
+    return points, cells, made.thickness(plan)[cells]

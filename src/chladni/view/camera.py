@@ -44,21 +44,47 @@ class Camera:
         return (u1 - u0) / (v1 - v0)
 
 
-def best_view(seen: Surface, tilt: float = 24.0) -> Camera:
+def best_view(seen: Surface, focus: np.ndarray | None = None, tilt: float = 24.0) -> Camera:
     """The direction of largest projected area ½ Σ |a · d|, tilted a little so that depth shows.
 
     Areas are counted over 400 directions spread by the golden angle (Vogel 1979); a structure
-    without faces is seen along the direction in which its points spread least.
+    without faces is seen along the direction in which its points spread least. Where ``focus``
+    (k, 3) points are better seen from behind, the eye goes there.
     """
     d = _broadest(seen)
+    front = _looking(d, seen, tilt)
+    if focus is None or not len(focus) or not len(seen.faces):
+        return front
+    back = _looking(-d, seen, tilt)
+    return back if _visible(back, seen, focus) > 1.05 * _visible(front, seen, focus) else front
+
+
+def _looking(d: np.ndarray, seen: Surface, tilt: float) -> Camera:
+    """The camera that looks along -d, after the tilt."""
     up = _upright(d, seen)
     right = np.cross(up, d)
-    above = tilt if abs(d[2]) > 0.8 else -tilt  # either way the eye is above the front edge
+    above = tilt * np.sign(d[2]) if abs(d[2]) > 0.8 else -tilt  # the eye is above the front edge
     toward = _turned(_turned(d, right, above), up, 0.7 * tilt)
     right = np.cross(up, toward)
     right /= np.linalg.norm(right)
     up = np.cross(toward, right)
     return Camera(right, up, toward, (0.0, 1.0, 0.0, 1.0)).framing(seen.points[seen.used])
+
+
+def _visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 80) -> float:
+    """Share of the points that nothing lies clearly in front of, on a coarse depth map."""
+    middle = seen.points[seen.faces].mean(axis=1)
+    u0, u1, v0, v1 = camera.window
+
+    def cell(points: np.ndarray) -> np.ndarray:
+        ij = (camera.project(points) - [u0, v0]) / [u1 - u0, v1 - v0] * cells
+        i, j = np.clip(ij.astype(int), 0, cells - 1).T
+        return np.asarray(i * cells + j)
+
+    nearest = np.full(cells**2, -np.inf)
+    np.maximum.at(nearest, cell(middle), camera.depth(middle))
+    hidden = nearest[cell(focus)] - camera.depth(focus)
+    return float(np.mean(hidden < 0.012 * seen.size))
 
 
 def _broadest(seen: Surface) -> np.ndarray:

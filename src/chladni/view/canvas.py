@@ -17,7 +17,8 @@ from .probe import prepare
 from .surface import Surface
 
 GREY = (0.80, 0.82, 0.85)
-_AMBIENT, _DIFFUSE = 0.55, 0.50
+_AMBIENT, _DIFFUSE = 0.52, 0.54
+_KEY = 0.6  # share of the lamp over the shoulder, the rest comes from the eye
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,9 @@ def _photo(seen: Surface, camera: Camera, paint: Paint, width: int) -> np.ndarra
     width = max(64, min(width, 3200))
     height = max(64, round(width / camera.aspect))
     plotter = pv.Plotter(off_screen=True, window_size=[width, height], lighting="none")
-    plotter.add_light(pv.Light(position=tuple(_lamp(camera)), light_type="scene light"))
+    for lamp, power in ((_lamp(camera), _KEY), (camera.toward, 1 - _KEY)):
+        light = pv.Light(position=tuple(lamp), light_type="scene light", intensity=power)
+        plotter.add_light(light)
     if len(seen.faces):
         plotter.add_mesh(_polydata(seen), **_look(seen, paint, width))
     if len(seen.lines):
@@ -151,7 +154,9 @@ def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
     if len(seen.faces):
         corners = seen.points[seen.faces]
         order = np.argsort(camera.depth(corners.mean(axis=1)))
-        shade = _AMBIENT + _DIFFUSE * np.abs(seen.normals() @ _lamp(camera))
+        n = seen.normals()
+        lit = _KEY * np.abs(n @ _lamp(camera)) + (1 - _KEY) * np.abs(n @ camera.toward)
+        shade = _AMBIENT + _DIFFUSE * lit
         colour = np.clip(_colours(seen, paint)[:, :3] * shade[:, None], 0, 1)[order]
         line = 0.82 * colour if paint.edges else colour
         polygons = camera.project(corners.reshape(-1, 3)).reshape(-1, 4, 2)[order]

@@ -21,6 +21,7 @@ from .canvas import Paint, draw
 from .surface import Surface
 
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
+_GHOST = 70.0  # degrees of a fold that the undeformed outline shows
 _MANY = 6000  # above so many faces element edges would only blacken the picture
 
 
@@ -129,7 +130,8 @@ def sensors(
     path: Path | str, seen: Surface, outputs: Sequence[Marker], inputs: Sequence[Marker] = ()
 ) -> Path:
     """Where sensors (blue) and shakers (red) sit and which way they point."""
-    figure, ax = _sheet(camera := best_view(seen))
+    focus = np.array([m.point for m in (*outputs, *inputs)]).reshape(-1, 3)
+    figure, ax = _sheet(camera := best_view(seen, focus))
     draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
     reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
     for markers, colour, name in (
@@ -155,7 +157,9 @@ def location(
 
     ``faces`` (m,) bool are coloured: the parts or elements that are meant.
     """
-    figure, ax = _sheet(camera := best_view(seen))
+    meant = seen.points[seen.faces[faces]].mean(axis=1) if faces is not None else np.zeros((0, 3))
+    focus = meant if point is None else np.asarray(point, dtype=float)[None]
+    figure, ax = _sheet(camera := best_view(seen, focus))
     values = None if faces is None else np.where(faces, 0.55, np.nan)
     draw(ax, seen, camera, Paint(values, (0.0, 1.0), "Reds", len(seen.faces) < _MANY))
     if point is not None:
@@ -201,7 +205,7 @@ def _swung(
         (0.0, 1.0),
         "viridis",
         len(seen.faces) < _MANY,
-        seen.points[seen.outline()],
+        seen.points[seen.outline(_GHOST)],
     )
     draw(ax, moved, camera, colours)
 

@@ -1,7 +1,10 @@
 """Numbers as Nastran writes them: "1.5-3", "1.", "1.D+3", ".5"; whole columns at once."""
 
+import re
+
 import numpy as np
 
+_BARE_EXPONENT = re.compile(r"([0-9.])([+-])")
 _DIGIT_OR_DOT = np.zeros(256, bool)
 _DIGIT_OR_DOT[list(b"0123456789.")] = True
 
@@ -69,20 +72,26 @@ def integers(text: np.ndarray, blank: int) -> tuple[np.ndarray, int]:
     return np.where(empty, blank, values), bad
 
 
-def _fixed(value: float, width: int) -> list[str]:
-    """Fixed-point spellings, the longest first."""
-    texts = (f"{value:.{digits}f}" for digits in range(width, -1, -1))
-    texts = (t if "." in t else t + "." for t in texts)
-    return [t.replace("0.", ".", 1) if t.lstrip("-").startswith("0.") else t for t in texts]
+def _fixed(value: float, width: int) -> tuple[str, int]:
+    """(fixed-point spelling, its significant digits)."""
+    size = abs(value)
+    whole = len(str(int(size))) if size >= 1 else 0
+    decimals = width - whole - 1 - (value < 0)
+    text = f"{value:.{max(decimals, 0)}f}"
+    text = text if "." in text else text + "."
+    if whole == 0:
+        text = text.replace("0.", ".", 1)
+    zeros = 0 if size >= 1 or size == 0 else -int(np.floor(np.log10(size))) - 1
+    return text, (whole + decimals - zeros if len(text) <= width else 0)
 
 
-def _exponent(value: float, width: int) -> list[str]:
-    """Nastran's short exponents, 1.234-5, the longest first."""
-    out = []
-    for digits in range(width, -1, -1):
-        mantissa, power = f"{value:.{digits}e}".split("e")
-        out.append((mantissa if "." in mantissa else mantissa + ".") + f"{int(power):+d}")
-    return out
+def _exponent(value: float, width: int) -> tuple[str, int]:
+    """(Nastran's short exponent spelling, 1.234-5, its significant digits)."""
+    power = f"{int(f'{value:.17e}'.split('e')[1]):+d}"
+    digits = width - len(power) - 2 - (value < 0)
+    mantissa, power = f"{value:.{max(digits, 0)}e}".split("e")
+    text = (mantissa if "." in mantissa else mantissa + ".") + f"{int(power):+d}"
+    return text, (digits + 1 if len(text) <= width else 0)
 
 
 def _shortest(text: str) -> str:
@@ -102,38 +111,46 @@ def real(value: float, width: int = 8) -> str:
     '.001234567'
     """
     value = float(value)
-    best, error = "", np.inf
-    for spellings in (_fixed(value, width), _exponent(value, width)):
-        for text in spellings:
-            short = _shortest(text)
-            if len(short) <= width:
-                off = abs(parse_real(short) - value)
-                if off < error or (off == error and len(short) < len(best)):
-                    best, error = short, off
-                break
-    return best
+    plain = f"{value:.6g}"
+    if plain == f"{value:.{width}g}" and "e" not in plain and len(plain) < width:
+        text = plain if "." in plain else plain + "."
+        return text.replace("0.", ".", 1) if value and abs(value) < 1 else text
+    fixed, exponent = _fixed(value, width), _exponent(value, width)
+    text, digits = fixed if fixed[1] >= exponent[1] else exponent
+    return _shortest(text if digits > 0 else exponent[0])
 
 
 def parse_real(text: str) -> float:
-    """Value of one Nastran real; nan where the text is none."""
-    values, bad = reals(np.array([text.strip().upper().encode()]), 0.0)
-    return float("nan") if bad >= 0 else float(values[0])
+    """Value of one Nastran real; nan where the text is none.
+
+    >>> parse_real("1.5-3"), parse_real("2.D+3"), parse_real("x")
+    (0.0015, 2000.0, nan)
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        word = _BARE_EXPONENT.sub(r"\1E\2", text.strip().upper().replace("D", "E"))
+        try:
+            value = float(word)
+        except ValueError:
+            return float("nan")
+    return value if np.isfinite(value) else float("nan")
 
 
 def field(value: float | int | str | None, width: int = 8) -> str:
     """A field's text: reals as precise as the width allows, integers and words as they are."""
     if value is None:
         return ""
-    if isinstance(value, str | int | np.integer) and not isinstance(value, bool):
-        return str(value)
-    return real(float(value), width)
+    if isinstance(value, float):  # numpy's float64 is one
+        return real(value, width)
+    return str(value)
 
 
-def fits(value: float | int | str | None, width: int = 8, tolerance: float = 1e-6) -> bool:
-    """True where so many columns hold the value to the relative tolerance."""
+def fitted(value: float | int | str | None, width: int, tolerance: float) -> str | None:
+    """A field's text; None where so many columns do not hold it to the relative tolerance."""
     text = field(value, width)
     if len(text) > width:
-        return False
-    if isinstance(value, float | np.floating):
-        return abs(parse_real(text) - value) <= tolerance * abs(value)
-    return True
+        return None
+    if isinstance(value, float):
+        return text if abs(parse_real(text) - value) <= tolerance * abs(value) else None
+    return text

@@ -21,7 +21,7 @@ class Include:
     first: int
     past: int
     name: str
-    file: int  # position in Deck.sources; -1: a missing one before CEND, which is no bulk data
+    file: int  # position in Deck.sources; -1: above BEGIN BULK, so no bulk data
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +117,10 @@ def _includes(
         name, after = _statement(path, lines, first)
         asked = f"{path}:{first + 1}: INCLUDE "
         target = _target(name, path, above)
-        executive = first < bulk and (first < cend or cend < 0)
         file = -1
-        if not (executive or first < bulk) or target.is_file():
+        if first >= bulk:
             file = _load(target, above, found, asked)
-        elif not executive:
+        elif 0 <= cend < first and not target.is_file():
             raise FileError(f"{asked}{target} does not exist")
         out.append(Include(first, after, name, file))
     return tuple(out)

@@ -1,0 +1,240 @@
+"""Poles and residues of a recording, with their spread, down to the noise floor.
+
+Weighted common-pole fit on any frequency grid; see `fitting` and `selection`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..errors import FileError, ShapeError
+from .fitting import Data, Fit, Slope, polish
+from .selection import ORDERS, Rule, Sweep, extended, settled, start, swept
+
+DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """H(s) = s^q [Σ_r R_r/(s-p_r) + R̄_r/(s-p̄_r) + L/s² + U], with the spread of the poles.
+
+    Attributes
+    ----------
+    poles : (r,) complex             p_r [rad/s], by increasing |p|
+    residues : (r, n_out, n_in)      R_r of the receptance
+    lower, upper : (n_out, n_in)     L, U: modes below and above the band
+    frequency_sd, damping_sd : (r,)  standard deviations [Hz], [-]
+    gain : (r,)                      rise of χ² without the pole, over what it must pay
+    chi : float                      rms of the whitened residual (1: the noise is all that is left)
+    noise : float                    √(χ² per degree of freedom) taken as noise
+    outputs, inputs, quantity        as in the recording
+    band : (low, high)               [Hz] that was fitted
+    diagram : Sweep                  poles of every order, [rad/s]: the stabilisation diagram
+    """
+
+    poles: np.ndarray
+    residues: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    frequency_sd: np.ndarray
+    damping_sd: np.ndarray
+    gain: np.ndarray
+    chi: float
+    noise: float
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    quantity: str
+    band: tuple[float, float]
+    diagram: Sweep
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """|p| / 2π [Hz]."""
+        return np.abs(self.poles) / (2 * np.pi)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """ζ = -Re p / |p|."""
+        return -self.poles.real / np.abs(self.poles)
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return len(self.poles)
+
+    def sel(self, modes: np.ndarray | slice) -> Self:
+        """Some of the modes; the residual terms stay."""
+        names = ("poles", "residues", "frequency_sd", "damping_sd", "gain")
+        return replace(self, **{name: getattr(self, name)[modes] for name in names})
+
+
+def spread(frf: FRF, averages: int | None = None) -> tuple[np.ndarray, bool]:
+    """Variance E|ΔH|² of every sample, and whether its scale is known.
+
+    In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
+    Piersol 2010, eq. 9.81), smoothed over nine lines; 1 % of |H| and 0.1 % of its rms.
+    """
+    H = np.abs(frf.values)
+    rms = np.sqrt((H**2).mean(axis=0))
+    if frf.variance is not None:
+        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2, True
+    if frf.coherence is not None:
+        gamma = np.clip(frf.coherence, 1e-3, 1.0)
+        ratio = _smooth((1 - gamma) / gamma)
+        return (ratio / (averages or 1) + 0.005**2) * H**2 + (1e-4 * rms) ** 2, bool(averages)
+    return (0.01 * H) ** 2 + (1e-3 * rms) ** 2, False
+
+
+def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
+    """Moving mean over the first axis."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(x, min(width, len(x)), axis=0, mode="nearest"))
+
+
+def identify(
+    frf: FRF,
+    band: tuple[float, float] | None = None,
+    orders: tuple[int, ...] = ORDERS,
+    largest_damping: float = 0.1,
+    averages: int | None = None,
+    use: np.ndarray | None = None,
+    tries: int = 12,
+) -> Identified:
+    """Modes of a recording.
+
+    Parameters
+    ----------
+    frf : any quantity, one channel or many, frequencies spaced as they please
+    band : Hz, default: all lines above zero
+    orders : numbers of poles of the sweep
+    largest_damping : poles beyond are no modes
+    averages : of the estimate, where the spread comes from the coherence
+    use : (n_f,) bool, lines that count (a gap, the cord's band left out)
+    tries : attempts to add a pole where the residual stands out
+
+    Raises
+    ------
+    FileError
+        If the band holds too few lines.
+    """
+    keep = frf.frequency > 0
+    if band is not None:
+        keep &= (band[0] <= frf.frequency) & (frf.frequency <= band[1])
+    if use is not None:
+        keep &= use
+    if keep.sum() < 12:
+        raise FileError(
+            f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
+            f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+        )
+    data, top, known = _data(frf, keep, averages)
+    sweep = swept(data, orders, largest_damping)
+    floor = float(sweep.chi.min()) ** 2
+    noise = max(1.0, floor) if known else floor
+    rule = Rule(data.y.shape[1], len(data.s), noise, largest_damping)
+    p = start(data, sweep, rule)
+    fit, slope = settled(data, p, rule)
+    fit, slope = extended(data, fit, slope, rule, tries)
+    fit, slope = polish(data, fit.p, rule.largest, tol=0.05 * noise)
+    return _result(frf, keep, data, top, fit, slope, sweep, noise, rule)
+
+
+def _data(frf: FRF, keep: np.ndarray, averages: int | None) -> tuple[Data, float, bool]:
+    """Scaled, weighted samples; the scale of s; whether the noise is known."""
+    variance, known = spread(frf, averages)
+    s = 2j * np.pi * frf.frequency[keep]
+    top = float(np.abs(s).max())
+    y = frf.values[keep].reshape(len(s), -1)
+    v = variance[keep].reshape(len(s), -1)
+    fine = np.isfinite(y) & np.isfinite(v) & (v > 0)
+    w = np.where(fine, np.sqrt(2 / np.where(fine, v, 1.0)), 0.0)
+    if not w.any():
+        raise ShapeError("no sample of the recording is a finite number other than zero")
+    q = DERIVATIVES[frf.quantity]
+    return Data(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top, known
+
+
+def _result(
+    frf: FRF,
+    keep: np.ndarray,
+    data: Data,
+    top: float,
+    fit: Fit,
+    slope: Slope,
+    sweep: Sweep,
+    noise: float,
+    rule: Rule,
+) -> Identified:
+    """Back to rad/s and labels, poles in order, spreads from the Gauss-Newton matrix."""
+    n_out, n_in = len(frf.outputs), len(frf.inputs)
+    parameters = fit.x.size + 2 * len(fit.p)
+    chi = np.sqrt(fit.chi2 / max(data.samples - parameters, 1))
+    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, chi) ** 2
+    sd_f, sd_z = _spreads(fit.p, C)
+    order = np.argsort(np.abs(fit.p))
+    shape = (n_out, n_in)
+    f = frf.frequency[keep]
+    return Identified(
+        poles=top * fit.p[order],
+        residues=top * fit.residues[order].reshape(-1, *shape),
+        lower=top**2 * fit.x[-2].reshape(shape),
+        upper=fit.x[-1].reshape(shape),
+        frequency_sd=top * sd_f[order] / (2 * np.pi),
+        damping_sd=sd_z[order],
+        gain=fit.gain[order] / rule.price,
+        chi=float(chi),
+        noise=float(np.sqrt(noise)),
+        outputs=frf.outputs,
+        inputs=frf.inputs,
+        quantity=frf.quantity,
+        band=(float(f[0]), float(f[-1])),
+        diagram=replace(sweep, poles=top * sweep.poles),
+    )
+
+
+def _spreads(p: np.ndarray, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of |p| and of ζ from the covariance of (Re p, Im p) (r,)."""
+    k = 2 * np.arange(len(p))
+    blocks = np.stack([C[k, k], C[k, k + 1], C[k + 1, k + 1]], axis=-1)
+    size = np.abs(p)
+    d_size = np.stack([p.real, p.imag], -1) / size[:, None]
+    d_zeta = np.stack([-(p.imag**2), p.real * p.imag], -1) / size[:, None] ** 3
+    sd = [
+        np.sqrt(np.maximum(d[:, 0] ** 2 * blocks[:, 0] + 2 * d[:, 0] * d[:, 1] * blocks[:, 1]
+                           + d[:, 1] ** 2 * blocks[:, 2], 0.0))
+        for d in (d_size, d_zeta)
+    ]  # fmt: skip
+    return sd[0], sd[1]
+
+
+def evaluate(
+    identified: Identified,
+    s: np.ndarray,
+    poles: np.ndarray | None = None,
+    residues: np.ndarray | None = None,
+) -> np.ndarray:
+    """H(s) of the identified model (n_s, n_out, n_in), s complex [rad/s]."""
+    s = np.asarray(s, complex)[:, None]
+    p = identified.poles if poles is None else poles
+    R = identified.residues if residues is None else residues
+    shape = identified.lower.shape
+    r = R.reshape(len(p), -1)
+    H = (1 / (s - p)) @ r + (1 / (s - p.conj())) @ r.conj()
+    H = H + identified.lower.ravel() / s**2 + identified.upper.ravel()
+    return np.asarray((s ** DERIVATIVES[identified.quantity] * H).reshape(-1, *shape))
+
+
+def equalised(identified: Identified, s: np.ndarray) -> np.ndarray:
+    """H_X(s) with every pole moved to the imaginary axis, p -> i|p| (n_s, n_out, n_in).
+
+    Evaluated on s = ω(ζ_e + i) it meets the undamped model Σ φ φᵀ / (ω_r² + s²) on the same
+    line, with no pairing of modes. The residue φφᵀ / 2i Im p becomes φφᵀ / 2i |p|.
+
+    Abrahamsson and Kammer (2015), IMAC XXXIII, eqs. 26.14-26.28 (damping equalisation).
+    """
+    p = identified.poles
+    R = identified.residues * (p.imag / np.abs(p))[:, None, None]
+    return evaluate(identified, s, 1j * np.abs(p), R)

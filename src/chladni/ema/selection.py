@@ -1,0 +1,192 @@
+"""Which poles a recording supports: order sweep, clusters, adding and deleting by χ².
+
+Sweep of orders and stable clusters: Van der Auweraer and Peeters (2004), J. Mech. Eng. 50(3);
+adding and deleting by the fall of χ² against its cost in parameters.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fitting import Data, Fit, Slope, bounded, polish, relocated, solve, stacked
+
+ORDERS = (6, 10, 15, 22, 31, 42, 56)
+_VF_STEPS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Poles of every order tried: the stabilisation diagram.
+
+    Attributes
+    ----------
+    order : (k,) int      number of pole pairs of the fit each pole comes from
+    poles : (k,) complex  scaled as the data
+    gain : (k,)           rise of χ² without the pole
+    chi : (n_orders,)     rms of the whitened residual, by order
+    orders : (n_orders,) int
+    """
+
+    order: np.ndarray
+    poles: np.ndarray
+    gain: np.ndarray
+    chi: np.ndarray
+    orders: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """When a pole is worth its parameters."""
+
+    channels: int
+    lines: int
+    noise: float = 1.0  # χ² per degree of freedom that counts as noise
+    largest: float = 0.1  # damping ratio of the most damped pole
+    factor: float = 2.5
+
+    @property
+    def price(self) -> float:
+        """Fall of χ² a pole must bring: 2.5 for each parameter and 4 ln(lines) for the search."""
+        parameters = 2 * self.channels + 2
+        return self.noise * (self.factor * parameters + 4 * np.log(self.lines))
+
+
+def compressed(data: Data, most: int = 8) -> Data:
+    """At most ``most`` real combinations of the channels, lines weighted alike for all.
+
+    Channels are scaled to one and every line to the rms over channels, so that small responses
+    count as large ones do.
+    """
+    used = data.w > 0
+    scale = np.sqrt((np.abs(data.y) ** 2).mean(axis=0))
+    y = np.where(used, data.y, 0) / np.maximum(scale, 1e-300)
+    g = 1 / np.sqrt(np.maximum((np.abs(y) ** 2).mean(axis=1), 1e-12))
+    _, _, V = np.linalg.svd(stacked(g[:, None] * y), full_matrices=False)
+    k = min(most, len(V))
+    g = np.where(used.any(axis=1), g, 0.0)
+    return Data(data.s, y @ V[:k].T, np.repeat(g[:, None], k, axis=1), data.q)
+
+
+def swept(data: Data, orders: tuple[int, ...] = ORDERS, largest: float = 0.1) -> Sweep:
+    """Vector fitting at growing order, until χ² no longer falls by what the poles cost."""
+    small = compressed(data)
+    f = np.abs(data.s)
+    order: list[int] = []
+    poles: list[complex] = []
+    gain: list[float] = []
+    chi: list[float] = []
+    done: list[int] = []
+    best = np.inf
+    for n in orders:
+        if n > len(f) // 6 and done:
+            break
+        n = min(n, max(2, len(f) // 6))
+        p = np.quantile(f, (np.arange(n) + 0.5) / n) * (-0.01 + 1j)
+        for _ in range(_VF_STEPS):
+            p = relocated(small, p)
+        fit, _ = solve(data, bounded(p, 10 * largest))
+        parameters = fit.x.size + 2 * len(p)
+        order += [n] * len(p)
+        poles += list(fit.p)
+        gain += list(fit.gain)
+        done.append(n)
+        chi.append(float(np.sqrt(fit.chi2 / max(data.samples - parameters, 1))))
+        score = fit.chi2 + 2 * parameters
+        if score > best and len(done) > 2 and chi[-1] < 1.2 * min(chi):
+            break
+        best = min(best, score)
+    return Sweep(np.array(order), np.array(poles), np.array(gain), np.array(chi), np.array(done))
+
+
+def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
+    """Numbers of poles of different orders that agree, one array a cluster, richest order first.
+
+    Each leading pole takes the nearest of every other order that lies within the sum of the two
+    half bandwidths.
+    """
+    p, order = sweep.poles, sweep.order
+    free = among.copy()
+    found = []
+    for k in np.argsort(-order, kind="stable"):
+        if not free[k]:
+            continue
+        reach = np.maximum(np.abs(p.real) + abs(p[k].real), 1e-4 * np.abs(p))
+        near = np.flatnonzero(free & (np.abs(p - p[k]) < reach))
+        each = [min(near[order[near] == n], key=lambda i: abs(p[i] - p[k])) for n in {*order[near]}]
+        free[each] = False
+        found.append(np.array(each))
+    return found
+
+
+def start(data: Data, sweep: Sweep, rule: Rule) -> np.ndarray:
+    """Poles to begin with: what pays in the richest order, and clusters the rest agree on."""
+    p, richest = sweep.poles, sweep.orders.max()
+    low, high = 0.9 * float(np.abs(data.s).min()), 1.1 * float(np.abs(data.s).max())
+    fits = (low < np.abs(p)) & (np.abs(p) < high) & (sweep.gain > rule.price)
+    fits &= -p.real / np.abs(p) < rule.largest
+    leading = [g for g in clusters(sweep, fits) if sweep.order[g[0]] == richest or len(g) > 2]
+    chosen = p[[g[0] for g in leading]]
+    small = compressed(data)
+    for _ in range(_VF_STEPS if len(chosen) else 0):
+        chosen = relocated(small, chosen)
+    return chosen
+
+
+def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 30) -> tuple[Fit, Slope]:
+    """Polish a little, take out what does not pay, again, until both are at rest.
+
+    A pole does not pay if χ² rises by less than its price without it, or if it has left the
+    neighbourhood of the band.
+    """
+    fit, slope = polish(data, p, rule.largest, 0)
+    for _ in range(rounds):
+        before = fit.chi2
+        poor = _poor(data, fit, rule)
+        if len(poor):
+            fit, slope = polish(data, np.delete(fit.p, poor), rule.largest, 0)
+        else:
+            fit, slope = polish(data, fit.p, rule.largest, 2, rule.noise)
+            if before - fit.chi2 < rule.noise and len(_poor(data, fit, rule)) == 0:
+                break
+    return fit, slope
+
+
+def _poor(data: Data, fit: Fit, rule: Rule) -> np.ndarray:
+    """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
+    low, high = 0.85 * float(np.abs(data.s).min()), 1.15 * float(np.abs(data.s).max())
+    away = (np.abs(fit.p) < low) | (np.abs(fit.p) > high)
+    gain = np.where(away, 0.0, fit.gain)
+    out: list[int] = []
+    for k in np.argsort(gain):
+        if gain[k] >= rule.price:
+            break
+        width = np.minimum(np.abs(fit.p[out].real), abs(fit.p[k].real))
+        if (np.abs(fit.p[out] - fit.p[k]) > 4 * width).all():
+            out.append(int(k))
+    return np.array(out, dtype=int)
+
+
+def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tuple[Fit, Slope]:
+    """Poles added where the residual stands out, as long as each pays for itself."""
+    f = np.abs(data.s)
+    closed = np.zeros(len(f), bool)
+    for _ in range(tries):
+        local = _local(fit, 2 * rule.noise)
+        local[closed] = 0
+        k = int(local.argmax())
+        if closed.all() or local[k] < 1.8 * np.median(local[~closed]):
+            break
+        zeta = float(np.median(-fit.p.real / np.abs(fit.p))) if len(fit.p) else 0.01
+        trial = bounded(np.append(fit.p, f[k] * (-zeta + 1j)), rule.largest)
+        better, better_slope = polish(data, trial, rule.largest, 8, rule.noise)
+        if fit.chi2 - better.chi2 > rule.price and better.gain.min() > rule.price:
+            fit, slope = better, better_slope
+        else:
+            closed[max(0, k - 4) : k + 5] = True
+    return fit, slope
+
+
+def _local(fit: Fit, expected: float) -> np.ndarray:
+    """χ² around each line over what noise gives (n_f,): moving mean of five lines."""
+    power = (np.abs(fit.e) ** 2).mean(axis=1) / expected
+    return np.convolve(power, np.ones(5) / 5, mode="same")

@@ -1,0 +1,80 @@
+"""What a forming simulation leaves: a mesh of its own with the thickness at its corners."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import readonly
+from ..errors import ModelError, ShapeError
+
+
+@dataclass(frozen=True, eq=False)
+class FormedMesh:
+    """Sheets with the thickness forming left them.
+
+    Attributes
+    ----------
+    ids : (n,) int            node ids of the file
+    points : (n, 3)           [m]
+    cells : (m, 4) int        rows of points; a triangle repeats its third; (0, 4): points alone
+    part : (m,) int           part id of each cell
+    thickness : (m, 4)        at the corners [m]
+    names : dict              part id -> name, where the file has them
+    nodal : (n,)              thickness at the points [m], NaN where no cell has any
+    """
+
+    ids: np.ndarray
+    points: np.ndarray
+    cells: np.ndarray
+    part: np.ndarray
+    thickness: np.ndarray
+    names: dict[int, str] = field(default_factory=dict)
+    nodal: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if self.thickness.shape != self.cells.shape or len(self.part) != len(self.cells):
+            raise ShapeError(
+                f"thickness is {self.thickness.shape}, cells {self.cells.shape}, "
+                f"part {self.part.shape}; one row per cell is due"
+            )
+        if not len(self.nodal):
+            object.__setattr__(self, "nodal", self._nodal())
+        known = self.nodal[np.isfinite(self.nodal)]
+        if len(known) and (known.min() <= 0 or known.max() > 0.05):
+            raise ModelError(
+                f"thickness runs from {known.min() * 1e3:g} to {known.max() * 1e3:g} mm; "
+                "sheets are 0 to 50 mm, is the unit system right?"
+            )
+        for name in ("points", "cells", "thickness", "nodal"):
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+
+    def _nodal(self) -> np.ndarray:
+        """Mean over the cells at each point."""
+        at, t = self.cells.ravel(), self.thickness.ravel()
+        n = len(self.points)
+        count = np.bincount(at, minlength=n)
+        total = np.bincount(at, t, minlength=n)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of each cell (m,) [m²]."""
+        x = self.points[self.cells]
+        return np.asarray(
+            np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1) / 2
+        )
+
+    def of_part(self, id_: int) -> "FormedMesh":
+        """The cells of one part, on the same points."""
+        mine = self.part == id_
+        if not mine.any():
+            known = ", ".join(f"{k} {self.names.get(k, '')}".strip() for k in np.unique(self.part))
+            raise ModelError(f"the formed mesh has no part {id_}; there are {known}")
+        return FormedMesh(
+            self.ids,
+            self.points,
+            self.cells[mine],
+            self.part[mine],
+            self.thickness[mine],
+            self.names,
+        )

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chladni.dynamics.damping import (
+    DampingTable,
+    equalised_poles,
+    modal_damping,
+    with_modal_damping,
+    with_table,
+)
+from chladni.dynamics.eigen import normal_modes
+from chladni.errors import ShapeError
+
+
+def table(frequency, value, kind="g"):
+    return DampingTable(np.array(frequency, float), np.array(value, float), kind)
+
+
+def test_the_three_kinds_say_the_same():
+    """ζ = g/2 = 1/2Q; without TYPE a table is g."""
+    f = np.array([1.0, 50.0])
+    for ratio in (DampingTable(f, f * 0 + 0.04).ratio(f), table(f, [25, 25], "q").ratio(f)):
+        np.testing.assert_allclose(ratio, 0.02)
+    np.testing.assert_allclose(table(f, [0.02, 0.02], "crit").ratio(f), 0.02)
+
+
+def test_lines_between_and_beyond_the_points():
+    t = table([10, 20, 40], [0.0, 0.1, 0.1], "crit")
+    np.testing.assert_allclose(
+        t.ratio(np.array([5, 10, 15, 20, 30, 100])), [-0.05, 0, 0.05, 0.1, 0.1, 0.1]
+    )
+
+
+def test_a_jump_counts_its_mean():
+    t = table([0, 10, 10, 20], [0.02, 0.02, 0.06, 0.06], "crit")
+    np.testing.assert_allclose(t.ratio(np.array([9.99, 10, 10.01])), [0.02, 0.04, 0.06])
+
+
+def test_one_point_is_a_constant():
+    np.testing.assert_allclose(table([5], [0.03], "crit").ratio(np.array([1.0, 9])), 0.03)
+
+
+def test_table_lands_on_the_modes(chain):
+    modal = with_table(normal_modes(chain), table([0, 100], [0, 0.1]))
+    np.testing.assert_allclose(modal.damping, modal.frequency / 100 * 0.05)
+
+
+def test_modal_damping_damps_each_mode_by_its_own(chain):
+    """Φᵀ V Φ = diag(2 ζ ω), the state matrix has the poles -ζω ± iω√(1-ζ²)."""
+    modal = normal_modes(chain).with_damping(np.linspace(0.01, 0.1, 10))
+    V = with_modal_damping(chain, modal).V
+    U, d = modal_damping(chain, modal)
+    np.testing.assert_allclose(modal.shapes.T @ V @ modal.shapes, np.diag(d), atol=1e-10)
+    np.testing.assert_allclose(V.toarray(), (U * d) @ U.T, atol=1e-10)
+
+
+@given(st.floats(1, 1e4), st.floats(0, 0.5), st.floats(1e-3, 0.5))
+def test_equalised_poles_keep_modulus_and_side(omega, zeta, new):
+    p = omega * (-zeta + 1j * np.sqrt(1 - zeta**2)) * np.ones(2)
+    q = equalised_poles(np.array([p[0], np.conj(p[0])]), new)
+    np.testing.assert_allclose(np.abs(q), omega)
+    np.testing.assert_allclose(-q.real / np.abs(q), new)
+    np.testing.assert_allclose(q[1], np.conj(q[0]))
+
+
+def test_bad_tables_are_refused():
+    with pytest.raises(ShapeError):
+        table([1, 2], [0.1])
+    with pytest.raises(ShapeError, match="must not fall"):
+        table([2, 1], [0.1, 0.1])

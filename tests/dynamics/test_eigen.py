@@ -1,0 +1,208 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from chladni.dynamics import eigen
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.lanczos import block_lanczos
+from chladni.dynamics.modes import rigid_modes
+from chladni.dynamics.system import System
+from chladni.errors import AccuracyError, ModelError
+from chladni.fem.assemble import structure
+from chladni.model.plates import box
+
+from .conftest import line, line_frequency
+
+
+def together(*systems):
+    """Systems side by side, with nothing between them."""
+    blocks = [sp.csr_array(sp.block_diag([getattr(s, a) for s in systems])) for a in "MVK"]
+    return System(*blocks, np.vstack([s.dofs for s in systems]))
+
+
+@pytest.fixture(scope="module")
+def shell_box():
+    built = structure(box(0.3, 0.2, 0.1, h=0.025))
+    return built.system
+
+
+@pytest.mark.parametrize("n", [40, 900])
+def test_line_has_its_closed_form(n):
+    """Dense and sparse roads; sine law to rounding, mode 0 rigid."""
+    modal = normal_modes(line(n), 12)
+    assert rigid_modes(modal).sum() == 1
+    due = line_frequency(n, np.arange(12))
+    np.testing.assert_allclose(modal.frequency[1:], due[1:], rtol=1e-8)
+    assert modal.frequency[0] < 1e-4 * due[1]
+
+
+def test_shapes_solve_the_problem(shell_box):
+    modal = normal_modes(shell_box, 25)
+    lam, phi = (2 * np.pi * modal.frequency) ** 2, modal.shapes
+    np.testing.assert_allclose(phi.T @ (shell_box.M @ phi), np.eye(25), atol=1e-10)
+    k = phi.T @ (shell_box.K @ phi)
+    np.testing.assert_allclose(k, np.diag(lam), atol=1e-7 * lam[-1])
+
+
+def test_free_box_has_six_rigid_modes(shell_box):
+    modal = normal_modes(shell_box, 12)
+    assert rigid_modes(modal).sum() == 6
+    assert modal.frequency[6] > 1e3 * modal.frequency[5]
+
+
+def test_sparse_equals_dense(shell_box, monkeypatch):
+    sparse = normal_modes(shell_box, 30)
+    monkeypatch.setattr(eigen, "_DENSE", 10**6)
+    dense = normal_modes(shell_box, 30)
+    np.testing.assert_allclose(sparse.frequency[6:], dense.frequency[6:], rtol=1e-7)
+
+
+def test_units_do_not_matter(shell_box):
+    """mm-t-s: forces in N, lengths in mm; translations and rotations scale apart."""
+    mm = np.where(shell_box.dofs[:, 1] <= 3, 1e-3, 1.0)  # q_SI = D q_mm; work in N mm
+    D = sp.diags_array(mm)
+    other = replace(
+        shell_box,
+        M=sp.csr_array(D @ shell_box.M @ D) * 1e3,
+        K=sp.csr_array(D @ shell_box.K @ D) * 1e3,
+    )
+    a, b = normal_modes(shell_box, 20), normal_modes(other, 20)
+    np.testing.assert_allclose(a.frequency[6:], b.frequency[6:], rtol=1e-7)
+    assert rigid_modes(b).sum() == 6
+
+
+@pytest.mark.parametrize("copies", [2, 12, 20])
+def test_disconnected_copies_give_repeated_modes(copies):
+    """More equal modes than a block has columns: all of them are found."""
+    n = 120
+    modal = normal_modes(together(*(line(n, first=1 + n * c) for c in range(copies))), 3 * copies)
+    due = np.repeat(line_frequency(n, np.arange(3)), copies)
+    np.testing.assert_allclose(modal.frequency, due, atol=1e-5 * due[-1])
+    assert rigid_modes(modal).sum() == copies
+
+
+def test_a_cut_through_equal_modes_is_no_error():
+    """count = 15 of 4 equal sets: whichever of the equal ones, but fifteen."""
+    modal = normal_modes(together(*(line(120, first=1 + 120 * c) for c in range(4))), 15)
+    due = np.repeat(line_frequency(120, np.arange(4)), 4)[:15]
+    np.testing.assert_allclose(modal.frequency, due, atol=1e-5 * due[-1])
+
+
+def test_band_finds_all_below(shell_box):
+    top = 0.5 * np.sum(normal_modes(shell_box, 20).frequency[[14, 15]])
+    assert len(normal_modes(shell_box, band=top)) == 15
+    assert len(normal_modes(shell_box, 9, band=top)) == 9
+    assert len(normal_modes(line(900, free=False), band=1e-3)) == 0
+
+
+@pytest.mark.parametrize("n", [150, 901])
+def test_massless_dofs_follow_statically(n):
+    """Every second point without mass: springs in series, a line of half the points and k/2."""
+    full = line(n, free=False)
+    m = np.zeros(n)
+    m[1::2] = 1.0
+    light = replace(full, M=sp.csr_array(sp.diags_array(m)))
+    keep = np.arange(1, n, 2)
+    due = normal_modes(line(len(keep), free=False, k=5e4), 10)
+    modal = normal_modes(light, 10)
+    if n % 2:  # both ends hang on two springs in series, as all the others do
+        np.testing.assert_allclose(modal.frequency, due.frequency, rtol=1e-8)
+    inner = modal.shapes[2:-2:2]
+    mean = (modal.shapes[1:-3:2] + modal.shapes[3:-1:2]) / 2
+    np.testing.assert_allclose(inner, mean, atol=1e-8)
+
+
+def test_a_stiff_and_a_soft_world_far_apart():
+    """No scale fits both: modes a thousand times slower are found beside the others."""
+    modal = normal_modes(together(line(400), line(400, k=1e-1, first=500)), 30)
+    fast, slow = (line_frequency(400, np.arange(30), k=k) for k in (1e5, 1e-1))
+    due = np.sort(np.r_[fast, slow])[:30]
+    np.testing.assert_allclose(modal.frequency[2:], due[2:], rtol=1e-5)
+
+
+@pytest.mark.parametrize("backend", ["cholmod", "superlu"])
+def test_backends_agree(shell_box, backend):
+    if backend == "cholmod":
+        pytest.importorskip("sksparse")
+    a, b = (normal_modes(shell_box, 15, backend=x) for x in ("multifrontal", backend))
+    np.testing.assert_allclose(a.frequency[6:], b.frequency[6:], rtol=1e-8)
+
+
+def test_points_change_the_work_only(shell_box):
+    structure_ = box(0.3, 0.2, 0.1, h=0.025)
+    points = structure_.points[np.searchsorted(structure_.ids, shell_box.dofs[:, 0])]
+    a, b = normal_modes(shell_box, 15), normal_modes(shell_box, 15, points=points)
+    np.testing.assert_allclose(a.frequency[6:], b.frequency[6:], rtol=1e-9)
+
+
+def forgetful(times):
+    """block_lanczos that loses the fourth mode for so many calls."""
+    left = [times]
+
+    def lanczos(*args, **options):
+        ritz = block_lanczos(*args, **options)
+        if left[0] == 0:
+            return ritz
+        left[0] -= 1
+        keep = np.arange(len(ritz.theta)) != min(3, len(ritz.theta) - 1)
+        if len(ritz.theta) <= 3:
+            keep[0] = False
+        return replace(
+            ritz, theta=ritz.theta[keep], error=ritz.error[keep], weights=ritz.weights[:, keep]
+        )
+
+    return lanczos
+
+
+def test_a_dropped_mode_is_found_again(monkeypatch):
+    monkeypatch.setattr(eigen, "block_lanczos", forgetful(1))
+    modal = normal_modes(line(900), 12)
+    np.testing.assert_allclose(
+        modal.frequency[1:], line_frequency(900, np.arange(1, 12)), rtol=1e-7
+    )
+
+
+def test_a_mode_lost_for_good_is_an_error(monkeypatch):
+    """A solver blind to mode 3, M-orthogonal to it throughout."""
+    n = 900
+    x = np.cos(3 * np.pi * (np.arange(n) + 0.5) / n)
+    x /= np.linalg.norm(x)
+
+    def blind(solve, M, k, **options):
+        return block_lanczos(lambda B: (Y := solve(B)) - np.outer(x, x @ Y), M, k, **options)
+
+    monkeypatch.setattr(eigen, "block_lanczos", blind)
+    with pytest.raises(AccuracyError, match=r"modes lie below .* Hz, .* were found"):
+        normal_modes(line(n), 12)
+    assert len(normal_modes(line(n), 12, proof=False)) == 12
+
+
+def test_wrong_vectors_are_an_error(monkeypatch):
+    def sloppy(*args, **options):
+        ritz = block_lanczos(*args, **options)
+        return replace(ritz, weights=ritz.weights[:, ::-1])
+
+    monkeypatch.setattr(eigen, "block_lanczos", sloppy)
+    with pytest.raises(AccuracyError, match="residual"):
+        normal_modes(line(900), 12)
+
+
+def test_a_part_that_hangs_on_nothing_is_named():
+    K = line(900).K.tolil()
+    K[600, :] = K[:, 600] = 0
+    loose = replace(
+        line(900),
+        K=sp.csr_array(K),
+        M=sp.csr_array(sp.diags_array(np.where(np.arange(900) == 600, 0.0, 1.0))),
+    )
+    with pytest.raises(ModelError, match=r"601:\+Z"):
+        normal_modes(loose, 5)
+
+
+@pytest.mark.parametrize("n", [50, 900])
+def test_negative_stiffness_is_refused(n):
+    bad = line(n)
+    with pytest.raises((ModelError, AccuracyError)):
+        normal_modes(replace(bad, K=bad.K - 5e4 * sp.eye_array(n)), 5)
