@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +13,7 @@ from .effect import Effect
 from .material import orthotropic
 from .ordinary import PartScale, ordinary
 from .sheet import Sheet
+from .somewhere import NEIGHBOURS, ExtraSupport, Patch, PointMass, moved
 
 NAMES = (
     "orthotropic-material",
@@ -22,6 +24,9 @@ NAMES = (
     "thickness-distribution",
     "sensor-fault",
 )
+
+
+FACING = 0.85  # cosine between normals that still lie in one face
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,10 @@ class Places:
 
     def __len__(self) -> int:
         return len(self.grids)
+
+    def position(self, grid: int) -> int:
+        """Position of a grid among them."""
+        return int(np.flatnonzero(self.grids == grid)[0])
 
     def only(self, chosen: np.ndarray) -> "Places":
         """Some of them."""
@@ -102,24 +111,43 @@ def everywhere(sheet: Sheet, grids: Sequence[int]) -> sp.csr_array:
     return sheet.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
 
 
-def point_mass(sheet: Sheet, setup: Setup, grid: int, point: np.ndarray, tried: int) -> Effect:
-    """A mass at one grid; median 3 % of the structure's."""
+def point_mass(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+    """A mass near one grid; median 3 % of the structure's."""
     m = points.strength("M", "kg", 0.03 * setup.weight, 1.2, (-1.5, -0.5, 0.5))
-    return points.PointMass(
-        (m,), f"at grid {grid}", grids=(int(grid),), point=_tuple(point), places=tried,
-        rows=everywhere(sheet, [grid]), directions=np.eye(3),
-    )  # fmt: skip
+    area = patch(sheet, spots, k, np.eye(3))
+    return PointMass(moved(m), places=tried, patch=area, **_there(sheet, spots, k))
 
 
-def extra_support(
-    sheet: Sheet, setup: Setup, grid: int, point: np.ndarray, normal: np.ndarray, tried: int
-) -> Effect:
-    """A spring to ground along the normal of one grid."""
-    k = points.strength("K", "N/m", stiffness_scale(setup), 2.0, (-2.0, 0.0, 2.0))
-    return points.ExtraSupport(
-        (k,), f"at grid {grid}", grids=(int(grid),), point=_tuple(point), places=tried,
-        rows=sheet.structure.along(np.array([grid]), normal[None]), directions=normal[None],
-    )  # fmt: skip
+def extra_support(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+    """A spring to ground along the normal near one grid."""
+    K = points.strength("K", "N/m", stiffness_scale(setup), 2.0, (-2.0, 0.0, 2.0))
+    n = spots.normal[k]
+    area = patch(sheet, spots, k, n[None])
+    return ExtraSupport(moved(K), places=tried, patch=area, direction=n, **_there(sheet, spots, k))
+
+
+def _there(sheet: Sheet, spots: Places, k: int) -> dict[str, Any]:
+    grid = int(spots.grids[k])
+    return {"text": f"at grid {grid}", "grids": (grid,), "point": _tuple(spots.point[k])}
+
+
+def patch(sheet: Sheet, spots: Places, k: int, directions: np.ndarray) -> Patch:
+    """The grids round one of the places that lie in the same face of the sheet."""
+    d = spots.point - spots.point[k]
+    facing = np.abs(spots.normal @ spots.normal[k]) > FACING
+    distance = np.where(facing, np.linalg.norm(d, axis=1), np.inf)
+    near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+    near = near[np.isfinite(distance[near])]
+    n = spots.normal[k]
+    e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
+    e1 /= np.linalg.norm(e1)
+    plane = np.stack([e1, np.cross(n, e1)])
+    size = float(np.sort(distance)[1:5].mean())
+    rows = tuple(
+        sheet.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
+        for axis in directions
+    )
+    return Patch(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
 
 
 def stiffness_scale(setup: Setup) -> float:

@@ -65,12 +65,16 @@ class FieldChange:
 
 @dataclass(frozen=True, eq=False)
 class PointTerm:
-    """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters)."""
+    """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters).
+
+    Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it.
+    """
 
     matrix: Literal["K", "M"]
     rows: sp.csr_array
     coefficient: np.ndarray
     gradient: np.ndarray
+    moving: dict[int, sp.csr_array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

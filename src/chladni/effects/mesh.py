@@ -70,15 +70,23 @@ def mesh_error(built: Structure, top: float) -> MeshError | None:
     )
 
 
-def jitter(built: Structure, top: float, sd: float = 0.002) -> Jitter:
-    """Independent scatter of each modal frequency up to ``top``, sd of ln f."""
+def jitter(built: Structure, top: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
+    """Independent scatter of each modal frequency up to ``top``.
+
+    Standard deviation of ln f: ``sd``, and half of what the finer mesh changes in that mode.
+    """
     modes = _flexible(normal_modes(built.system, band=1.1 * top), top)
+    lam = (2 * np.pi * modes.frequency) ** 2
+    own = np.zeros(len(lam))
+    if mesh is not None:
+        b = mesh.rows @ modes.shapes
+        own = 0.5 * np.abs((b.T * mesh.change) @ b).diagonal() / (2 * lam)
     unknown = tuple(
-        Parameter(f"mode {r + 1}", "-", 0.0, 2 * sd, kind="linear", step=4 * sd)
-        for r in range(len(modes.frequency))
+        Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(spread), kind="linear", step=0.02)
+        for r, spread in enumerate(np.hypot(sd, own))
     )
     rows = sp.csr_array((built.system.M @ modes.shapes).T)
-    return Jitter(unknown, "every mode", rows=rows, lam=(2 * np.pi * modes.frequency) ** 2)
+    return Jitter(unknown, "every mode", rows=rows, lam=lam)
 
 
 def _flexible(modes: ModalModel, top: float) -> ModalModel:

@@ -46,14 +46,6 @@ class MassEffect(AtPoints):
 
 
 @dataclass(frozen=True, eq=False)
-class PointMass(MassEffect):
-    """A mass sits at a place the model does not know of."""
-
-    name = "point-mass"
-    claim = "something sits on the structure that the model does not have"
-
-
-@dataclass(frozen=True, eq=False)
 class SensorMass(MassEffect):
     """Accelerometers (and their cables) weigh something; taken off before weighing."""
 
@@ -63,19 +55,6 @@ class SensorMass(MassEffect):
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Nothing: the article is weighed without its sensors."""
         return 0.0, np.zeros(1)
-
-
-@dataclass(frozen=True, eq=False)
-class ExtraSupport(AtPoints):
-    """A spring to ground at an unknown place."""
-
-    name = "extra-support"
-    claim = "the structure touches something stiff that the model does not have"
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground at the grid, along the axis nearest to the direction."""
-        k = self.parameters[0].value(x[0])
-        return with_springs(assembly, self.grids, self.directions, k)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +75,18 @@ def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float,
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)
 
 
-def with_masses(assembly: Assembly, grids: tuple[int, ...], m: float) -> Assembly:
-    """The assembly with a mass m [kg] at each of these grids."""
+def with_masses(
+    assembly: Assembly, grids: tuple[int, ...], m: float, offset: np.ndarray | None = None
+) -> Assembly:
+    """The assembly with a mass m [kg] at each of these grids, ``offset`` (3,) from it [m]."""
     old = assembly.masses
     first = int(old.ids.max(initial=0)) + 1
-    block = np.diag([m, m, m, 0.0, 0.0, 0.0])
+    x, y, z = np.zeros(3) if offset is None else offset
+    arm = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])  # motion of the mass
     new = Masses(
         np.append(old.ids, first + np.arange(len(grids))),
         np.append(old.node, assembly.rows(list(grids))),
-        np.concatenate([old.matrix, np.tile(block, (len(grids), 1, 1))]),
+        np.concatenate([old.matrix, np.tile(m * arm.T @ arm, (len(grids), 1, 1))]),
     )
     return replace(assembly, masses=new)
 

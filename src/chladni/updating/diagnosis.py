@@ -21,6 +21,7 @@ from ..errors import ModelError
 from .calibration import Fit, Weighing, fit
 from .likelihood import LN10, Data, Poles, Responses
 from .reduced import Reduced, State, evaluate
+from ..effects.somewhere import Somewhere
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 from .workbench import Workbench
 
@@ -103,9 +104,11 @@ class Search:
     def trial(self, effect: Effect, start: np.ndarray, base: np.ndarray) -> Trial:
         """Fit one effect together with the base, from these starts."""
         model = self.bench.model
-        for rows in (t.rows for t in effect.terms(start)):
-            if rows.shape[0] <= 12:
-                model = self.bench.with_attachments(rows)
+        if isinstance(effect, Somewhere):
+            model = self.bench.with_attachments(effect.carried())
+        else:
+            for term in effect.terms(start):
+                model = self.bench.with_attachments(term.rows)
         if any(change.field.startswith("Q") for change in effect.fields(start)):
             model = model.with_components()
         data = self.data.over(model)
@@ -318,18 +321,16 @@ def _points(search: Search, bases: list[Baseline], data: Responses) -> list[Cand
             for k in _distinct(score.min(axis=1), spots.point, chosen, 2):
                 chosen.append(k)
                 c = strengths[int(np.argmin(score[k]))]
-                effect = _at(search, matrix, spots, k)
-                start = np.array([np.log(c / effect.parameters[0].scale)])
+                effect = _at(search, matrix, bench.grids, bench.grids.position(spots.grids[k]))
+                start = np.array([np.log(c / effect.parameters[0].scale), 0.0, 0.0])
                 out.append((effect, start, base.x))
     return out
 
 
 def _at(search: Search, matrix: str, spots: catalogue.Places, k: int) -> Effect:
     sheet, setup, tried = search.bench.sheet, search.setup, len(search.bench.candidates)
-    grid, point = int(spots.grids[k]), spots.point[k]
-    if matrix == "M":
-        return catalogue.point_mass(sheet, setup, grid, point, tried)
-    return catalogue.extra_support(sheet, setup, grid, point, spots.normal[k], tried)
+    make = catalogue.point_mass if matrix == "M" else catalogue.extra_support
+    return make(sheet, setup, spots, k, tried)
 
 
 def _distinct(score: np.ndarray, point: np.ndarray, taken: list[int], wanted: int) -> list[int]:
@@ -410,7 +411,8 @@ def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
     some = catalogue.spread(spots.point, 40)
     out: list[Candidate] = []
     for matrix in "MK":
-        effects = [_at(search, matrix, spots, int(k)) for k in some]
+        grids = search.bench.grids
+        effects = [_at(search, matrix, grids, grids.position(spots.grids[k])) for k in some]
         out += _best_of(search, bases, effects, spots.point[some])
     return out
 
@@ -452,37 +454,32 @@ def _by_family(trials: list[Trial]) -> list[Trial]:
 
 
 def _closer(search: Search, lead: Trial) -> list[Trial]:
-    """The leader moved to the best grid near by, until it stays."""
+    """The leader begun anew from the grid it moved to, while it moves."""
     out: list[Trial] = []
-    if lead.effect.name not in ("point-mass", "extra-support") or not isinstance(lead.data, Responses):
-        return out
-    matrix = "M" if lead.effect.name == "point-mass" else "K"
-    spots, tried = search.bench.grids, {int(lead.effect.grids[0])}
-    reach = 1.5 * _spacing(search.bench.candidates.point)
+    grids = search.bench.grids
     for _ in range(3):
-        near = np.linalg.norm(spots.point - np.array(lead.effect.point), axis=1) < reach
-        some = spots.only(np.flatnonzero(near)[:200])
-        x = lead.fit.x[: -len(lead.effect.parameters)]
-        base = baseline(search.bench.model, search.base, search.data, search.weighing, x)
-        c = np.array([lead.effect.parameters[0].value(lead.fit.x[-1])]) * np.exp([-0.2, 0.0, 0.2])
-        score = point_scores(
-            base, search.bench.model, search.data, some, matrix, c, search.bench.flexibility(some)
-        )
-        k = int(np.argmin(score.min(axis=1)))
-        if int(some.grids[k]) in tried:
+        effect, x = lead.effect, lead.fit.of(lead.effect)
+        if not isinstance(effect, Somewhere) or np.abs(x[1:]).max() < 0.75:
             break
-        tried.add(int(some.grids[k]))
-        new = search.trial(_at(search, matrix, some, k), lead.fit.of(lead.effect), x)
-        if new.S < lead.S:
-            lead = new
-        out.append(new)
+        new = _at(search, "M" if effect.matrix == "M" else "K", grids, grids.position(effect.nearest(x)))
+        start = np.array([x[0], 0.0, 0.0])
+        trial = search.trial(new, start, _fresh(search, lead))
+        out.append(trial)
+        if trial.S > lead.S - 1:
+            break
+        lead = trial
     return out
 
 
-def _spacing(point: np.ndarray) -> float:
-    """Typical distance of a point to its nearest neighbour."""
-    d = np.linalg.norm(point[:, None] - point[None], axis=2) + 1e9 * np.eye(len(point))
-    return float(np.median(d.min(axis=1)))
+def _fresh(search: Search, lead: Trial) -> np.ndarray:
+    """Base parameters with the leader's ordinary ones and no scatter."""
+    x, at = search.mean(), 0
+    kept = search.without(lead.effect)
+    for e in search.base:
+        if e in kept and e.kind == "ordinary":
+            x[at : at + len(e.parameters)] = lead.fit.of(e)
+        at += len(e.parameters)
+    return x
 
 
 def _restarted(search: Search, null: Trial, trials: list[Trial]) -> Trial:

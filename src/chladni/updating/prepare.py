@@ -340,8 +340,7 @@ def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
-    out.append(jitter(built, top))
-    return out
+    return [*out, jitter(built, top, mesh)]
 
 
 def _search(

@@ -6,7 +6,7 @@ derivatives are exact, because K and M are known functions of the fields.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -43,10 +43,17 @@ class Reduced:
     K0: np.ndarray
     M0: np.ndarray
     weight0: float
+    _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
 
-    def rows(self, rows: sp.csr_array) -> np.ndarray:
-        """Rows of the structure in the basis (k, r)."""
-        return np.asarray(rows @ self.basis)
+    def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
+        """Rows of the structure in the basis (k, r); projected once where they are to be kept."""
+        if not keep:
+            return np.asarray(rows @ self.basis)
+        known = self._seen.get(id(rows))
+        if known is None or known[0] is not rows:
+            known = rows, np.asarray(rows @ self.basis)
+            self._seen[id(rows)] = known
+        return known[1]
 
     def extended(self, vectors: np.ndarray) -> Self:
         """The same model over a basis that also holds these vectors (n, k)."""
@@ -77,6 +84,7 @@ class Reduced:
         return replace(
             self, basis=basis, linear=linear, cubic=cubic, mass=mass,
             K0=rest(self.K0, system.K.real, np.asarray(stiff)), M0=rest(self.M0, system.M, mass),
+            _seen={},
         )  # fmt: skip
 
     def _pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -153,11 +161,14 @@ def evaluate(
     doffset: np.ndarray | None = None
     for effect, at in _slices(effects):
         for term in effect.terms(x[at]):
-            b = model.rows(term.rows)
+            b = model.rows(term.rows, keep=not term.moving)
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
             target += (b.T * term.coefficient) @ b
             if gradient:
-                slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, b)
+                slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, b, optimize=True)
+                for p, rows in term.moving.items():
+                    half = (b.T * term.coefficient) @ model.rows(rows, keep=False)
+                    slope[at.start + p] += half + half.T
         extra, d_extra = effect.weight(x[at])
         weight, dweight[at] = weight + extra, dweight[at] + d_extra
         if (change := effect.outputs(x[at])) is not None:
