@@ -1,1 +1,1 @@
-"""A virtual test bench: an article, its scatter, sensors and noise; what comes out is a recording."""
+"""A virtual test bench: an article, its scatter, sensors and noise; out comes a recording."""

@@ -24,9 +24,7 @@ def thickness_split(
     arrays = section_arrays(assembly, geo) if arrays is None else arrays
     t, reference = assembly.shells.thickness, arrays.Qm
     thin, residual = _shear_split(arrays)
-    linear = shell.stiffness(
-        geo, t, Qm=arrays.Qm, S=thin, drill=arrays.drill, reference=reference
-    )
+    linear = shell.stiffness(geo, t, Qm=arrays.Qm, S=thin, drill=arrays.drill, reference=reference)
     return linear, shell.stiffness(geo, t, Qb=arrays.Qb, S=residual, reference=reference)
 
 

@@ -33,7 +33,7 @@ class OrthotropicMaterial(Effect):
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
-        """ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
+        """Ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
         m = _mean_ratio(x[3])
         base = np.log(1 - self.nu**2) - np.log(1 - m**2)
         return np.array(
@@ -41,7 +41,7 @@ class OrthotropicMaterial(Effect):
         )
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """ln factors of the four components of the plane stiffness."""
+        """Ln factors of the four components of the plane stiffness."""
         logs, h = self._logs(x), 1e-6
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1

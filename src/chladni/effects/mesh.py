@@ -27,7 +27,7 @@ class MeshError(Effect):
     change: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """x ΔK over the modes."""
+        """X ΔK over the modes."""
         return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None]),)
 
 
@@ -65,9 +65,7 @@ def mesh_error(built: Structure, top: float) -> MeshError | None:
     delta = (B * omega2) @ B.T - np.diag((2 * np.pi * coarse.frequency) ** 2)
     change, V = np.linalg.eigh((delta + delta.T) / 2)
     unknown = Parameter("mesh", "-", LIMIT - 0.17, 0.3, kind="linear", step=0.5)
-    return MeshError(
-        (unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change
-    )
+    return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
 
 
 def jitter(built: Structure, top: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
@@ -91,9 +89,7 @@ def jitter(built: Structure, top: float, mesh: MeshError | None, sd: float = 0.0
 
 def _flexible(modes: ModalModel, top: float) -> ModalModel:
     keep = modes.frequency > 1e-3 * top
-    return ModalModel(
-        modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs
-    )
+    return ModalModel(modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs)
 
 
 def _rows_of(finer: Structure, coarse: Structure) -> sp.csr_array:

@@ -21,7 +21,7 @@ class SensorFault(Effect):
     mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
-        """x / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
+        """X / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
         value, slope = np.zeros(self.n_outputs, complex), np.zeros((self.n_outputs, 1), complex)
         value[self.channel] = (x[0] + (1j * np.pi if self.sign < 0 else 0)) / np.log(10)
         slope[self.channel] = 1 / np.log(10)

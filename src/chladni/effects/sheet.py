@@ -62,9 +62,7 @@ class Sheet:
         return (out + out.transpose(0, 2, 1)) / 2 if right is None else out
 
 
-def groups(
-    centre: np.ndarray, part: np.ndarray, area: np.ndarray, most: int = 64
-) -> np.ndarray:
+def groups(centre: np.ndarray, part: np.ndarray, area: np.ndarray, most: int = 64) -> np.ndarray:
     """Group of each shell (m,): every part halved along its longest side until pieces are alike.
 
     The number of groups of a part follows its area; none mixes parts.

@@ -43,7 +43,9 @@ class Patch:
         """Interpolation weights of the grids at a place of the plane (k,)."""
         d = (self.flat - at) / self.size
         w = np.exp(-(d**2).sum(axis=1) / 1.8)
-        P = np.stack([np.ones(len(d)), d[:, 0], d[:, 1], d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], 1)
+        P = np.stack(
+            [np.ones(len(d)), d[:, 0], d[:, 1], d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], 1
+        )
         A = (P.T * w) @ P + 1e-9 * np.eye(6)
         return np.asarray(np.linalg.solve(A, (P.T * w))[0])
 
@@ -140,7 +142,9 @@ class ExtraSupport(Somewhere):
             return [(int(self.patch.grids[near[0]]), 1.0)]
         A = np.vstack([self.patch.flat[near].T, np.ones(3)])
         w = np.clip(np.linalg.lstsq(A, np.append(at, 1.0), rcond=None)[0], 0.0, None)
-        return [(int(self.patch.grids[k]), float(v / w.sum())) for k, v in zip(near, w, strict=True)]
+        return [
+            (int(self.patch.grids[k]), float(v / w.sum())) for k, v in zip(near, w, strict=True)
+        ]
 
 
 def moved(strength: Parameter) -> tuple[Parameter, ...]:

@@ -28,7 +28,7 @@ class ThicknessDistribution(Effect):
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
 
     def _bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
-        """q at points X (n,), averaged over a group of variance ``blur``."""
+        """Q at points X (n,), averaged over a group of variance ``blur``."""
         flat = (X - self.origin) @ self.plane.T - self.size * x[2:4]
         R2 = (self.size * np.exp(x[1])) ** 2
         return np.asarray(R2 / (R2 + blur) * np.exp(-(flat**2).sum(axis=1) / (2 * (R2 + blur))))
@@ -41,7 +41,9 @@ class ThicknessDistribution(Effect):
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """ln(1 - α q) over the groups; the slope by central differences of that scalar formula."""
         h = 1e-5
-        slope = np.stack([(self._log(x + h * e) - self._log(x - h * e)) / (2 * h) for e in np.eye(4)], 1)
+        slope = np.stack(
+            [(self._log(x + h * e) - self._log(x - h * e)) / (2 * h) for e in np.eye(4)], 1
+        )
         return (FieldChange("t", self._log(x), slope),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:

@@ -31,9 +31,9 @@ def holed_plate(
     X, Y = np.meshgrid(xs, ys, indexing="ij")
     points = np.stack([X.ravel(), Y.ravel(), 0 * X.ravel()], axis=1)
     node = np.arange(X.size).reshape(X.shape)
-    quads = np.stack(
-        [node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1
-    ).reshape(-1, 4)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(
+        -1, 4
+    )
     middle = points[quads].mean(axis=1)
     quads = quads[(np.abs(middle[:, 0] - x) > a) | (np.abs(middle[:, 1] - y) > a)]
     rim = _box(xs, ys, x, y, a)

@@ -48,7 +48,9 @@ def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unique edges (k, 2) and, per shell, the edge after each corner (m, 4)."""
     pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
     tri = nodes[:, 2] == nodes[:, 3]
-    pairs[tri, 2] = pairs[tri, 3]  # a triangle's third edge leads from its third corner to the first
+    pairs[tri, 2] = pairs[
+        tri, 3
+    ]  # a triangle's third edge leads from its third corner to the first
     flat = np.sort(pairs.reshape(-1, 2), axis=1)
     edges, of = np.unique(flat, axis=0, return_inverse=True)
     return edges, of.reshape(-1, 4)
@@ -79,7 +81,9 @@ def _bent(
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     n_a, n_b = normal[edges[:, 0]], normal[edges[:, 1]]
     d = b - a
-    lift = np.einsum("ij,ij->i", d, n_a)[:, None] * n_a - np.einsum("ij,ij->i", d, n_b)[:, None] * n_b
+    lift = (
+        np.einsum("ij,ij->i", d, n_a)[:, None] * n_a - np.einsum("ij,ij->i", d, n_b)[:, None] * n_b
+    )
     both = (smooth[edges[:, 0]] & smooth[edges[:, 1]])[:, None]
     return np.asarray((a + b) / 2 - np.where(both, lift / 8, 0.0))
 

@@ -18,6 +18,7 @@ from ..effects import catalogue, points
 from ..ema.uff_write import write_uff
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
+
 try:
     from ..meshing.nastran import write_assembly
 except ImportError:
@@ -114,7 +115,9 @@ def _layout(
     """Grids of sensors, shaker and hangers, on the faces that look up."""
     X = deck.points
     used = np.unique(deck.shells.nodes[deck.shells.part == 0])
-    chosen = used[catalogue.spread(X[used] + 0.01 * rng.normal(size=(len(used), 3)), specimen.sensors)]
+    chosen = used[
+        catalogue.spread(X[used] + 0.01 * rng.normal(size=(len(used), 3)), specimen.sensors)
+    ]
     low = np.quantile(X[used], 0.12, axis=0), np.quantile(X[used], 0.3, axis=0)
     corner = [k for k in used if np.all((X[k, :2] > low[0][:2]) & (X[k, :2] < low[1][:2]))]
     edge = used[np.argsort(X[used, 1])[-max(4, len(used) // 15) :]]
@@ -129,13 +132,13 @@ def _ordinary(article: Assembly, effect: str, rng: np.random.Generator) -> Assem
         scale = dict.fromkeys(scale, 1.0)
     if effect == "calibration":
         scale = dict.fromkeys(scale, 1.0)
-        scale[("E", "rho", "t")[rng.integers(3)]] = float(1 + rng.choice([-1, 1]) * rng.uniform(0.03, 0.1))
+        scale[("E", "rho", "t")[rng.integers(3)]] = float(
+            1 + rng.choice([-1, 1]) * rng.uniform(0.03, 0.1)
+        )
     steel = Isotropic(STEEL.E * scale["E"], STEEL.nu, STEEL.rho * scale["rho"])
     parts = tuple(p.with_section(membrane=steel, bending=steel) for p in article.parts)
     t = article.shells.thickness * scale["t"]
-    return replace(
-        article.with_parts(parts), shells=replace(article.shells, thickness=t)
-    )
+    return replace(article.with_parts(parts), shells=replace(article.shells, thickness=t))
 
 
 def _scattered(article: Assembly, sd: float, rng: np.random.Generator) -> Assembly:
@@ -175,7 +178,11 @@ def _concealed(
     truth: dict[str, Any] = {"point_m": deck.points[spot].tolist()}
     if effect == "point-mass":
         m = float(rng.uniform(0.015, 0.08)) * weight
-        return _at(article, deck, deck.ids[[spot]], points.with_masses, m), {**truth, "value": m}, gains
+        return (
+            _at(article, deck, deck.ids[[spot]], points.with_masses, m),
+            {**truth, "value": m},
+            gains,
+        )
     k = float(np.exp(rng.uniform(np.log(2e3), np.log(5e4))))
     return _at(article, deck, deck.ids[[spot]], _springs, k), {**truth, "value": k}, gains
 
@@ -242,9 +249,7 @@ def _recording(
     f = np.arange(4.0, specimen.top, 0.25)
     front = Front(noise=0.01, floor=0.001)
     labels = tuple(f"{g}:+Z" for g in outputs)
-    return measured(
-        modes.with_damping(zeta), phi_o, phi_i, f, front, rng, labels, (f"{drive}:+Z",)
-    )
+    return measured(modes.with_damping(zeta), phi_o, phi_i, f, front, rng, labels, (f"{drive}:+Z",))
 
 
 def _case(specimen: Specimen, mass: float, hangers: np.ndarray) -> str:

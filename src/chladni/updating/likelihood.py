@@ -24,7 +24,7 @@ class Data(Protocol):
     """Residuals of a state, whitened so that their expected square is one."""
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """r (n,) and ∂r/∂x (n, n_p)."""
+        """R (n,) and ∂r/∂x (n, n_p)."""
 
     def over(self, model: Reduced) -> Self:
         """The same data seen through another basis."""
@@ -49,7 +49,7 @@ class Responses:
     inputs: object
     use: np.ndarray
     quantity: str = "accelerance"
-    floor: float = 0.01
+    floor: float = 0.015
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording

@@ -12,11 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
-from ..ema.identification import Identified, equalised, identify
 from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.mesh import jitter, mesh_error
 from ..effects.ordinary import PartScale, gain, scatter
+from ..ema.identification import Identified, equalised, identify
 from ..errors import FileError
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
@@ -163,9 +163,7 @@ def _by_responses(question: Question) -> Prepared:
         s = 2 * np.pi * f * (zeta + 1j)
         use = np.outer((f >= low) & (f <= fit_top), ~held_sensors)
         data.append(
-            Responses(
-                equalised(found, s), s, rows_o, rows_i, use, found.quantity
-            ).over(bench.model)
+            Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
     f = lines[1]
     outside = (f >= held_band[0]) & (f <= held_band[1])
@@ -175,7 +173,9 @@ def _by_responses(question: Question) -> Prepared:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = _search(question, bench, data[0], nuisance, top)
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
-    what = f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
+    what = (
+        f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
+    )
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
@@ -320,12 +320,16 @@ def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
     f, peak = found.frequency, _peaks(found)
     keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
     if not keep.any():
-        raise FileError(f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz")
+        raise FileError(
+            f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz"
+        )
     usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
     keep &= found.damping < max(0.005, 4 * usual)
     for i in np.flatnonzero(keep):
         apart = np.abs(np.log(f / f[i]))
-        over = ((apart < TWIN) & (peak > peak[i])) | ((apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i]))
+        over = ((apart < TWIN) & (peak > peak[i])) | (
+            (apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i])
+        )
         keep[i] = not np.any(over & keep) and peak[i] > FAINTEST * peak[keep].max()
     return keep
 
@@ -344,7 +348,11 @@ def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:
 
 
 def _search(
-    question: Question, bench: Workbench, data: Responses | Poles, nuisance: list[Effect], top: float
+    question: Question,
+    bench: Workbench,
+    data: Responses | Poles,
+    nuisance: list[Effect],
+    top: float,
 ) -> Search:
     base = [*_ordinary(question, bench), *nuisance]
     weight = mass_properties(question.assembly)[0]
@@ -369,6 +377,8 @@ def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
 
 def _mass_note(question: Question) -> list[str]:
     if question.weighing is None:
-        return ["no weighed mass was given: E and rho cannot be told apart, both stay near the deck"]
+        return [
+            "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"
+        ]
     w = question.weighing
     return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]

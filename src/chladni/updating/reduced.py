@@ -194,9 +194,7 @@ def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
     ends = np.cumsum([len(e.parameters) for e in effects])
-    return [
-        (e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)
-    ]
+    return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
 
 
 def _fields(

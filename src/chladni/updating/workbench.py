@@ -39,7 +39,7 @@ class Workbench:
     candidates: Places
 
     def flexibility(self, where: Places) -> np.ndarray:
-        """b (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
+        """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
         exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
         b = self.model.rows(where.rows)
         K = self.model.basis.T @ (self.structure.system.K.real @ self.model.basis)
