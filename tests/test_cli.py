@@ -93,6 +93,28 @@ def test_render(deck, tmp_path):
     assert {p.name for p in out.iterdir()} == due | {"report.html"}
 
 
+def test_specimen_comes_back_as_a_deck(tmp_path):
+    """What is written weighs what the generator says: ρ t (a b) of a plate."""
+    out = tmp_path / "out"
+    sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
+    assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
+    done = call("modes", out / "deck.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
+    assert done.exit_code == 0, done.output
+    mass = json.loads((out / "modes.json").read_text())["mass_kg"]
+    assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)
+
+
+def test_plan_sees_every_mode(deck, tmp_path):
+    """As many sensors as modes or more, no label twice, no mode unseen."""
+    out = tmp_path / "out"
+    done = call("plan", deck, "--modes", 5, "--sensors", 8, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    result = json.loads((out / "plan.json").read_text())
+    labels = [s["label"] for s in result["sensors"]]
+    assert len(set(labels)) == 8
+    assert (out / "sensors.csv").read_text().count("output") == 8
+
+
 BAD = {
     "missing": None,
     "empty": b"",
@@ -124,7 +146,7 @@ def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     assert not list(tmp_path.glob("runs/*")), "half a run was left"
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c != "report"])
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ("report", "specimen")])
 def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
@@ -142,6 +164,7 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["render", "--modes", "a-b"], "--modes"),
         (["render", "--modes", "0-3"], "from 1"),
         (["render", "--gif", "100000"], "100000"),
+        (["plan", "--sensors", "3", "--modes", "9"], "3 sensors"),
     ],
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
@@ -150,6 +173,22 @@ def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
     assert done.exit_code == 2, (done.output, done.exception)
     assert named in done.stderr
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["teapot"], "tailgate"),
+        (["plate", "--set", "lenght=1"], "length"),
+        (["plate", "--set", "length=a"], "number"),
+        (["tailgate", "--size", "1"], "6 to 32"),
+        (["panel", "--set", "t"], "KEY=VALUE"),
+    ],
+)
+def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
+    done = call("specimen", *arguments, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
 
 
 def test_out_must_be_a_folder(deck):

@@ -16,6 +16,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "plan",
     "identify",
     "report",
+    "specimen",
 )
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
 

@@ -101,6 +101,13 @@ def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
     return np.asarray(normal[at] / length)
 
 
+def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:
+    """Values of the shells as values of all faces; skins of solids have none (nan)."""
+    values = np.full(len(seen.faces), np.nan)
+    values[: len(of_shells)] = of_shells
+    return values
+
+
 def is_case(source: Path) -> bool:
     """A folder (with a case.toml, or to be told that there is none) or a .toml file."""
     return source.is_dir() or source.suffix == ".toml"
