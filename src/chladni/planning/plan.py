@@ -143,7 +143,7 @@ def plan(
     progress("modes", 0.2)
     built = built or structure(assembly)
     modal, above, first = target_modes(built, wishes)
-    mounts = _mounts(places)
+    mounts = mounts_at(places)
     phi = shapes(built, above, mounts)
     largest = np.linalg.norm(motion(built, modal), axis=1).max(axis=0)
     progress("sensors", 0.6)
@@ -210,7 +210,7 @@ def shapes(built: Structure, modal: ModalModel, mounts: Mount) -> np.ndarray:
     return np.asarray(built.along(mounts.ids, mounts.directions) @ modal.shapes)
 
 
-def _mounts(places: Places) -> Mount:
+def mounts_at(places: Places) -> Mount:
     """Normals of all places, then the two axes of the basic frame most along each sheet."""
     ids, points = [places.ids], [places.points]
     directions, names = [places.normals], [_labels(places.ids, places.normals)]
