@@ -208,3 +208,15 @@ def test_rho_and_nonstructural_mass_come_from_the_section():
     s = section_arrays(shape.with_parts(tuple(replace(p, section=section) for p in shape.parts)))
     assert (s.rho == 900.0).all()
     assert (s.nsm == 2.5).all()
+
+
+def test_a_plate_without_membrane_is_a_plate():
+    """MID1 blank: the stiffness is finite and that of bending and shear alone."""
+    shape = panel(STEEL)
+    parts = tuple(p.with_section(membrane=None) for p in shape.parts)
+    _, s, K = element_matrices(shape.with_parts(parts))
+    _, whole, _ = element_matrices(shape)
+    geo = shell.geometry(shape.points, shape.shells)
+    due = shell.stiffness(geo, shape.shells.thickness, Qb=whole.Qb, S=whole.S)
+    assert not s.Qm.any()
+    np.testing.assert_allclose(K, due)
