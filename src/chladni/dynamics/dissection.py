@@ -2,8 +2,8 @@
 
 George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are gathered into nodes first (six dofs, one
 vertex), vertices are split at medians of their coordinates, and the smaller shore of each cut is
-the separator. Where nobody knows the places, distances in the graph to a few far vertices make
-some: pivot multidimensional scaling (Brandes and Pich 2007).
+the separator. Where nobody knows the places, distances in the graph from a few far vertices stand
+for coordinates; their planes are the level sets of George and Liu (1978, SIAM J. Numer. Anal. 15).
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ from ..errors import ShapeError
 
 _LEAF = 24  # vertices eliminated as one dense block
 _HUB = 10  # times the mean degree: such a vertex belongs to the last separator
-_LANDMARKS = 8
+_LANDMARKS = 12
+_TRIES = 12  # coordinates tried for a cut, the widest first
 _CUTS = (0.5, 0.42, 0.58)
 
 
@@ -62,7 +63,7 @@ def analyse(
             raise ShapeError(f"{len(given)} {name} given, one for each of {n} rows is needed")
     vertex = np.arange(n) if nodes is None else np.unique(nodes, return_inverse=True)[1]
     G = quotient(A, vertex)
-    places = scaled(G) if points is None else _mean(np.asarray(points, float), vertex)
+    places = distances(G) if points is None else _mean(np.asarray(points, float), vertex)
     pivots, children = _dissected(G, places)
     return _symbolic(G, vertex, pivots, children)
 
@@ -86,20 +87,22 @@ def _mean(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     return total / np.bincount(vertex)[:, None]
 
 
-def scaled(G: sp.csr_array) -> np.ndarray:
-    """Coordinates (N, 3) in which hop distance is near to distance (pivot MDS)."""
-    N = G.shape[0]
-    nearest, far, D = np.full(N, np.inf), 0, []
-    for _ in range(min(_LANDMARKS, N)):
-        d = dijkstra(G, unweighted=True, indices=far)
-        d[np.isinf(d)] = 2 * d[np.isfinite(d)].max() + 2  # another component: far away
-        D.append(d)
-        nearest = np.minimum(nearest, d)
-        far = int(np.argmax(nearest))
-    C = np.array(D).T ** 2
-    C = C - C.mean(axis=0) - C.mean(axis=1, keepdims=True) + C.mean()
-    _, V = np.linalg.eigh(C.T @ C)
-    return np.asarray(C @ V[:, ::-1][:, :3])
+def distances(G: sp.csr_array) -> np.ndarray:
+    """Hops from a few far vertices (N, _LANDMARKS): level sets of them are narrow cuts."""
+    hops = _hops(G, 0)
+    nearest, columns = hops, []
+    for _ in range(_LANDMARKS):
+        hops = _hops(G, int(np.argmax(nearest)))
+        nearest = hops if not columns else np.minimum(nearest, hops)
+        columns.append(hops)
+    return np.array(columns).T
+
+
+def _hops(G: sp.csr_array, start: int) -> np.ndarray:
+    """Number of edges on the shortest way from a vertex; another component is far away."""
+    hops = dijkstra(G, unweighted=True, indices=start)
+    hops[np.isinf(hops)] = 2 * hops[np.isfinite(hops)].max() + 2
+    return hops
 
 
 def _dissected(
@@ -139,7 +142,7 @@ def _dissected(
 def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
     m, extent = len(x), np.ptp(x, axis=0)
-    axes = [a for a in np.argsort(-extent) if extent[a] >= 0.3 * extent.max()]
+    axes = [a for a in np.argsort(-extent)[:_TRIES] if extent[a] >= 0.3 * extent.max()]
     best, cost = None, np.inf
     for axis in axes:
         rank = np.argsort(np.argsort(x[:, axis], kind="stable"))
