@@ -45,6 +45,13 @@ def notes(found: Plan) -> list[str]:
             f"The sensors' mass moves frequencies by up to {100 * shift:.1f} %: put their mass "
             "into the model before comparing."
         )
+    if not found.aimed.all():
+        blind = ", ".join(str(found.first + 1 + k) for k in np.flatnonzero(~found.aimed))
+        out.append(
+            f"Mode {blind} moves along the sheets: no sensor glued flat sees it and no shaker at a "
+            "normal drives it well; the layout was made for the others, and a sensor on a block "
+            "was moved to it where that helps."
+        )
     if found.wishes.draws:
         out.append(
             f"The layout serves {found.wishes.draws} models with the thickness of every part drawn "

@@ -131,15 +131,19 @@ def _off_edges(seen: Surface, points: np.ndarray, foot: float) -> np.ndarray:
 def spread(points: np.ndarray, count: int) -> np.ndarray:
     """Order of ``count`` points in which each is the farthest from those before it (Gonzalez 1985).
 
-    It begins at the point farthest from the middle.
+    It begins at the point farthest from the middle; of points equally far the first is taken.
     """
-    first = int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())
-    order = [first]
-    far = np.linalg.norm(points - points[first], axis=1)
+    far = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    order = [_farthest(far)]
+    far = np.linalg.norm(points - points[order[0]], axis=1)
     while len(order) < count:
-        order.append(int(far.argmax()))
+        order.append(_farthest(far))
         far = np.minimum(far, np.linalg.norm(points - points[order[-1]], axis=1))
     return np.array(order)
+
+
+def _farthest(far: np.ndarray) -> int:
+    return int(np.argmax(far >= (1 - 1e-9) * far.max()))
 
 
 def _reachable(

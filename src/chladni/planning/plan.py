@@ -85,6 +85,7 @@ class Plan:
     first : int                   number of the first of them in the deck (rigid modes before it)
     mounts : Mount                every candidate: normals first, then directions on blocks
     phi : (m, r)                  target shapes at the mounts
+    aimed : (r,) bool             modes that sensors glued flat can see: the layout is made for them
     layout : (n_sensors,) int     mounts, the most informative first
     moves : tuple of Move         sensors given up so that a mode is seen
     visible_before, visible : (r,)  before and after the moves
@@ -106,6 +107,7 @@ class Plan:
     first: int
     mounts: Mount
     phi: np.ndarray
+    aimed: np.ndarray
     layout: np.ndarray
     moves: tuple[pretest.Move, ...]
     visible_before: np.ndarray
@@ -148,15 +150,16 @@ def plan(
     largest = np.linalg.norm(motion(built, modal), axis=1).max(axis=0)
     progress("sensors", 0.6)
     r, normal = len(modal), mounts.normal
-    draws = _draws(assembly, wishes, mounts, r, progress) if wishes.draws else None
-    chosen = _layout(phi[normal, :r] if draws is None else draws, mounts, wishes)
-    ranked, log_det = chosen
+    aimed = pretest.visibility(phi[normal, :r], largest) >= wishes.floor
+    flat = phi[normal, :r][:, aimed]
+    draws = _draws(assembly, wishes, mounts, r, progress)[:, :, aimed] if wishes.draws else flat
+    ranked, log_det = _layout(draws, mounts, wishes)
     layout, moves = pretest.with_visible_modes(
         phi[:, :r], ranked, largest, floor=wishes.floor, rules=_near(mounts, wishes)
     )
     progress("shaker and cords", 0.8)
     f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
-    shaker = pretest.shaking(f, zeta, seen, phi[normal, :r])
+    shaker = pretest.shaking(f[aimed], zeta[aimed], seen[:, aimed], flat)
     observed = pretest.observability_gramian(f, zeta, seen)
     hangers, quiet = hang_points(built, modal, places)
     return Plan(
@@ -166,13 +169,14 @@ def plan(
         first,
         mounts,
         phi[:, :r],
+        aimed,
         layout,
         moves,
         pretest.visibility(phi[ranked, :r], largest),
         pretest.visibility(seen, largest),
         log_det,
-        mode_sweep(phi[normal], wishes.sensors, r),
-        pretest.ranked_actuators(shaker, f, phi[normal, :r]),
+        mode_sweep(_visible(phi[normal], aimed), wishes.sensors, int(aimed.sum())),
+        pretest.ranked_actuators(shaker, f[aimed], flat),
         pretest.best_actuators(shaker, wishes.actuators),
         (pretest.modal_rank(f, seen), 2 * r),
         pretest.gramian_quotient(observed, f),
@@ -181,6 +185,11 @@ def plan(
         hangers,
         quiet,
     )
+
+
+def _visible(phi: np.ndarray, aimed: np.ndarray) -> np.ndarray:
+    """Shapes at the normals of the modes aimed at and of all above the targets."""
+    return phi[:, np.r_[aimed, np.ones(phi.shape[1] - len(aimed), bool)]]
 
 
 def target_modes(built: Structure, wishes: Wishes) -> tuple[ModalModel, ModalModel, int]:

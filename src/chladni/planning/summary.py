@@ -76,6 +76,7 @@ def _modes(found: Plan) -> list[dict[str, Any]]:
             "frequency_hz": f,
             "visibility": found.visible[k],
             "visibility_before": found.visible_before[k],
+            "seen_by_normals": bool(found.aimed[k]),
             "seen": bool(found.visible[k] >= found.wishes.floor),
             "with_sensor_mass_hz": found.loaded[k],
         }
