@@ -90,7 +90,8 @@ def _mean(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
 def distances(G: sp.csr_array) -> np.ndarray:
     """Hops from a few far vertices (N, _LANDMARKS): level sets of them are narrow cuts."""
     hops = _hops(G, 0)
-    nearest, columns = hops, []
+    nearest = hops
+    columns: list[np.ndarray] = []
     for _ in range(_LANDMARKS):
         hops = _hops(G, int(np.argmax(nearest)))
         nearest = hops if not columns else np.minimum(nearest, hops)
