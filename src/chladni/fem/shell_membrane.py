@@ -62,7 +62,7 @@ def spin(grad: np.ndarray) -> np.ndarray:
 def membrane(
     corners: np.ndarray, det: np.ndarray, inverse: np.ndarray, reference: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """ε = (B + A G) u and ω = ½(v,x - u,y) at the Gauss points, with G = -(∫AᵀQA)⁻¹ ∫AᵀQB.
+    """ε = (B + A G) u with G = -(∫AᵀQA)⁻¹ ∫AᵀQB, and ω = ½(v,x - u,y), at the Gauss points.
 
     A holds the strains of the two incompatible bubbles 1-ξ², 1-η², condensed for the material
     ``reference``; by stationarity ∫(B+AG)ᵀ dQ (B+AG) is the exact derivative of the condensed
@@ -88,4 +88,4 @@ def membrane(
     m = len(corners)
     QA, flat = QA.reshape(m, 12, 4).swapaxes(1, 2), A.reshape(m, 12, 4)
     G = -np.linalg.solve(QA @ flat, QA @ B.reshape(m, 12, 8))
-    return B + A @ G[:, None], spin(grad) + spin(bubble) @ G[:, None]
+    return B + A @ G[:, None], spin(grad)
