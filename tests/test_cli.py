@@ -12,6 +12,23 @@ from chladni.errors import AccuracyError, FileError
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
 }
+OSCILLATOR = """SOL 108
+CEND
+DLOAD = 5
+FREQ = 6
+BEGIN BULK
+GRID,1,,0.,0.,0.,,23456
+GRID,2,,1.,0.,0.,,123456
+CELAS2,1,4000.,1,1,2,1
+CDAMP2,2,2.0,1,1,2,1
+CONM2,3,1,,0.1
+RLOAD1,5,7,,,8
+DAREA,7,1,1,3.0
+TABLED1,8
+,0.,1.,100.,1.,ENDT
+FREQ1,6,5.,5.,9
+ENDDATA
+"""
 
 
 def deck_text(n=2, side=0.3, t=1e-3):
@@ -73,6 +90,50 @@ def test_frf_peaks_at_its_modes(deck, tmp_path):
         assert str(held["quantity"]) == "accelerance"
         peak = held["frequency_hz"][np.abs(held["values"][:, 0, 0]).argmax()]
     assert peak == pytest.approx(first, abs=0.1)
+
+
+def test_frf_holds_what_higher_modes_contribute(deck, tmp_path):
+    """Modes to 3 f and a two-term rest: direct inversion to (1/3)⁴ of the rest, so 1.2 %."""
+    from chladni.cli.model import load_model
+    from chladni.dynamics.frf import direct_frf
+
+    out = tmp_path / "out"
+    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "30:+Z"]
+    band = ["--band", "5:30", "--lines", 6, "--damping", 0.0]
+    options = [*ends, *band, "--units", "SI", "--quantity", "receptance", "--out", out]
+    assert call("frf", deck, *options).exit_code == 0
+    system = load_model(deck, "SI").structure.system
+    rows = [system.dofs.tolist().index([grid, 3]) for grid in (1, 30)]
+    exact = direct_frf(system, np.array(rows), np.array(rows[:1]), np.linspace(5, 30, 6)).values
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        np.testing.assert_allclose(held["values"], exact, rtol=3**-4)
+
+
+def test_frf_runs_what_the_deck_asks_for(tmp_path):
+    """One mass: u = F / (k - ω² m + i ω c), as SOL 108 has it."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR)
+    done = call("frf", deck, "--quantity", "receptance", "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        w = 2 * np.pi * held["frequency_hz"]
+        assert held["outputs"].tolist() == ["1:+X"]
+        exact = 3.0 / (4000 - 0.1 * w**2 + 2j * w)
+        np.testing.assert_allclose(w, 2 * np.pi * 5 * np.arange(1, 11))
+        np.testing.assert_allclose(held["values"][:, 0, 0], exact, rtol=1e-9)
+
+
+def test_transmissibility_of_a_base(tmp_path):
+    """One mass on a moving base without dashpot: T = 1 / (1 - f²/f₀²)."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR.replace("CDAMP2,2,2.0,1,1,2,1\n", ""))
+    ends = ["--input", "base:+X", "--output", "1:+X", "--band", "5:20", "--lines", 4]
+    done = call("frf", deck, *ends, "--damping", 0.0, "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        assert str(held["quantity"]) == "transmissibility"
+        f, f0 = held["frequency_hz"], np.sqrt(4000 / 0.1) / (2 * np.pi)
+        np.testing.assert_allclose(held["values"][:, 0, 0], 1 / (1 - (f / f0) ** 2), rtol=1e-9)
 
 
 def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
@@ -157,6 +218,9 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     ("arguments", "named"),
     [
         (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
+        (["frf"], "--input"),
+        (["frf", "--input", "1:+Z"], "--output"),
+        (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "alone"),
         (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
