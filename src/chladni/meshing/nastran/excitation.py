@@ -1,6 +1,7 @@
 """Dynamic loads, frequencies and damping: RLOAD, DLOAD, DAREA, LSEQ, TABLED, FREQ, TABDMP1."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -51,17 +52,7 @@ def _dloads(
 
 
 def _scaled(e: Excitation, factor: float) -> Excitation:
-    return Excitation(
-        e.kind,
-        e.rows,
-        e.components,
-        e.amplitude * factor,
-        e.delay,
-        e.phase,
-        e.first,
-        e.second,
-        e.polar,
-    )
+    return replace(e, amplitude=e.amplitude * factor)
 
 
 def _rload(
