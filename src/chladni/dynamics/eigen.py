@@ -64,7 +64,7 @@ def normal_modes(
     limit = np.inf if band is None else (2 * np.pi * band) ** 2
     K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
     if n <= _DENSE or (count is not None and 3 * count > n):
-        lam, phi = _dense(K, M, system.dofs, count)
+        lam, phi = _dense(K, M, system.dofs, count, limit)
     else:
         order = analyse(abs(K) + abs(M), points, system.dofs[:, 0])
         problem = _Problem(K, M, system.dofs, backend, order)
@@ -131,9 +131,12 @@ def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
 
 
 def _dense(
-    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None
+    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None, limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Modes by LAPACK: a few from M φ = θ (K - σM) φ, which is sharp below, all from K φ = λ M φ.
+
+    A limit asks for the few below it: where a mass of 1e6 times the structure's drives its base,
+    the small motions there are right only so.
 
     Massless rows follow the others, φ_s = -K_ss⁻¹ K_sm φ_m, and have no modes of their own.
     """
@@ -143,6 +146,8 @@ def _dense(
     try:
         T[massless] = -cho_solve(cho_factor(k[massless][:, massless]), k[massless][:, ~massless])
         k, m = T.T @ k @ T, m[~massless][:, ~massless]
+        if count is None and np.isfinite(limit):
+            count = 1 + int((eigh(k, m, eigvals_only=True) <= limit).sum())
         lam, phi = _few(k, m, -_FIRM * ratio, count) if count else eigh(k, m)
     except LinAlgError as error:
         raise ModelError("K - σM is not positive definite: a part hangs on nothing") from error
