@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 
 from ..errors import ShapeError
 
@@ -144,18 +144,43 @@ def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
     m, extent = len(x), np.ptp(x, axis=0)
     axes = [a for a in np.argsort(-extent)[:_TRIES] if extent[a] >= 0.3 * extent.max()]
-    best, cost = None, np.inf
+    best, cost = np.zeros(m, bool), np.inf
     for axis in axes:
         rank = np.argsort(np.argsort(x[:, axis], kind="stable"))
         for low in _halves(x[:, axis], rank):
             cross = low[u] & ~low[v]
-            for shore in (u[cross], v[cross]):
-                separator = np.bincount(shore, minlength=m) > 0
-                balance = abs(2 * np.sum(low & ~separator) / m - 1)
-                if (price := separator.sum() * (1 + balance)) < cost:
-                    best, cost = np.where(separator, 2, np.where(low, 0, 1)), price
-    assert best is not None
-    return best
+            shores = [np.count_nonzero(np.bincount(w[cross], minlength=m)) for w in (u, v)]
+            price = min(shores) * (1 + abs(2 * low.sum() / m - 1))
+            if price < cost:
+                best, cost = low, price
+    cross = best[u] & ~best[v]
+    return np.where(_cover(u[cross], v[cross], m), 2, np.where(best, 0, 1))
+
+
+def _cover(u: np.ndarray, v: np.ndarray, m: int) -> np.ndarray:
+    """Fewest vertices that touch every edge u-v of a cut, True in (m,) (König 1931).
+
+    A largest matching, and from its unmatched lower ends alternately over the edges and back along
+    the matching: the cover is what was not reached below and what was reached above.
+    """
+    below, i = np.unique(u, return_inverse=True)
+    above, j = np.unique(v, return_inverse=True)
+    edges = sp.csr_array((np.ones(len(i), np.int8), (i, j)), shape=(len(below), len(above)))
+    mate = maximum_bipartite_matching(edges, perm_type="column")
+    back = np.full(len(above), -1)
+    back[mate[mate >= 0]] = np.flatnonzero(mate >= 0)
+    reached, over = mate < 0, np.zeros(len(above), bool)
+    while True:
+        fresh = np.zeros(len(above), bool)
+        fresh[j[reached[i]]] = True
+        fresh &= ~over
+        if not fresh.any():
+            break
+        over |= fresh
+        reached[back[fresh]] = True
+    cover = np.zeros(m, bool)
+    cover[below[~reached]] = cover[above[over]] = True
+    return cover
 
 
 def _halves(x: np.ndarray, rank: np.ndarray) -> list[np.ndarray]:
