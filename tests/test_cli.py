@@ -282,3 +282,9 @@ def test_exit_codes(raised, code):
 def test_help_lists_every_command():
     said = call("--help").output
     assert all(name in said for name in COMMANDS)
+
+
+def test_version_is_printed():
+    done = call("--version")
+    assert done.exit_code == 0
+    assert done.output.startswith("chladni ")
