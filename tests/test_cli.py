@@ -12,6 +12,23 @@ from chladni.errors import AccuracyError, FileError
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
 }
+OSCILLATOR = """SOL 108
+CEND
+DLOAD = 5
+FREQ = 6
+BEGIN BULK
+GRID,1,,0.,0.,0.,,23456
+GRID,2,,1.,0.,0.,,123456
+CELAS2,1,4000.,1,1,2,1
+CDAMP2,2,2.0,1,1,2,1
+CONM2,3,1,,0.1
+RLOAD1,5,7,,,8
+DAREA,7,1,1,3.0
+TABLED1,8
+,0.,1.,100.,1.,ENDT
+FREQ1,6,5.,5.,9
+ENDDATA
+"""
 
 
 def deck_text(n=2, side=0.3, t=1e-3):
@@ -75,6 +92,50 @@ def test_frf_peaks_at_its_modes(deck, tmp_path):
     assert peak == pytest.approx(first, abs=0.1)
 
 
+def test_frf_holds_what_higher_modes_contribute(deck, tmp_path):
+    """Modes to 3 f and a two-term rest: direct inversion to (1/3)⁴ of the rest, so 1.2 %."""
+    from chladni.cli.model import load_model
+    from chladni.dynamics.frf import direct_frf
+
+    out = tmp_path / "out"
+    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "30:+Z"]
+    band = ["--band", "5:30", "--lines", 6, "--damping", 0.0]
+    options = [*ends, *band, "--units", "SI", "--quantity", "receptance", "--out", out]
+    assert call("frf", deck, *options).exit_code == 0
+    system = load_model(deck, "SI").structure.system
+    rows = [system.dofs.tolist().index([grid, 3]) for grid in (1, 30)]
+    exact = direct_frf(system, np.array(rows), np.array(rows[:1]), np.linspace(5, 30, 6)).values
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        np.testing.assert_allclose(held["values"], exact, rtol=3**-4)
+
+
+def test_frf_runs_what_the_deck_asks_for(tmp_path):
+    """One mass: u = F / (k - ω² m + i ω c), as SOL 108 has it."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR)
+    done = call("frf", deck, "--quantity", "receptance", "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        w = 2 * np.pi * held["frequency_hz"]
+        assert held["outputs"].tolist() == ["1:+X"]
+        exact = 3.0 / (4000 - 0.1 * w**2 + 2j * w)
+        np.testing.assert_allclose(w, 2 * np.pi * 5 * np.arange(1, 11))
+        np.testing.assert_allclose(held["values"][:, 0, 0], exact, rtol=1e-9)
+
+
+def test_transmissibility_of_a_base(tmp_path):
+    """One mass on a moving base without dashpot: T = 1 / (1 - f²/f₀²)."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR.replace("CDAMP2,2,2.0,1,1,2,1\n", ""))
+    ends = ["--input", "base:+X", "--output", "1:+X", "--band", "5:20", "--lines", 4]
+    done = call("frf", deck, *ends, "--damping", 0.0, "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        assert str(held["quantity"]) == "transmissibility"
+        f, f0 = held["frequency_hz"], np.sqrt(4000 / 0.1) / (2 * np.pi)
+        np.testing.assert_allclose(held["values"][:, 0, 0], 1 / (1 - (f / f0) ** 2), rtol=1e-9)
+
+
 def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
     """On a plate in z = 0 the normal is Z up to sign, and H is reciprocal."""
     labels = ["--input", "1:+Z", "--input", "9:n", "--output", "1:+Z", "--output", "9:n"]
@@ -91,6 +152,28 @@ def test_render(deck, tmp_path):
     assert done.exit_code == 0, done.output
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
     assert {p.name for p in out.iterdir()} == due | {"report.html"}
+
+
+def test_specimen_comes_back_as_a_deck(tmp_path):
+    """What is written weighs what the generator says: ρ t (a b) of a plate."""
+    out = tmp_path / "out"
+    sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
+    assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
+    done = call("modes", out / "deck.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
+    assert done.exit_code == 0, done.output
+    mass = json.loads((out / "modes.json").read_text())["mass_kg"]
+    assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)
+
+
+def test_plan_sees_every_mode(deck, tmp_path):
+    """As many sensors as modes or more, no label twice, no mode unseen."""
+    out = tmp_path / "out"
+    done = call("plan", deck, "--modes", 5, "--sensors", 8, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    result = json.loads((out / "plan.json").read_text())
+    labels = [s["label"] for s in result["sensors"]]
+    assert len(set(labels)) == 8
+    assert (out / "sensors.csv").read_text().count("output") == 8
 
 
 BAD = {
@@ -124,7 +207,7 @@ def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     assert not list(tmp_path.glob("runs/*")), "half a run was left"
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c != "report"])
+@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ("report", "specimen")])
 def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
@@ -135,6 +218,9 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     ("arguments", "named"),
     [
         (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
+        (["frf"], "--input"),
+        (["frf", "--input", "1:+Z"], "--output"),
+        (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "alone"),
         (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
@@ -142,6 +228,7 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["render", "--modes", "a-b"], "--modes"),
         (["render", "--modes", "0-3"], "from 1"),
         (["render", "--gif", "100000"], "100000"),
+        (["plan", "--sensors", "3", "--modes", "9"], "3 sensors"),
     ],
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
@@ -150,6 +237,22 @@ def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
     assert done.exit_code == 2, (done.output, done.exception)
     assert named in done.stderr
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["teapot"], "tailgate"),
+        (["plate", "--set", "lenght=1"], "length"),
+        (["plate", "--set", "length=a"], "number"),
+        (["tailgate", "--size", "1"], "6 to 32"),
+        (["panel", "--set", "t"], "KEY=VALUE"),
+    ],
+)
+def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
+    done = call("specimen", *arguments, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
 
 
 def test_out_must_be_a_folder(deck):
@@ -179,3 +282,9 @@ def test_exit_codes(raised, code):
 def test_help_lists_every_command():
     said = call("--help").output
     assert all(name in said for name in COMMANDS)
+
+
+def test_version_is_printed():
+    done = call("--version")
+    assert done.exit_code == 0
+    assert done.output.startswith("chladni ")

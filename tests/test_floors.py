@@ -23,7 +23,8 @@ MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects"}
 MAY_IMPORT["case"] = GROUND | {"model", "dynamics", "meshing", "fem", "ema"}
 BELOW = MAY_IMPORT["updating"] | {"updating", "meshing", "bench", "case"}
 MAY_IMPORT |= {"view": BELOW, "study": BELOW, "report": BELOW}
-MAY_IMPORT["cli"] = BELOW | {"view", "study", "report"}
+MAY_IMPORT["planning"] = BELOW | {"view", "report"}
+MAY_IMPORT["cli"] = BELOW | {"view", "study", "report", "planning"}
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},

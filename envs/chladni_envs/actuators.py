@@ -11,7 +11,7 @@ from chladni.errors import ShapeError
 
 from . import drawing
 from .placement import Reset, Step
-from .specimens import Specimen, plate
+from .specimens import Specimen, of_case, plate
 
 WORST = 1e6  # condition numbers beyond this are no worse than useless
 
@@ -41,7 +41,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     clearance : (g,)          [m]
     force : amplitude for which nothing may rattle [N]
     quantity : what the sensors measure
-    case : folder             a case whose deck gives candidates and modes
+    case : folder or deck     whose mesh gives candidates and modes
     modes : int               number of target modes of a case
     """
 
@@ -62,11 +62,9 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         modes: int = 24,
         render_mode: str | None = None,
     ) -> None:
-        if specimen is None and case is not None:
-            from .cases import specimen as of_case
-
-            specimen = of_case(case, modes)
-        s = self.specimen = specimen or plate(7, 7, 6)
+        if specimen is None:
+            specimen = plate(7, 7, 6) if case is None else of_case(case, modes)
+        s = self.specimen = specimen
         n, r = s.phi.shape
         at = best_layout(s.phi, min(n, r + 2)) if sensors is None else np.asarray(sensors)
         self.shaker = shaking(s.frequency, s.damping, s.phi[at], s.phi, quantity)

@@ -9,7 +9,7 @@ import numpy as np
 from chladni.ema.pretest import Candidates, Rules, Walk, candidates
 
 from . import drawing
-from .specimens import plate
+from .specimens import of_case, plate
 
 Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
@@ -43,7 +43,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     noise, prior, rules : as in :func:`chladni.ema.pretest.effective_independence`
     unusable : float              share of candidates that, drawn anew at each reset, turn out
                                   not to be usable
-    case : folder                 a case whose deck gives candidates and modes (phi is then None)
+    case : folder or deck         whose mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case
     """
 
@@ -65,7 +65,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         render_mode: str | None = None,
     ) -> None:
         if phi is None:
-            specimen = _of_case(case, modes) if case is not None else plate()
+            specimen = plate() if case is None else of_case(case, modes)
             phi, points = specimen.phi, specimen.points
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
@@ -125,9 +125,3 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             "score": float(self.walk.log_det - self.start),
             "kept": self.walk.kept.copy(),
         }
-
-
-def _of_case(case: str, modes: int) -> Any:
-    from .cases import specimen
-
-    return specimen(case, modes)

@@ -52,3 +52,10 @@ def plate(
     labels = tuple(f"{k + 1}:+Z" for k in range(len(X)))
     points = np.column_stack([X, Y])
     return Specimen(points, phi, omega[low] / (2 * np.pi), np.full(modes, zeta), labels)
+
+
+def of_case(case: str, modes: int) -> Specimen:
+    """Candidates and target modes of a case folder or deck (:mod:`chladni_envs.cases`)."""
+    from .cases import specimen  # loads the finite element part of the package only now
+
+    return specimen(case, modes)

@@ -1,6 +1,7 @@
 """Coupled superposition has two limits: plain superposition and direct inversion."""
 
 import numpy as np
+import pytest
 import scipy.sparse as sp
 
 from chladni.dynamics.coupled import coupled_receptance
@@ -20,11 +21,14 @@ def chain(n=7, damper=0.0):
     return System(*(sp.csr_array(A) for A in (np.diag(RNG.uniform(0.8, 1.2, n)), V, K)), dofs)
 
 
-def test_without_dampers_it_is_superposition():
+@pytest.mark.parametrize("structural", [False, True])
+def test_without_dampers_it_is_superposition(structural):
     modal = normal_modes(chain()).with_damping(0.02)
     phi = modal.shapes[[0, 3]]
-    plain = transfer(modal, phi, phi, 2j * np.pi * F, structural=True)
-    np.testing.assert_allclose(coupled_receptance(modal, phi, phi, F), plain, rtol=1e-10)
+    plain = transfer(modal, phi, phi, 2j * np.pi * F, structural=structural)
+    np.testing.assert_allclose(
+        coupled_receptance(modal, phi, phi, F, structural=structural), plain, rtol=1e-10
+    )
 
 
 def test_with_all_modes_it_is_inversion():

@@ -3,6 +3,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse.csgraph import structural_rank
 
 from chladni.dynamics import dissection
 from chladni.dynamics.factor import backward_error, factorise, inertia
@@ -101,6 +102,18 @@ def test_dissection_is_an_elimination_order():
         later = position[A[pivots].indices]
         later = later[later >= fronts.start[i + 1]]
         assert np.isin(later, fronts.boundary[i]).all()
+
+
+@given(st.integers(0, 10**6), st.integers(1, 40))
+@settings(max_examples=40, deadline=None)
+def test_separator_is_the_smallest_cover(seed, edges):
+    """It touches every edge of the cut, and is as large as a matching (König): none is smaller."""
+    rng = np.random.default_rng(seed)
+    u, v = rng.integers(0, 10, edges), rng.integers(10, 20, edges)
+    cover = dissection._cover(u, v, 20)
+    assert np.all(cover[u] | cover[v])
+    cut = sp.csr_array((np.ones(edges), (u, v - 10)), shape=(10, 10))
+    assert cover.sum() == structural_rank(cut)
 
 
 def test_fill_grows_like_n_log_n():

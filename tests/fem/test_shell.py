@@ -70,6 +70,21 @@ def test_matrices_turn_with_the_element(points, triangle):
     np.testing.assert_allclose(K_r, big @ K @ big.T, atol=1e-12 * np.abs(K).max())
 
 
+def test_a_triangle_has_no_first_corner():
+    """The same corners numbered from another one give the same matrix."""
+    geo, t = one(WARPED, [0.1, 0.12, 0.08, 0.08], triangle=True)
+    again, t_again = one(WARPED[[1, 2, 0]], [0.12, 0.08, 0.1, 0.1], triangle=True)
+    S = np.array([[[1.0, 0], [0, 1]]]) * 1e9  # isotropic: each frame is its own
+    plain = dict(FULL, S=S)
+    K, K_again = (
+        shell.stiffness(g, thick, **plain)[0] for g, thick in ((geo, t), (again, t_again))
+    )
+    order = (6 * np.array([1, 2, 0])[:, None] + np.arange(6)).ravel()
+    np.testing.assert_allclose(
+        K_again[:18, :18], K[np.ix_(order, order)], atol=1e-12 * np.abs(K).max()
+    )
+
+
 def test_a_shell_without_area_is_refused():
     with pytest.raises(ModelError, match=r"shells \[7\]"):
         one(FLAT[[0, 2, 1, 3]])

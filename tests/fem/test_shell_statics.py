@@ -152,6 +152,18 @@ def test_straight_cantilever(shape):
         assert u[tip, k].mean() == pytest.approx(0.63 * exact if leaning else exact, rel=0.03)
 
 
+def test_residual_bending_makes_a_strip_exact():
+    """w = FL³/3EI + 6FL/5GA with n = 2 elements; without it 1/4n² of the bending is missing."""
+    L, b, t, E = 1.0, 0.1, 0.01, 70e9
+    points, nodes = grid(np.linspace(0, L, 3), np.array([0, b]))
+    root, tip = ends(points[:, 0])
+    strip = held(sheet(points, nodes, t, Isotropic(E, 0.0)), (root, ALL))
+    bending, shear = 4 * L**3 / (E * b * t**3), 1.2 * L / (E / 2 * b * t)
+    for on, due in ((True, bending + shear), (False, bending * (1 - 1 / 16) + shear)):
+        u = deflection(strip, nodal(strip, (tip, (0, 0, 1))), residual_bending=on)
+        assert u[tip, 2].mean() == pytest.approx(due, rel=1e-8)
+
+
 def test_strip_in_torsion():
     """One element across: MacNeal-Harder's twist, 0.03208; their element has 0.94 of it.
 

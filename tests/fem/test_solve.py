@@ -8,6 +8,7 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.errors import LabelError, ModelError
 from chladni.fem import solve
 from chladni.fem.assemble import structure
+from chladni.model.analysis import Analysis, Load, Motion, Subcase
 from chladni.model.assembly import Assembly, Beams, Masses, RigidBody, Scalars
 from chladni.model.properties import BeamSection, Isotropic, Part
 
@@ -195,6 +196,30 @@ def test_driven_by_all_modes_is_driven_directly():
     direct = solve.driven(made, dofs, values, f, out)
     modal = solve.driven(made, dofs, values, f, out, normal_modes(structure(made).system))
     assert_allclose(modal, direct, rtol=1e-7, atol=1e-9 * np.abs(direct).max())
+
+
+def test_dashpots_couple_the_modes_of_a_driven_structure():
+    """With a damper on the tip the sum over all modes still is the direct answer."""
+    one = np.array([1])
+    tip = Scalars(one, np.array([[N, -1]]), np.array([[2, 1]]), np.array([3.0]), np.zeros(1))
+    made, f = cantilever(dampers=tip, structural_damping=0.02), np.array([13.0, 90.0])
+    dofs, out, value = np.array([(0, 2)]), np.array([[N + 1, 2]]), np.array([[0.01]])
+    modal = solve.driven(made, dofs, value, f, out, normal_modes(structure(made).system))
+    assert_allclose(modal, solve.driven(made, dofs, value, f, out), rtol=1e-7)
+
+
+def test_subcase_adds_loads_weight_and_settling():
+    """A set of forces and gravity, and a support moved by the SPC set: the sum of the three."""
+    made = cantilever()
+    force = Load(np.array([N]), np.array([2]), np.array([5.0]), np.array([0, -9.81, 0]))
+    settled = Motion(np.array([0]), np.array([2]), np.array([0.003]))
+    case = Subcase(1, spc=7, load=4)
+    both = solve.subcase_statics(made, Analysis(101, (case,), {4: force}, {7: settled}), case)
+    loaded = solve.subcase_statics(made, Analysis(101, (case,), {4: force}), case)
+    alone = solve.static(structure(made), 5 * unit_load(N + 1, 6 * N + 1))
+    weight = solve.inertia_load(made, np.array([[0], [-9.81], [0]]))
+    assert_allclose(loaded - alone, solve.static(structure(made), weight), atol=1e-15)
+    assert_allclose((both - loaded).reshape(-1, 6)[:, 1], 0.003, rtol=1e-9)
 
 
 def test_motion_is_read_in_displacement_frames():

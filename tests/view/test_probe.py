@@ -1,5 +1,7 @@
 """The question to VTK is put to a child, once; a crash there is an answer."""
 
+import subprocess
+
 import pytest
 
 from chladni.errors import FileError
@@ -52,4 +54,17 @@ def test_a_wish_overrides_and_a_wrong_one_is_refused(monkeypatch):
 def test_a_broken_cache_is_no_obstacle(monkeypatch):
     monkeypatch.setattr(probe, "opens", lambda name: True)
     (probe.cache_folder() / "graphics.json").write_text("{half")
+    assert probe.window() == probe.WINDOWS["osmesa"]
+
+
+def test_a_busy_machine_is_asked_again(monkeypatch):
+    """A child that does not answer in time says nothing about the library."""
+
+    def late(name):
+        raise subprocess.TimeoutExpired("child", 60)
+
+    monkeypatch.setattr(probe, "opens", late)
+    assert probe.window() is None
+    monkeypatch.setattr(probe, "opens", lambda name: True)
+    probe.window.cache_clear()
     assert probe.window() == probe.WINDOWS["osmesa"]

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "plan",
     "identify",
     "report",
+    "specimen",
 )
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
 
@@ -62,7 +63,17 @@ def _said(error: object, code: int) -> int:
     return code
 
 
+def _tell(wanted: bool) -> None:
+    if wanted:
+        from ..report.page import own_version
+
+        typer.echo(f"chladni {own_version()}")
+        raise typer.Exit(DONE)
+
+
 def _version(
-    version: bool = typer.Option(False, "--version", is_eager=True, help="Print the version."),
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Find, name and repair the physics a finite element model left out."""

@@ -1,28 +1,41 @@
 """``chladni frf``: frequency response functions of a deck or case."""
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, cast
 
 import numpy as np
+import scipy.sparse as sp
 import typer
 
+from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, Quantity, residual_flexibility
+from ..dynamics.modes import ModalModel
 from ..ema.tables_write import write_npz
 from ..errors import FileError, LabelError
+from ..model.analysis import Analysis
 from ..report.blocks import Picture, Table
 from ..report.words import number
-from .model import Model, load_model
+from .model import Model, is_case, load_deck, load_model
 from .run import Out, Run, Units, started
 
 UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
+_MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
+REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
+_SHOWN = 12
 
 
 def run(
     source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
-    input: Annotated[list[str], typer.Option("--input", help="Where it is driven, as 12:+Z.")],
-    output: Annotated[list[str], typer.Option("--output", help="Where it answers, as 55:+Z.")],
+    input: Annotated[
+        list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
+    ] = None,
     band: Annotated[str, typer.Option(help="From and to, in Hz.")] = "1:200",
     lines: Annotated[int, typer.Option(help="How many frequencies.", min=2)] = 800,
     damping: Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)] = 0.01,
@@ -32,18 +45,27 @@ def run(
     units: Units = None,
     out: Out = None,
 ) -> None:
-    """Frequency responses between degrees of freedom, with what higher modes contribute."""
+    """Frequency responses between degrees of freedom; without --input those the deck asks for."""
     low, high = limits(band)
     if quantity not in UNIT:
         raise LabelError(f"no quantity {quantity!r}; there are {', '.join(UNIT)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units)
-        frequency = np.linspace(low, high, lines)
-        found = response(job, model, output, input, frequency, damping)
-        found = found.to(cast(Quantity, quantity))
+        if not input:
+            found = of_deck(job, source, units, output or [])
+        else:
+            model, frequency = load_model(source, units), np.linspace(low, high, lines)
+            found = response(job, model, _asked(output), input, frequency, damping)
+        if found.quantity != "transmissibility":
+            found = found.to(cast(Quantity, quantity))
         write_npz(job.keep("frf.npz", "the responses as arrays"), found)
         _page(job, found)
+
+
+def _asked(output: list[str] | None) -> list[str]:
+    if not output:
+        raise FileError("--input needs at least one --output, as --output 55:+Z")
+    return output
 
 
 def limits(text: str) -> tuple[float, float]:
@@ -69,38 +91,119 @@ def response(
     frequency: np.ndarray,
     damping: float,
 ) -> FRF:
-    """Receptance by modes up to twice the band and the static rest of the others."""
-    from ..dynamics.eigen import normal_modes
-
+    """Receptance by modes up to three times the band and the static rest of the others."""
+    if bases := [text for text in inputs if text.startswith("base:")]:
+        return _from_base(job, model, outputs, bases, list(inputs), frequency, damping)
     s = model.structure
     pick, load = (model.directions(labels).T.toarray() for labels in (outputs, inputs))
-    job.progress(f"modes of {len(s.system.dofs)} degrees of freedom", 0.2)
-    modal = normal_modes(s.system, band=2 * frequency[-1], points=model.places)
-    if not len(modal):
-        modal = normal_modes(s.system, 1, points=model.places)
-    modal = modal.with_damping(damping)
-    job.progress("residual of higher modes", 0.6)
+    modal = _modes(job, model, frequency[-1], damping)
     rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
-    loss = s.hysteretic().K.imag
+    loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
-    job.notes.append(
-        f"{len(modal)} modes up to {number(2 * frequency[-1])} Hz were superposed with damping "
-        f"ratio {number(damping)}; what higher modes contribute was added as a static residual."
-    )
     return FRF(H, frequency, tuple(outputs), tuple(inputs))
+
+
+def _modes(job: Run, model: Model, top: float, damping: float) -> ModalModel:
+    from ..dynamics.eigen import normal_modes
+
+    s, limit = model.structure, REACH * top
+    job.progress(f"modes of {len(s.system.dofs)} degrees of freedom", 0.2)
+    modal = normal_modes(s.system, band=limit, points=model.places)
+    if not len(modal):
+        modal = normal_modes(s.system, 1, points=model.places)
+    job.progress("residual of higher modes", 0.6)
+    job.notes.append(
+        f"{len(modal)} modes up to {number(limit)} Hz were superposed with damping ratio "
+        f"{number(damping)}; what higher modes contribute was added as a static residual."
+    )
+    return modal.with_damping(damping)
+
+
+def _from_base(
+    job: Run,
+    model: Model,
+    outputs: Sequence[str],
+    bases: list[str],
+    inputs: list[str],
+    frequency: np.ndarray,
+    damping: float,
+) -> FRF:
+    """Acceleration per acceleration of all supports (transmissibility)."""
+    from ..fem.solve import base_response, inertia_load
+
+    if len(inputs) > 1:
+        raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
+    _, axis, sign = parse(bases[0].replace("base:", "0:"))
+    ends = [parse(text) for text in outputs]
+    dofs, s = np.array([(point, c) for point, c, _ in ends]), model.structure
+    load = s.T.T @ inertia_load(model.assembly, -np.eye(3)[:, axis - 1 : axis])
+    modal, pick = _modes(job, model, frequency[-1], damping), s.rows(dofs).T.toarray()
+    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    found = base_response(s, modal, axis, frequency, dofs, residual=rest)
+    signs = sign * np.array([c for _, _, c in ends])
+    return replace(
+        found,
+        values=found.values * signs[:, None],
+        outputs=tuple(outputs),
+        inputs=tuple(inputs),
+    )
+
+
+def of_deck(job: Run, source: Path, units: str | None, outputs: Sequence[str]) -> FRF:
+    """Displacements under the deck's own dynamic loads, one column a subcase.
+
+    Raises
+    ------
+    FileError
+        If it is a case, or a deck that asks for no frequency response.
+    """
+    from ..fem.respond import response as answer
+
+    if is_case(source):
+        raise FileError(f"{source}: a case needs --input and --output, as --input 12:+Z")
+    model, asked = load_deck(source, units)
+    cases = [c for c in asked.subcases if c.dload and c.frequency]
+    if not cases:
+        raise FileError(f"{source} asks for no frequency response; give --input and --output")
+    labels = list(outputs) or _loaded(model, asked)
+    ends = [parse(text) for text in labels]
+    dofs = np.array([(point, c) for point, c, _ in ends])
+    columns = []
+    for k, case in enumerate(cases):
+        job.progress(f"subcase {case.id}", 0.2 + 0.6 * k / len(cases))
+        f, u = answer(model.structure, asked, case, dofs)
+        columns.append(u * [sign for *_, sign in ends])
+    job.notes.extend(asked.notes)
+    job.notes.append(
+        "Each input is a subcase with all its loads, as the deck gives them: values are motion, "
+        "not motion per unit force."
+    )
+    return FRF(np.stack(columns, axis=2), f, tuple(labels), tuple(f"subcase {c.id}" for c in cases))
+
+
+def _loaded(model: Model, asked: Analysis) -> list[str]:
+    """The loaded degrees of freedom, for want of a wish."""
+    ends = {
+        (int(model.assembly.ids[row]), int(c))
+        for loads in asked.dynamic.values()
+        for load in loads
+        for row, c in zip(load.rows, load.components, strict=True)
+    }
+    return [label(point, c) for point, c in sorted(ends)[:_SHOWN]]
 
 
 def _page(job: Run, found: FRF) -> None:
     from ..view import plots
 
+    unit = (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
     pictures = []
     for j, drive in enumerate(found.inputs):
-        for i, answer in enumerate(found.outputs[:12]):
-            name = f"frf_{answer}_from_{drive}.png".replace(":", "_").replace("+", "p")
+        for i, answer in enumerate(found.outputs[:_SHOWN]):
+            name = re.sub(r"[^A-Za-z0-9]+", "_", f"frf_{answer}_from_{drive}".replace("-", "m"))
             title, curve = f"{answer} from {drive}", (found.frequency, found.values[:, i, j])
-            path = job.keep(name, title)
-            plots.frf(path, {"model": curve}, title, UNIT[found.quantity])
+            path = job.keep(f"{name}.png", title)
+            plots.frf(path, {"model": curve}, title, unit)
             pictures.append(Picture(path))
     peak = np.abs(found.values).max(axis=0)
     at = found.frequency[np.abs(found.values).argmax(axis=0)]
@@ -109,7 +212,7 @@ def _page(job: Run, found: FRF) -> None:
         for i, answer in enumerate(found.outputs)
         for j, drive in enumerate(found.inputs)
     ]
-    heads = ("output", "input", f"largest [{UNIT[found.quantity]}]", "at [Hz]")
+    heads = ("output", "input", f"largest [{unit}]" if unit else "largest", "at [Hz]")
     f = found.frequency
     job.lead = f"{len(rows)} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
     job.section("Responses", [*pictures, Table(heads, rows, ("output", "input"))])

@@ -29,8 +29,8 @@ def run(
         str, typer.Option(help="receptance, mobility, ... where the file does not say.")
     ] = "",
     averages: Annotated[
-        int | None, typer.Option(help="Averages of the estimate, for the noise.", min=1)
-    ] = None,
+        int, typer.Option(help="Averages of the estimate, for the noise.", min=1)
+    ] = 1,
     out: Out = None,
 ) -> int:
     """Poles with their spread, damping and residues; a stabilisation diagram and the fit."""
@@ -55,7 +55,7 @@ def _one(
     k: int,
     recording: Recording,
     band: tuple[float, float] | None,
-    averages: int | None,
+    averages: int,
     total: int,
 ) -> dict[str, Any]:
     job.progress(f"poles of {recording.name}", k / total)

@@ -13,6 +13,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import FileError, LabelError
 from ..fem.assemble import Structure, structure
+from ..model.analysis import Analysis
 from ..model.assembly import Assembly
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
@@ -81,10 +82,20 @@ def load_model(source: Path, units: str | None = None) -> Model:
         from ..case import load_case
 
         return Model(source, load_case(source).assembly)
-    from ..meshing.nastran import assembly, read_deck
+    return load_deck(source, units)[0]
 
+
+def load_deck(source: Path, units: str | None = None) -> tuple[Model, Analysis]:
+    """The model of a bare deck and what the deck asks of it."""
+    from ..meshing.nastran import assembly, read_deck
+    from ..meshing.nastran.analysis import analysis
+
+    if not source.is_file():
+        raise FileError(f"no file {source}{beside(source)}")
     system = None if units is None else unit_system(units)
-    return Model(source, assembly(read_deck(source), system), "" if system is None else "m")
+    deck = read_deck(source)
+    model = Model(source, assembly(deck, system), "" if system is None else "m")
+    return model, analysis(deck, system)
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
@@ -99,6 +110,13 @@ def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
             f"grid {ids[bare][0]} is on no shell, so it has no normal; give +X, +Y, +Z"
         )
     return np.asarray(normal[at] / length)
+
+
+def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:
+    """Values of the shells as values of all faces; skins of solids have none (nan)."""
+    values = np.full(len(seen.faces), np.nan)
+    values[: len(of_shells)] = of_shells
+    return values
 
 
 def is_case(source: Path) -> bool:

@@ -10,7 +10,7 @@ from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..report.blocks import Picture
 from ..report.words import number
-from .model import Model, load_model
+from .model import Model, load_model, on_faces
 from .run import Out, Run, Units, started
 
 
@@ -77,8 +77,7 @@ def _still(job: Run, model: Model, thickness: bool) -> None:
     if thickness:
         if not len(model.assembly.shells):
             raise FileError(f"{job.source} has no shells, so there is no thickness to show")
-        t = np.full(len(seen.faces), np.nan)
-        t[: len(model.assembly.shells)] = model.assembly.thickness()
+        t = on_faces(seen, model.assembly.thickness())
         pictures.append(scene.thickness_map(job.keep("thickness.png", "shell thickness"), seen, t))
     job.section("Structure", [Picture(p) for p in pictures])
 
@@ -113,8 +112,7 @@ def _energies(job: Run, model: Model, modal: ModalModel, chosen: list[int]) -> N
     density = e / np.linalg.norm(model.seen.areas()[: len(e)], axis=1)[:, None]
     pictures = []
     for column, k in zip(density.T, chosen, strict=True):
-        values = np.full(len(model.seen.faces), np.nan)
-        values[: len(e)] = column / column.max()
+        values = on_faces(model.seen, column / column.max())
         path = job.keep(f"energy_{k}.png", f"strain energy of mode {k}")
         name = f"strain energy per area, mode {k} ({number(modal.frequency[k - 1])} Hz), relative"
         pictures.append(scene.scalar_map(path, model.seen, values, name, cmap="magma"))

@@ -4,13 +4,14 @@ import ast
 import inspect
 from collections.abc import Callable
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from ..errors import FileError, LabelError, ModelError
+from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.plates import box, folded_panel, plate
@@ -20,7 +21,7 @@ from ..output import write_text
 from ..report.blocks import Facts, Picture
 from ..report.words import number
 from ..units import units as unit_system
-from .model import normals_at
+from .model import normals_at, on_faces
 from .run import Out, Run, started
 
 _CANDIDATES = 60
@@ -66,8 +67,7 @@ def _page(job: Run, made: Assembly, formed: Assembly, grids: np.ndarray) -> None
         scene.Marker(tuple(made.points[r].tolist()), tuple(d.tolist()), str(g))
         for r, d, g in zip(at, n, grids, strict=True)
     ]
-    t = np.full(len(seen.faces), np.nan)
-    t[: len(formed.shells)] = formed.thickness()
+    t = on_faces(seen, formed.thickness())
     pictures = [
         scene.sensors(job.keep("candidates.png", "candidates for sensors"), seen, markers),
         scene.thickness_map(job.keep("thickness.png", "shell thickness after forming"), seen, t),
@@ -150,9 +150,12 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
     """
     known = [n for n in inspect.signature(build).parameters if n != "material"]
     if wrong := [key for key in values if key not in known]:
-        raise LabelError(f"no setting {wrong}; there are {', '.join(known)}")
+        near = get_close_matches(wrong[0], known, 3) or known
+        raise LabelError(f"no setting {wrong[0]!r}; there are {', '.join(near[:12])} ...")
     try:
         return build(**values)
+    except ChladniError:
+        raise
     except (TypeError, ValueError, IndexError) as error:
         raise ModelError(f"a setting has the wrong kind of value: {error}") from error
 

@@ -16,24 +16,27 @@ def coupled_receptance(
     V: sp.csr_array | None = None,
     loss: sp.csr_array | None = None,
     residual: Residual | None = None,
+    structural: bool = False,
 ) -> np.ndarray:
-    """H(ω) = φ_o [Λ (1 + 2 i ζ) - ω² I + i ω ΦᵀVΦ + i ΦᵀK_lossΦ]⁻¹ φ_iᵀ + R(ω).
+    """H(ω) = φ_o [Λ + 2 i ω ζ Ω - ω² I + i ω ΦᵀVΦ + i ΦᵀK_lossΦ]⁻¹ φ_iᵀ + R(ω), Λ = Ω².
 
-    Structural modal damping 2 ζ_r; without V and loss this is plain superposition.
+    Without V and loss this is plain superposition.
 
     Parameters
     ----------
     phi_out, phi_in : (n_out, r), (n_in, r)   rows of Φ or combinations [1/√kg]
     frequency : (n_f,)                        [Hz]
     V, loss : (n, n) sparse, optional         [N s/m], imaginary stiffness [N/m]
+    structural :                              2 i ζ Λ in place of the viscous modal term
 
     Returns
     -------
     (n_f, n_out, n_in) complex [m/N]
     """
     omega = 2 * np.pi * np.asarray(frequency, dtype=float)[:, None, None]
-    lam, eye = (2 * np.pi * modal.frequency) ** 2, np.eye(len(modal))
-    Z = np.diag(lam * (1 + 2j * modal.damping)) - omega**2 * eye
+    w_r, eye = 2 * np.pi * modal.frequency, np.eye(len(modal))
+    modal_loss = np.diag(2j * modal.damping * (w_r**2 if structural else w_r))
+    Z = np.diag(w_r**2) - omega**2 * eye + (1 if structural else omega) * modal_loss
     for factor, A in ((1j * omega, V), (1j, loss)):
         if A is not None and A.nnz:
             Z = Z + factor * (modal.shapes.T @ (A @ modal.shapes))

@@ -2,8 +2,8 @@
 
 George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are gathered into nodes first (six dofs, one
 vertex), vertices are split at medians of their coordinates, and the smaller shore of each cut is
-the separator. Where nobody knows the places, distances in the graph to a few far vertices make
-some: pivot multidimensional scaling (Brandes and Pich 2007).
+the separator. Where nobody knows the places, distances in the graph from a few far vertices stand
+for coordinates; their planes are the level sets of George and Liu (1978, SIAM J. Numer. Anal. 15).
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import dijkstra, maximum_bipartite_matching
 
 from ..errors import ShapeError
 
 _LEAF = 24  # vertices eliminated as one dense block
 _HUB = 10  # times the mean degree: such a vertex belongs to the last separator
-_LANDMARKS = 8
+_LANDMARKS = 12
+_TRIES = 12  # coordinates tried for a cut, the widest first
 _CUTS = (0.5, 0.42, 0.58)
 
 
@@ -62,7 +63,7 @@ def analyse(
             raise ShapeError(f"{len(given)} {name} given, one for each of {n} rows is needed")
     vertex = np.arange(n) if nodes is None else np.unique(nodes, return_inverse=True)[1]
     G = quotient(A, vertex)
-    places = scaled(G) if points is None else _mean(np.asarray(points, float), vertex)
+    places = distances(G) if points is None else _mean(np.asarray(points, float), vertex)
     pivots, children = _dissected(G, places)
     return _symbolic(G, vertex, pivots, children)
 
@@ -86,20 +87,23 @@ def _mean(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
     return total / np.bincount(vertex)[:, None]
 
 
-def scaled(G: sp.csr_array) -> np.ndarray:
-    """Coordinates (N, 3) in which hop distance is near to distance (pivot MDS)."""
-    N = G.shape[0]
-    nearest, far, D = np.full(N, np.inf), 0, []
-    for _ in range(min(_LANDMARKS, N)):
-        d = dijkstra(G, unweighted=True, indices=far)
-        d[np.isinf(d)] = 2 * d[np.isfinite(d)].max() + 2  # another component: far away
-        D.append(d)
-        nearest = np.minimum(nearest, d)
-        far = int(np.argmax(nearest))
-    C = np.array(D).T ** 2
-    C = C - C.mean(axis=0) - C.mean(axis=1, keepdims=True) + C.mean()
-    _, V = np.linalg.eigh(C.T @ C)
-    return np.asarray(C @ V[:, ::-1][:, :3])
+def distances(G: sp.csr_array) -> np.ndarray:
+    """Hops from a few far vertices (N, _LANDMARKS): level sets of them are narrow cuts."""
+    hops = _hops(G, 0)
+    nearest = hops
+    columns: list[np.ndarray] = []
+    for _ in range(_LANDMARKS):
+        hops = _hops(G, int(np.argmax(nearest)))
+        nearest = hops if not columns else np.minimum(nearest, hops)
+        columns.append(hops)
+    return np.array(columns).T
+
+
+def _hops(G: sp.csr_array, start: int) -> np.ndarray:
+    """Number of edges on the shortest way from a vertex; another component is far away."""
+    hops = dijkstra(G, unweighted=True, indices=start)
+    hops[np.isinf(hops)] = 2 * hops[np.isfinite(hops)].max() + 2
+    return hops
 
 
 def _dissected(
@@ -139,19 +143,44 @@ def _dissected(
 def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
     m, extent = len(x), np.ptp(x, axis=0)
-    axes = [a for a in np.argsort(-extent) if extent[a] >= 0.3 * extent.max()]
-    best, cost = None, np.inf
+    axes = [a for a in np.argsort(-extent)[:_TRIES] if extent[a] >= 0.3 * extent.max()]
+    best, cost = np.zeros(m, bool), np.inf
     for axis in axes:
         rank = np.argsort(np.argsort(x[:, axis], kind="stable"))
         for low in _halves(x[:, axis], rank):
             cross = low[u] & ~low[v]
-            for shore in (u[cross], v[cross]):
-                separator = np.bincount(shore, minlength=m) > 0
-                balance = abs(2 * np.sum(low & ~separator) / m - 1)
-                if (price := separator.sum() * (1 + balance)) < cost:
-                    best, cost = np.where(separator, 2, np.where(low, 0, 1)), price
-    assert best is not None
-    return best
+            shores = [np.count_nonzero(np.bincount(w[cross], minlength=m)) for w in (u, v)]
+            price = min(shores) * (1 + abs(2 * low.sum() / m - 1))
+            if price < cost:
+                best, cost = low, price
+    cross = best[u] & ~best[v]
+    return np.where(_cover(u[cross], v[cross], m), 2, np.where(best, 0, 1))
+
+
+def _cover(u: np.ndarray, v: np.ndarray, m: int) -> np.ndarray:
+    """Fewest vertices that touch every edge u-v of a cut, True in (m,) (König 1931).
+
+    A largest matching, and from its unmatched lower ends alternately over the edges and back along
+    the matching: the cover is what was not reached below and what was reached above.
+    """
+    below, i = np.unique(u, return_inverse=True)
+    above, j = np.unique(v, return_inverse=True)
+    edges = sp.csr_array((np.ones(len(i), np.int8), (i, j)), shape=(len(below), len(above)))
+    mate = maximum_bipartite_matching(edges, perm_type="column")
+    back = np.full(len(above), -1)
+    back[mate[mate >= 0]] = np.flatnonzero(mate >= 0)
+    reached, over = mate < 0, np.zeros(len(above), bool)
+    while True:
+        fresh = np.zeros(len(above), bool)
+        fresh[j[reached[i]]] = True
+        fresh &= ~over
+        if not fresh.any():
+            break
+        over |= fresh
+        reached[back[fresh]] = True
+    cover = np.zeros(m, bool)
+    cover[below[~reached]] = cover[above[over]] = True
+    return cover
 
 
 def _halves(x: np.ndarray, rank: np.ndarray) -> list[np.ndarray]:

@@ -26,6 +26,7 @@ _LOOSE = 1e-6  # Ritz error of a mode handed out (frequencies are as good as its
 _FINITE = 1e-9  # θ/θ_max below which a massless motion is meant
 _FIRM = 1e-6  # of the median K_ii/M_ii: shift of small systems
 _ROUNDING = 1e-12
+_JUST_ABOVE = 1 + 1e-6  # a band that ends at a mode includes it, whatever the rounding
 
 
 def normal_modes(
@@ -61,15 +62,15 @@ def normal_modes(
         If modes are missing, not mass-orthonormal, or no eigenvectors.
     """
     n = len(system.dofs)
-    limit = np.inf if band is None else (2 * np.pi * band) ** 2
+    limit = np.inf if band is None else (2 * np.pi * band) ** 2 * _JUST_ABOVE
     K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
     if n <= _DENSE or (count is not None and 3 * count > n):
-        lam, phi = _dense(K, M, system.dofs, count)
+        lam, phi = _dense(K, M, system.dofs, count, limit)
     else:
         order = analyse(abs(K) + abs(M), points, system.dofs[:, 0])
         problem = _Problem(K, M, system.dofs, backend, order)
-        wanted = problem.below(limit) if count is None and band is not None else count or 20
-        lam, phi = _sparse(problem, wanted, limit, shift, proof)
+        due = problem.below(limit) if count is None and band is not None else None
+        lam, phi = _sparse(problem, count or 20 if due is None else due, limit, shift, proof, due)
     keep = (lam <= limit) & (np.arange(len(lam)) < (len(lam) if count is None else count))
     lam, phi = lam[keep], np.asfortranarray(phi[:, keep])
     if (gap := _gap(phi, M)) > _ORTHONORMAL:
@@ -131,9 +132,12 @@ def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
 
 
 def _dense(
-    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None
+    K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None, limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Modes by LAPACK: a few from M φ = θ (K - σM) φ, which is sharp below, all from K φ = λ M φ.
+
+    A limit asks for the few below it: where a mass of 1e6 times the structure's drives its base,
+    the small motions there are right only so.
 
     Massless rows follow the others, φ_s = -K_ss⁻¹ K_sm φ_m, and have no modes of their own.
     """
@@ -143,6 +147,8 @@ def _dense(
     try:
         T[massless] = -cho_solve(cho_factor(k[massless][:, massless]), k[massless][:, ~massless])
         k, m = T.T @ k @ T, m[~massless][:, ~massless]
+        if count is None and np.isfinite(limit):
+            count = 1 + int((eigh(k, m, eigvals_only=True) <= limit).sum())
         lam, phi = _few(k, m, -_FIRM * ratio, count) if count else eigh(k, m)
     except LinAlgError as error:
         raise ModelError("K - σM is not positive definite: a part hangs on nothing") from error
@@ -160,9 +166,9 @@ def _few(K: np.ndarray, M: np.ndarray, sigma: float, count: int) -> tuple[np.nda
 
 
 def _sparse(
-    problem: _Problem, k: int, limit: float, shift: float | None, proof: bool
+    problem: _Problem, k: int, limit: float, shift: float | None, proof: bool, due: int | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The k lowest modes, those beyond ``limit`` not cared for."""
+    """The k lowest modes, those beyond ``limit`` not cared for; ``due`` is its Sturm count."""
     if k == 0:
         return np.zeros(0), np.zeros((len(problem.dofs), 0))
     sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
@@ -171,7 +177,10 @@ def _sparse(
     lam, phi = sigma + 1 / ritz.theta[:k], ritz.vectors(k)
     if proof and len(ritz.theta) > k:
         s, known = _gap_above(sigma + 1 / ritz.theta, ritz.error, k)
-        if (due := problem.below(s)) != known:
+        if due is not None:  # the k modes are those below the limit, or some are missing
+            s, known = limit, int(np.sum(lam < limit))
+        due = problem.below(s) if due is None else due
+        if due != known:
             lam, phi = _completed(problem, factor, sigma, lam, phi, s, due)
     _check_residual(problem, factor, sigma, lam, phi)
     return lam[:k], phi[:, :k]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import cholesky, eigh, solve_triangular
+from scipy.linalg import blas, cholesky, eigh, solve_triangular
 
 _DROP = 1e-13  # of the operator's norm: a direction this small carries nothing new
 _THIN = 1e-5  # of it: rounding in such a column is large enough to orthogonalise once more
@@ -44,7 +44,7 @@ def block_lanczos(
     M: sp.csr_array,
     k: int,
     *,
-    block: int = 8,
+    block: int = 12,
     locked: np.ndarray | None = None,
     tolerance: float = 1e-9,
     largest_basis: int | None = None,
@@ -131,7 +131,7 @@ class _Run:
         change = 0.0
         for Q in kept:
             C = Q.T @ MW
-            W -= Q @ C
+            W = blas.dgemm(-1.0, Q, C, beta=1.0, c=W, overwrite_c=True)  # in place
             change = max(change, np.abs(C).max(initial=0.0))
         size = np.sqrt(np.abs(np.einsum("ij,ij->j", W, MW)).min(initial=np.inf))
         return W, MW if change < 1e-11 * size else self.M @ W

@@ -95,7 +95,7 @@ class Fit:
     @property
     def residues(self) -> np.ndarray:
         """(r, n_c) complex."""
-        pairs = self.x[:-2].reshape(len(self.p), 2, -1)
+        pairs = self.x[:-2].reshape(len(self.p), 2, self.x.shape[1])
         return np.asarray(pairs[:, 0] + 1j * pairs[:, 1])
 
 
@@ -216,22 +216,23 @@ def relocated(data: Data, p: np.ndarray) -> np.ndarray:
     Gustavsen (2006), IEEE Trans. Power Delivery 21(3), eqs. 5-11.
     """
     g = data.common[:, None]
-    Q, _ = _orthonormal(data, linear(data.s, p, data.q))
+    ramp = data.s[:, None] ** (data.q - 1.0)  # σ(s) L / s² has a term in 1 / s too
+    Q, _ = _orthonormal(data, np.concatenate([linear(data.s, p, data.q), ramp], axis=1))
     sigma = np.concatenate([basis(data.s, p, 0), np.ones((len(data.s), 1))], axis=1)
     scale = np.linalg.norm(stacked(sigma), axis=0)
     sigma = sigma / scale
     n = sigma.shape[1]
-    G, weight = np.zeros((n, n)), 0.0
+    rows, weight = [], 0.0
     for c in range(data.y.shape[1]):
         B = stacked(g * data.y[:, c, None] * sigma)
         B -= Q @ (Q.T @ B)
-        G += B.T @ B
+        rows.append(np.linalg.qr(B, mode="r"))
         weight += float((np.abs(g[:, 0] * data.y[:, c]) ** 2).sum())
     relax = sigma.real.sum(axis=0) * np.sqrt(weight) / len(data.s)
-    G += np.outer(relax, relax)
-    ridge = 1e-14 * np.trace(G) / n * np.eye(n)
-    x = np.linalg.solve(G + ridge, relax * np.sqrt(weight)) / scale
-    return _zeros(p, x[:-1], x[-1])
+    due = np.zeros(n * len(rows) + 1)
+    due[-1] = np.sqrt(weight)
+    x, *_ = np.linalg.lstsq(np.vstack([*rows, relax]), due, rcond=1e-13)
+    return _zeros(p, x[:-1] / scale[:-1], x[-1] / scale[-1])
 
 
 def _zeros(p: np.ndarray, c: np.ndarray, d: float) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
 from .fitting import Data, Fit, Slope, polish
-from .selection import ORDERS, Rule, Sweep, extended, settled, start, swept
+from .selection import ORDERS, Rule, Sweep, extended, settled, start, swept, uncertainty, untwinned
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
@@ -28,7 +28,6 @@ class Identified:
     frequency_sd, damping_sd : (r,)  standard deviations [Hz], [-]
     gain : (r,)                      rise of χ² without the pole, over what it must pay
     chi : float                      rms of the whitened residual (1: the noise is all that is left)
-    noise : float                    √(χ² per degree of freedom) taken as noise
     outputs, inputs, quantity        as in the recording
     band : (low, high)               [Hz] that was fitted
     diagram : Sweep                  poles of every order, [rad/s]: the stabilisation diagram
@@ -42,7 +41,6 @@ class Identified:
     damping_sd: np.ndarray
     gain: np.ndarray
     chi: float
-    noise: float
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     quantity: str
@@ -64,27 +62,33 @@ class Identified:
         """Number of poles."""
         return len(self.poles)
 
+    @property
+    def inside(self) -> np.ndarray:
+        """True for poles within the band; those beside it stand for what rings next door (r,)."""
+        return (self.band[0] <= self.frequency) & (self.frequency <= self.band[1])
+
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes; the residual terms stay."""
         names = ("poles", "residues", "frequency_sd", "damping_sd", "gain")
         return replace(self, **{name: getattr(self, name)[modes] for name in names})
 
 
-def spread(frf: FRF, averages: int | None = None) -> tuple[np.ndarray, bool]:
-    """Variance E|ΔH|² of every sample, and whether its scale is known.
+def spread(frf: FRF, averages: int = 1) -> np.ndarray:
+    """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
 
     In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
-    Piersol 2010, eq. 9.81), smoothed over nine lines; 1 % of |H| and 0.1 % of its rms.
+    Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
+    1 % of |H| and 0.1 % of its rms.
     """
     H = np.abs(frf.values)
     rms = np.sqrt((H**2).mean(axis=0))
     if frf.variance is not None:
-        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2, True
+        return np.asarray(frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2)
     if frf.coherence is not None:
         gamma = np.clip(frf.coherence, 1e-3, 1.0)
-        ratio = _smooth((1 - gamma) / gamma)
-        return (ratio / (averages or 1) + 0.005**2) * H**2 + (1e-4 * rms) ** 2, bool(averages)
-    return (0.01 * H) ** 2 + (1e-3 * rms) ** 2, False
+        ratio = _smooth((1 - gamma) / gamma) / averages
+        return np.asarray((ratio + 0.01**2) * H**2 + (1e-4 * rms) ** 2)
+    return np.asarray((0.01 * H) ** 2 + (1e-3 * rms) ** 2)
 
 
 def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
@@ -99,7 +103,7 @@ def identify(
     band: tuple[float, float] | None = None,
     orders: tuple[int, ...] = ORDERS,
     largest_damping: float = 0.1,
-    averages: int | None = None,
+    averages: int = 1,
     use: np.ndarray | None = None,
     tries: int = 12,
 ) -> Identified:
@@ -130,21 +134,20 @@ def identify(
             f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
             f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
-    data, top, known = _data(frf, keep, averages)
+    data, top = _data(frf, keep, averages)
     sweep = swept(data, orders, largest_damping)
-    floor = float(sweep.chi.min()) ** 2
-    noise = max(1.0, floor) if known else floor
-    rule = Rule(data.y.shape[1], len(data.s), noise, largest_damping)
+    rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
     p = start(data, sweep, rule)
     fit, slope = settled(data, p, rule)
     fit, slope = extended(data, fit, slope, rule, tries)
-    fit, slope = polish(data, fit.p, rule.largest, tol=0.05 * noise)
-    return _result(frf, keep, data, top, fit, slope, sweep, noise, rule)
+    fit, slope = untwinned(data, fit, slope, rule)
+    fit, slope = polish(data, fit.p, rule.largest, tol=0.05)
+    return _result(frf, keep, data, top, fit, slope, sweep, rule)
 
 
-def _data(frf: FRF, keep: np.ndarray, averages: int | None) -> tuple[Data, float, bool]:
-    """Scaled, weighted samples; the scale of s; whether the noise is known."""
-    variance, known = spread(frf, averages)
+def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[Data, float]:
+    """Scaled, weighted samples, and the scale of s."""
+    variance = spread(frf, averages)
     s = 2j * np.pi * frf.frequency[keep]
     top = float(np.abs(s).max())
     y = frf.values[keep].reshape(len(s), -1)
@@ -154,7 +157,7 @@ def _data(frf: FRF, keep: np.ndarray, averages: int | None) -> tuple[Data, float
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
-    return Data(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top, known
+    return Data(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top
 
 
 def _result(
@@ -165,15 +168,13 @@ def _result(
     fit: Fit,
     slope: Slope,
     sweep: Sweep,
-    noise: float,
     rule: Rule,
 ) -> Identified:
     """Back to rad/s and labels, poles in order, spreads from the Gauss-Newton matrix."""
     n_out, n_in = len(frf.outputs), len(frf.inputs)
     parameters = fit.x.size + 2 * len(fit.p)
     chi = np.sqrt(fit.chi2 / max(data.samples - parameters, 1))
-    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, chi) ** 2
-    sd_f, sd_z = _spreads(fit.p, C)
+    sd_f, sd_z = uncertainty(fit.p, slope, chi**2)
     order = np.argsort(np.abs(fit.p))
     shape = (n_out, n_in)
     f = frf.frequency[keep]
@@ -186,28 +187,12 @@ def _result(
         damping_sd=sd_z[order],
         gain=fit.gain[order] / rule.price,
         chi=float(chi),
-        noise=float(np.sqrt(noise)),
         outputs=frf.outputs,
         inputs=frf.inputs,
         quantity=frf.quantity,
         band=(float(f[0]), float(f[-1])),
         diagram=replace(sweep, poles=top * sweep.poles),
     )
-
-
-def _spreads(p: np.ndarray, C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations of |p| and of ζ from the covariance of (Re p, Im p) (r,)."""
-    k = 2 * np.arange(len(p))
-    blocks = np.stack([C[k, k], C[k, k + 1], C[k + 1, k + 1]], axis=-1)
-    size = np.abs(p)
-    d_size = np.stack([p.real, p.imag], -1) / size[:, None]
-    d_zeta = np.stack([-(p.imag**2), p.real * p.imag], -1) / size[:, None] ** 3
-    sd = [
-        np.sqrt(np.maximum(d[:, 0] ** 2 * blocks[:, 0] + 2 * d[:, 0] * d[:, 1] * blocks[:, 1]
-                           + d[:, 1] ** 2 * blocks[:, 2], 0.0))
-        for d in (d_size, d_zeta)
-    ]  # fmt: skip
-    return sd[0], sd[1]
 
 
 def evaluate(

@@ -4,7 +4,8 @@ Sweep of orders and stable clusters: Van der Auweraer and Peeters (2004), J. Mec
 adding and deleting by the fall of χ² against its cost in parameters.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -43,12 +44,18 @@ class Rule:
     noise: float = 1.0  # χ² per degree of freedom that counts as noise
     largest: float = 0.1  # damping ratio of the most damped pole
     factor: float = 2.5
+    twin: float = 6.0
 
     @property
     def price(self) -> float:
         """Fall of χ² a pole must bring: 2.5 for each parameter and 4 ln(lines) for the search."""
         parameters = 2 * self.channels + 2
         return self.noise * (self.factor * parameters + 4 * np.log(self.lines))
+
+    def after(self, data: Data, fit: Fit) -> Self:
+        """The rule with the misfit of this fit as noise: what is systematic buys no poles."""
+        freedom = max(data.samples - fit.x.size - 2 * len(fit.p), 1)
+        return replace(self, noise=max(self.noise, fit.chi2 / freedom))
 
 
 def compressed(data: Data, most: int = 8) -> Data:
@@ -132,38 +139,53 @@ def start(data: Data, sweep: Sweep, rule: Rule) -> np.ndarray:
     return chosen
 
 
-def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 30) -> tuple[Fit, Slope]:
+def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 40) -> tuple[Fit, Slope]:
     """Polish a little, take out what does not pay, again, until both are at rest.
 
-    A pole does not pay if χ² rises by less than its price without it, or if it has left the
-    neighbourhood of the band.
+    A pole does not pay if χ² rises by less than its price without it. It is no mode if it has
+    left the band by a tenth, sits at the damping limit, or lies inside with a frequency less sure
+    than its bandwidth.
     """
     fit, slope = polish(data, p, rule.largest, 0)
     for _ in range(rounds):
         before = fit.chi2
-        poor = _poor(data, fit, rule)
+        poor = _poor(data, fit, slope, rule.after(data, fit))
         if len(poor):
             fit, slope = polish(data, np.delete(fit.p, poor), rule.largest, 0)
-        else:
-            fit, slope = polish(data, fit.p, rule.largest, 2, rule.noise)
-            if before - fit.chi2 < rule.noise and len(_poor(data, fit, rule)) == 0:
-                break
+            continue
+        fit, slope = polish(data, fit.p, rule.largest, 2, rule.noise)
+        poor = _poor(data, fit, slope, rule.after(data, fit))
+        if before - fit.chi2 < max(rule.noise, 1e-4 * before) and len(poor) == 0:
+            break
     return fit, slope
 
 
-def _poor(data: Data, fit: Fit, rule: Rule) -> np.ndarray:
+def _poor(data: Data, fit: Fit, slope: Slope, rule: Rule) -> np.ndarray:
     """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
-    low, high = 0.85 * float(np.abs(data.s).min()), 1.15 * float(np.abs(data.s).max())
-    away = (np.abs(fit.p) < low) | (np.abs(fit.p) > high)
-    gain = np.where(away, 0.0, fit.gain)
+    low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())
+    size, half = np.abs(fit.p), np.abs(fit.p.real)
+    no_mode = (size < 0.9 * low) | (size > 1.1 * high) | (half > 0.98 * rule.largest * size)
+    inside = (low <= size) & (size <= high)
+    no_mode |= inside & (uncertainty(fit.p, slope, rule.noise)[0] > half)
+    gain = np.where(no_mode, 0.0, fit.gain)
     out: list[int] = []
-    for k in np.argsort(gain):
+    for k in np.lexsort((fit.gain, gain)):
         if gain[k] >= rule.price:
             break
-        width = np.minimum(np.abs(fit.p[out].real), abs(fit.p[k].real))
-        if (np.abs(fit.p[out] - fit.p[k]) > 4 * width).all():
+        if (np.abs(fit.p[out] - fit.p[k]) > 4 * np.minimum(half[out], half[k])).all():
             out.append(int(k))
     return np.array(out, dtype=int)
+
+
+def uncertainty(p: np.ndarray, slope: Slope, noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,)."""
+    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, noise)
+    k = 2 * np.arange(len(p))
+    a, b, d = C[k, k], C[k, k + 1], C[k + 1, k + 1]
+    size, x, y = np.abs(p), p.real, p.imag
+    of_size = x**2 * a + 2 * x * y * b + y**2 * d
+    of_zeta = y**4 * a - 2 * x * y**3 * b + x**2 * y**2 * d
+    return np.sqrt(np.maximum(of_size, 0)) / size, np.sqrt(np.maximum(of_zeta, 0)) / size**3
 
 
 def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tuple[Fit, Slope]:
@@ -171,22 +193,50 @@ def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tupl
     f = np.abs(data.s)
     closed = np.zeros(len(f), bool)
     for _ in range(tries):
-        local = _local(fit, 2 * rule.noise)
+        local = _local(fit)
         local[closed] = 0
         k = int(local.argmax())
         if closed.all() or local[k] < 1.8 * np.median(local[~closed]):
             break
         zeta = float(np.median(-fit.p.real / np.abs(fit.p))) if len(fit.p) else 0.01
         trial = bounded(np.append(fit.p, f[k] * (-zeta + 1j)), rule.largest)
-        better, better_slope = polish(data, trial, rule.largest, 8, rule.noise)
-        if fit.chi2 - better.chi2 > rule.price and better.gain.min() > rule.price:
-            fit, slope = better, better_slope
+        better, its_slope = polish(data, trial, rule.largest, 8, rule.noise)
+        now = rule.after(data, better)
+        if fit.chi2 - better.chi2 > now.price and len(_poor(data, better, its_slope, now)) == 0:
+            fit, slope = better, its_slope
         else:
             closed[max(0, k - 4) : k + 5] = True
     return fit, slope
 
 
-def _local(fit: Fit, expected: float) -> np.ndarray:
-    """χ² around each line over what noise gives (n_f,): moving mean of five lines."""
-    power = (np.abs(fit.e) ** 2).mean(axis=1) / expected
-    return np.convolve(power, np.ones(5) / 5, mode="same")
+def untwinned(data: Data, fit: Fit, slope: Slope, rule: Rule) -> tuple[Fit, Slope]:
+    """Twins made one: two poles in one bandwidth with the same shape are one mode, seen twice.
+
+    A slightly nonlinear or leaky resonance is fitted better by two poles than by one; the second
+    stays only if it brings ``rule.twin`` times its price after the first has been polished alone.
+    """
+    refused: set[complex] = set()
+    while len(weaker := [k for k in _twins(fit) if complex(fit.p[k]) not in refused]):
+        left = np.delete(fit.p, weaker[0])
+        alone, its_slope = polish(data, left, rule.largest, 6, rule.noise)
+        if alone.chi2 - fit.chi2 < rule.twin * rule.after(data, alone).price:
+            fit, slope = alone, its_slope
+        else:
+            refused.add(complex(fit.p[weaker[0]]))
+    return fit, slope
+
+
+def _twins(fit: Fit) -> list[int]:
+    """Weaker partners of pairs within a bandwidth whose residues are alike, weakest first."""
+    half, R = np.abs(fit.p.real), fit.residues
+    close = np.abs(fit.p[:, None] - fit.p) < 1.5 * np.maximum(half[:, None], half)
+    power = (np.abs(R) ** 2).sum(axis=1)
+    alike = np.abs(R.conj() @ R.T) ** 2 > 0.8 * power[:, None] * power
+    weaker = fit.gain[:, None] < fit.gain
+    pairs = (close & alike & weaker).any(axis=1)
+    return [int(k) for k in np.argsort(fit.gain) if pairs[k]]
+
+
+def _local(fit: Fit) -> np.ndarray:
+    """χ² around each line (n_f,): moving mean of five lines, all channels."""
+    return np.convolve((np.abs(fit.e) ** 2).mean(axis=1), np.ones(5) / 5, mode="same")

@@ -73,7 +73,8 @@ class Pattern:
         p, n = self.pairs, len(self.start)
         if self.mask.all():
             spots = np.empty((len(p.column), 6, 6), dtype=np.int8)
-            where = (spots, p.column.astype(np.int32), np.append(p.before, len(spots)))
+            first = np.append(p.before, len(spots)).astype(np.int32)
+            where = (spots, p.column.astype(np.int32), first)
             wide = sp.bsr_array(where, shape=(6 * n, 6 * n)).tocsr()
             return wide.indices, wide.indptr
         count = (p.width[:, None] * self.along).ravel()

@@ -59,12 +59,13 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     if geo.triangle.any():
         epsilon, omega = triangle.membrane(geo.corners)
         kappa, gamma = triangle.plate(geo.corners)
+        weight, N = _quadrature(geo)
     else:
         sheet = POISSON_03 if reference is None else np.asarray(reference)
         sheet = np.where(sheet[..., :1, :1] == 0, POISSON_03, sheet)  # plates without membrane
-        epsilon, omega = _quad_membrane(geo.corners, turned(sheet, geo.turn))
-        kappa, gamma = _quad_plate(geo.corners)
-    weight, N = _quadrature(geo)
+        (weight, inverse), N = jacobians(geo.corners), QUAD_N
+        epsilon, omega = _quad_membrane(geo.corners, weight, inverse, turned(sheet, geo.turn))
+        kappa, gamma = _quad_plate(geo.corners, inverse)
     B = np.zeros((len(geo), len(N), 9, 4, 6))  # nodal motions in the element frame
     B[:, :, MEMBRANE, :, :2] = epsilon.reshape(len(geo), -1, 3, 4, 2)
     B[:, :, BENDING, :, 3:5] = kappa.reshape(len(geo), -1, 3, 4, 2)
@@ -227,7 +228,7 @@ def _quadrature(geo: ShellGeometry) -> tuple[np.ndarray, np.ndarray]:
     """DA (m, g) and N (g, 4)."""
     if geo.triangle.any():
         return np.repeat(geo.area[:, None] / 3, 3, axis=1), triangle.N
-    return jacobians(geo.corners)[1], QUAD_N
+    return jacobians(geo.corners)[0], QUAD_N
 
 
 def _integrated(
@@ -246,7 +247,7 @@ def _integrated(
         K[rows] = e.B.reshape(m, -1, 24).swapaxes(1, 2) @ (C @ e.B).reshape(m, -1, 24)
         if excess is not None:
             share = e.weight / part.area[:, None]
-            mean = np.einsum("mg,mgik->mik", share, e.B[:, :, SHEAR])
+            mean = (share[:, :, None, None] * e.B[:, :, SHEAR]).sum(axis=1)
             stress = excess[rows] * part.area[:, None, None] @ mean
             K[rows] += mean.swapaxes(1, 2) @ stress
     return K
@@ -259,7 +260,8 @@ def _damped(B: np.ndarray, weight: np.ndarray) -> np.ndarray:
     beam, Raasch's hook), which the mean does; held at every point it locks coarse doubly curved
     shells (hemisphere, 8 x 8: 3 % low; this way 1 % high as MacNeal's element).
     """
-    mean = np.einsum("mg,mg...->m...", weight / weight.sum(axis=1, keepdims=True), B)[:, None]
+    share = weight / weight.sum(axis=1, keepdims=True)
+    mean = (share[:, :, None, None, None] * B).sum(axis=1, keepdims=True)
     return np.asarray(mean + VARYING_SPIN * (B - mean))
 
 
@@ -327,15 +329,14 @@ def _mass(
     geo: ShellGeometry, N: np.ndarray, areal: np.ndarray, rotary: np.ndarray, coupled: bool
 ) -> np.ndarray:
     """Nodal mass and inertia through the link of an offset (never of warp): (m, 24, 24)."""
-    NN = np.einsum("gi,gj->gij", N, N)
-    if not coupled:
-        NN = np.eye(4) * N[:, :, None]
-    m_ij, j_ij = np.einsum("mg,gij->mij", areal, NN), np.einsum("mg,gij->mij", rotary, NN)
+    NN = N[:, :, None] * (N[:, None, :] if coupled else np.eye(4))
+    m_ij, j_ij = ((w @ NN.reshape(-1, 16)).reshape(-1, 4, 4) for w in (areal, rotary))
     n = geo.frames[:, 2]
     plane = np.eye(3) - n[:, :, None] * n[:, None, :]
     M = np.zeros((len(geo), 4, 6, 4, 6))
-    M[:, :, :3, :, :3] = np.einsum("mij,kl->mikjl", m_ij, np.eye(3))
-    M[:, :, 3:, :, 3:] = np.einsum("mij,mkl->mikjl", j_ij, plane)
+    for k in range(3):
+        M[:, :, k, :, k] = m_ij
+    M[:, :, 3:, :, 3:] = j_ij[:, :, None, :, None] * plane[:, None, :, None, :]
     if geo.offset.any():
         _carry_offset(M, m_ij, geo.offset, n)
     return M.reshape(len(geo), 24, 24)

@@ -17,12 +17,12 @@ def derivatives(xi: float, eta: float) -> np.ndarray:
     return np.stack([a * (1 + eta * b), b * (1 + xi * a)]) / 4
 
 
-def jacobians(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J (m, 4, 2, 2) at the Gauss points (rows ∂x/∂ξ, ∂x/∂η), its determinant and inverse."""
-    dN = np.stack([derivatives(*point) for point in GAUSS])
-    J = np.einsum("gdc,mci->mgdi", dN, corners)
-    det, inverse = invert(J)
-    return J, det, inverse
+_SLOPES = np.stack([derivatives(*point) for point in GAUSS])  # (4 points, 2, 4)
+
+
+def jacobians(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Determinant (m, 4) and inverse (m, 4, 2, 2) of J, rows ∂x/∂ξ, ∂x/∂η, at the Gauss points."""
+    return invert((_SLOPES.reshape(8, 4) @ corners).reshape(-1, 4, 2, 2))
 
 
 def invert(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -35,12 +35,12 @@ def invert(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def gradients(inverse: np.ndarray) -> np.ndarray:
     """∂N/∂x and ∂N/∂y at the Gauss points (m, 4, 2, 4)."""
-    return np.asarray(inverse @ np.stack([derivatives(*point) for point in GAUSS]))
+    return np.asarray(inverse @ _SLOPES)
 
 
 def middle_slope(corners: np.ndarray) -> np.ndarray:
     """∂N/∂x and ∂N/∂y in the middle (m, 2, 4)."""
-    _, inverse = invert(np.einsum("dc,mci->mdi", derivatives(0, 0), corners))
+    _, inverse = invert(derivatives(0, 0) @ corners)
     return np.asarray(inverse @ derivatives(0, 0))
 
 
@@ -59,8 +59,10 @@ def spin(grad: np.ndarray) -> np.ndarray:
     return W
 
 
-def membrane(corners: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """ε = (B + A G) u and ω = ½(v,x - u,y) at the Gauss points, with G = -(∫AᵀQA)⁻¹ ∫AᵀQB.
+def membrane(
+    corners: np.ndarray, det: np.ndarray, inverse: np.ndarray, reference: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """ε = (B + A G) u with G = -(∫AᵀQA)⁻¹ ∫AᵀQB, and ω = ½(v,x - u,y), at the Gauss points.
 
     A holds the strains of the two incompatible bubbles 1-ξ², 1-η², condensed for the material
     ``reference``; by stationarity ∫(B+AG)ᵀ dQ (B+AG) is the exact derivative of the condensed
@@ -69,6 +71,7 @@ def membrane(corners: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np
     Parameters
     ----------
     corners : (m, 4, 2)      [m]
+    det, inverse             of :func:`jacobians`
     reference : (m, 3, 3)    plane stiffness of any scale
 
     Returns
@@ -76,8 +79,7 @@ def membrane(corners: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np
     (m, 4, 3, 8), (m, 4, 1, 8)
         Strain and spin from the in-plane displacements u1 v1 u2 v2 ...
     """
-    _, det, inverse = jacobians(corners)
-    det_0, inverse_0 = invert(np.einsum("dc,mci->mdi", derivatives(0, 0), corners))
+    det_0, inverse_0 = invert(derivatives(0, 0) @ corners)
     bubble = inverse_0[:, None] * (-2 * GAUSS)[None, :, None, :]  # columns: 1-ξ², 1-η²
     bubble = bubble * (det_0[:, None] / det)[..., None, None]
     grad = gradients(inverse)
@@ -86,4 +88,4 @@ def membrane(corners: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np
     m = len(corners)
     QA, flat = QA.reshape(m, 12, 4).swapaxes(1, 2), A.reshape(m, 12, 4)
     G = -np.linalg.solve(QA @ flat, QA @ B.reshape(m, 12, 8))
-    return B + A @ G[:, None], spin(grad) + spin(bubble) @ G[:, None]
+    return B + A @ G[:, None], spin(grad)

@@ -15,6 +15,7 @@ from ..dynamics.factor import factorise
 from ..dynamics.frf import FRF, Residual, transfer
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError, ModelError
+from ..model.analysis import Analysis, Subcase
 from ..model.assembly import Assembly
 from .assemble import Structure, _families, structure
 from .energy import rigid_motions
@@ -46,6 +47,28 @@ def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
             f"find no resistance"
         )
     return np.asarray(q)
+
+
+def subcase_statics(assembly: Assembly, analysis: Analysis, case: Subcase) -> np.ndarray:
+    """Displacements (6n, 1) of one static subcase: its loads, its weight, its moved supports.
+
+    Parameters
+    ----------
+    assembly : with the supports and equations of this subcase
+    """
+    load = np.zeros((6 * len(assembly.ids), 1))
+    if chosen := analysis.loads.get(case.load):
+        np.add.at(load[:, 0], 6 * chosen.rows + chosen.components - 1, chosen.values)
+        if np.any(chosen.gravity):
+            load += inertia_load(assembly, chosen.gravity[:, None])
+    moved = [analysis.prescribed[k] for k in {case.load, case.spc} if k in analysis.prescribed]
+    if not moved:
+        return static(structure(assembly), load)
+    dofs = np.column_stack(
+        [np.concatenate([getattr(m, name) for m in moved]) for name in ("rows", "components")]
+    )
+    values = np.concatenate([m.values for m in moved])
+    return enforced(assembly, dofs, values[:, None], load)
 
 
 def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
@@ -139,12 +162,12 @@ def _line_by_line(dofs: np.ndarray) -> Answer:
 
 
 def _by_modes(modal: ModalModel, dofs: np.ndarray) -> Answer:
-    """Σ φ φᵀ f / (ω_r² - ω² + 2 i ζ_r ω_r ω)."""
+    """Φ (Φᵀ Z Φ + diag(2 i ζ_r ω_r ω))⁻¹ Φᵀ f: dashpots and loss factors couple the modes."""
     phi, w_r = _shapes_at(modal, dofs), 2 * np.pi * modal.frequency
 
-    def answer(w: float, _: sp.csr_array, f: np.ndarray) -> np.ndarray:
-        line = w_r**2 - w**2 + 2j * modal.damping * w_r * w
-        return np.asarray(phi @ (phi.T @ f / line[:, None]))
+    def answer(w: float, Z: sp.csr_array, f: np.ndarray) -> np.ndarray:
+        A = phi.T @ (Z @ phi) + np.diag(2j * modal.damping * w_r * w)
+        return np.asarray(phi @ np.linalg.solve(A, phi.T @ f))
 
     return answer
 

@@ -22,7 +22,7 @@ def membrane(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def plate(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """κ from rx1 ry1 ... (m, 3, 3, 8) and γ from w1 rx1 ry1 ... (m, 3, 2, 12)."""
-    _, inverse = invert(np.einsum("dc,mci->mdi", _SLOPES, corners))
+    _, inverse = invert(_SLOPES @ corners)
     e_r, e_s = (_covariant(corners, point) for point in ((0.5, 0.0), (0.0, 0.5)))
     slanted = _covariant(corners, (0.5, 0.5))
     at_r, at_s = e_r[:, 0], e_s[:, 1]
@@ -38,14 +38,14 @@ def _thrice(B: np.ndarray) -> np.ndarray:
 
 def _gradients(corners: np.ndarray) -> np.ndarray:
     """∂N/∂x, ∂N/∂y (m, 2, 4)."""
-    _, inverse = invert(np.einsum("dc,mci->mdi", _SLOPES, corners))
+    _, inverse = invert(_SLOPES @ corners)
     return np.asarray(inverse @ _SLOPES)
 
 
 def _covariant(corners: np.ndarray, point: tuple[float, float]) -> np.ndarray:
     """γ along r and s, w,k + x,k ry - y,k rx; (m, 2, 12)."""
     shape = np.array([1 - sum(point), *point, 0.0])
-    J = np.einsum("dc,mci->mdi", _SLOPES, corners)
+    J = _SLOPES @ corners
     B = np.zeros((len(corners), 2, 12))
     B[:, :, 0::3] = _SLOPES
     B[:, :, 1::3], B[:, :, 2::3] = -J[:, :, 1:] * shape, J[:, :, :1] * shape

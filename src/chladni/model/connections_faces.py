@@ -61,6 +61,11 @@ class Surface:
     tree: cKDTree = field(repr=False)
 
     @classmethod
+    def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
+        """A surface of its own, not of an assembly."""
+        return cls(name, points, nodes, np.arange(len(nodes)), cKDTree(points[nodes].mean(axis=1)))
+
+    @classmethod
     def of(cls, assembly: Assembly, sheet: Sheet) -> Self:
         """The shells of a part, or the shells with these rows."""
         if isinstance(sheet, str | int):
@@ -75,8 +80,14 @@ class Surface:
         nodes = assembly.shells.nodes[rows]
         return cls(name, assembly.points, nodes, rows, cKDTree(assembly.points[nodes].mean(axis=1)))
 
-    def feet(self, places: np.ndarray) -> Feet:
-        """The nearest point of the surface to each place (k, 3)."""
+    def feet(
+        self, places: np.ndarray, normal: np.ndarray | None = None, cosine: float = 0.7
+    ) -> Feet:
+        """The nearest point of the surface to each place (k, 3).
+
+        With a `normal` (k, 3) at each place, triangles turned away from it (|cos| below `cosine`)
+        do not count; where none is left the distance is infinite.
+        """
         places = np.atleast_2d(np.asarray(places, dtype=float))
         k, count = len(places), min(NEAR, len(self.nodes))
         near = self.tree.query(places, count)[1].reshape(k, count)
@@ -85,15 +96,18 @@ class Surface:
         weight = barycentric_foot(places[:, None], x)
         foot = np.einsum("kta,ktai->kti", weight, x)
         distance = np.linalg.norm(foot - places[:, None], axis=-1)
+        facing = _unit(np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]))
+        if normal is not None:
+            away = np.abs(np.einsum("kti,ki->kt", facing, normal)) < cosine
+            distance = np.where(away, np.inf, distance)
         row, best = np.arange(k), distance.round(12).argmin(axis=1)
-        normal = np.cross(x[row, best, 1] - x[row, best, 0], x[row, best, 2] - x[row, best, 0])
         return Feet(
             near[row, best // 2],
             foot[row, best],
             triangles[row, best],
             weight[row, best],
             distance[row, best],
-            normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30),
+            facing[row, best],
         )
 
     def within(self, feet: Feet, places: np.ndarray, reach: float) -> None:
@@ -136,6 +150,10 @@ class Surface:
             nodes = self._with_ring(nodes)
             return nodes, np.full(len(nodes), 1 / len(nodes))
         return nodes[keep], weight[keep]
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30))
 
 
 _HALVES = np.array([(0, 1, 2), (0, 2, 3)])

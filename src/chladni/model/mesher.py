@@ -60,17 +60,23 @@ def _feature_points(
 ) -> tuple[np.ndarray, set[tuple[int, int]]]:
     """Border and feature points, and the pairs of rows that follow a feature line."""
     points = np.vstack(borders)
-    dense = cKDTree(np.vstack([resampled(b, size / 8) for b in borders]))
+    border = cKDTree(np.vstack([resampled(b, size / 8) for b in borders]))
+    before = np.full((1, 2), np.inf)
     folds: set[tuple[int, int]] = set()
     for line in lines:
-        far = dense.query(line)[0] > 0.4 * size
-        kept = []
-        for place in line[far]:
-            if ((points - place) ** 2).sum(axis=1).min() > gap**2:
-                kept.append(len(points))
-                points = np.vstack([points, place])
-        folds |= {(min(e), max(e)) for e in zip(kept, kept[1:] + kept[:1], strict=True)}
+        kept = line[(border.query(line)[0] > 0.4 * size) & (_away(line, before) > gap)]
+        rows = len(points) + np.arange(len(kept))
+        points = np.vstack([points, kept])
+        folds |= {(int(min(e)), int(max(e))) for e in zip(rows, np.roll(rows, -1), strict=True)}
+        closed = np.linalg.norm(line[0] - line[-1]) < 2 * size
+        before = np.vstack([before, resampled(line, gap / 4, closed=bool(closed))])
     return points, folds
+
+
+def _away(line: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Distance of the points of a line from the nearest of some places (n,)."""
+    finite = places[np.isfinite(places[:, 0])]
+    return cKDTree(finite).query(line)[0] if len(finite) else np.full(len(line), np.inf)
 
 
 def _lattice(outer: np.ndarray, size: float) -> np.ndarray:

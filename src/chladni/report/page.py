@@ -88,7 +88,7 @@ def made_with() -> str:
     """Versions and date, for the foot of the page."""
     tools = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     today = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return f"chladni {_own_version()}, Python {platform.python_version()}, {tools}; {today}"
+    return f"chladni {own_version()}, Python {platform.python_version()}, {tools}; {today}"
 
 
 def pictures(named: Mapping[str, tuple[Path, str]]) -> list[Block]:
@@ -96,7 +96,8 @@ def pictures(named: Mapping[str, tuple[Path, str]]) -> list[Block]:
     return [Picture(path, caption) for path, caption in named.values()]
 
 
-def _own_version() -> str:
+def own_version() -> str:
+    """Version of this package, where it is installed."""
     try:
         return version("chladni")
     except PackageNotFoundError:

@@ -18,6 +18,7 @@ from .surface import Surface
 
 GREY = (0.80, 0.82, 0.85)
 _AMBIENT, _DIFFUSE = 0.52, 0.54
+_TILES = 12_000  # polygons the painter may cut faces into
 _KEY = 0.6  # share of the lamp over the shoulder, the rest comes from the eye
 
 
@@ -152,25 +153,69 @@ def _lamp(camera: Camera) -> np.ndarray:
 def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
     """Painter's algorithm: the farthest face first, Lambert shading, no library needed."""
     if len(seen.faces):
-        corners = seen.points[seen.faces]
-        order = np.argsort(camera.depth(corners.mean(axis=1)))
-        n = seen.normals()
-        lit = _KEY * np.abs(n @ _lamp(camera)) + (1 - _KEY) * np.abs(n @ camera.toward)
-        shade = _AMBIENT + _DIFFUSE * lit
-        colour = np.clip(_colours(seen, paint)[:, :3] * shade[:, None], 0, 1)[order]
-        line = 0.82 * colour if paint.edges else colour
-        polygons = camera.project(corners.reshape(-1, 3)).reshape(-1, 4, 2)[order]
-        ax.add_collection(
-            PolyCollection(polygons, facecolors=colour, edgecolors=line, linewidths=0.3, zorder=1)  # type: ignore[arg-type]
-        )
+        polygons, colours, lines = _tiles(seen, camera, paint)
+        style: dict[str, Any] = {"facecolors": colours, "edgecolors": lines, "linewidths": 0.35}
+        ax.add_collection(PolyCollection(list(polygons), **style, zorder=1))
     _stroked(ax, camera, seen.points[seen.lines], _line_colours(seen, paint), 1.8)
     if paint.ghost is not None:
-        _stroked(ax, camera, paint.ghost, "#8a8f98", 0.7)
+        _stroked(ax, camera, paint.ghost, "#8a8f98", 0.7, behind=True)
 
 
-def _stroked(ax: Axes, camera: Camera, ends: np.ndarray, colours: Any, width: float) -> None:
+def _tiles(
+    seen: Surface, camera: Camera, paint: Paint
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Polygons (p, 4, 2), face colours and edge colours (p, 4), in the order of painting.
+
+    Values at points vary within a face: few large faces are cut into k by k tiles, the face's own
+    outline is painted over them.
+    """
+    corners, k = seen.points[seen.faces], _cuts(seen, paint)
+    order = np.argsort(camera.depth(corners.mean(axis=1)))
+    tiles = _bilinear(corners, k)  # (m, k², 4, 3)
+    fill = _colours(seen, paint, k) * _shade(seen, camera)[:, None, None]
+    fill = np.concatenate([np.clip(fill, 0, 1), np.ones((*fill.shape[:2], 1))], axis=2)
+    line = np.where(np.arange(4) < 3, 0.82 * fill, fill) if paint.edges and k == 1 else fill
+    if paint.edges and k > 1:
+        tiles = np.concatenate([tiles, corners[:, None]], axis=1)
+        fill = np.concatenate([fill, np.zeros((len(fill), 1, 4))], axis=1)
+        rim = np.tile([0.1, 0.12, 0.15, 0.25], (len(fill), 1, 1))
+        line = np.concatenate([line, rim], axis=1)
+    flat = camera.project(tiles[order].reshape(-1, 3)).reshape(-1, 4, 2)
+    return flat, fill[order].reshape(-1, 4), line[order].reshape(-1, 4)
+
+
+def _shade(seen: Surface, camera: Camera) -> np.ndarray:
+    """Brightness of each face (m,), from both sides alike."""
+    n = seen.normals()
+    lit = _KEY * np.abs(n @ _lamp(camera)) + (1 - _KEY) * np.abs(n @ camera.toward)
+    return np.asarray(_AMBIENT + _DIFFUSE * lit)
+
+
+def _cuts(seen: Surface, paint: Paint) -> int:
+    """Tiles along a side of a face: only values at points vary within it."""
+    if paint.values is None or len(paint.values) != len(seen.points):
+        return 1
+    return int(np.clip(np.sqrt(_TILES / len(seen.faces)), 1, 5))
+
+
+def _bilinear(corners: np.ndarray, k: int) -> np.ndarray:
+    """Corner values (m, 4, ...) at the corners of k by k tiles of each face (m, k², 4, ...)."""
+    r = np.arange(k + 1) / k
+    xi, eta = (g.ravel() for g in np.meshgrid(r, r, indexing="ij"))
+    N = np.stack([(1 - xi) * (1 - eta), xi * (1 - eta), xi * eta, (1 - xi) * eta], axis=1)
+    grid = np.tensordot(corners, N, axes=(1, 1))  # (m, ..., (k+1)²)
+    at = np.arange((k + 1) ** 2).reshape(k + 1, k + 1)
+    quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], -1).reshape(-1, 4)
+    return np.asarray(np.moveaxis(grid, -1, 1)[:, quads])
+
+
+def _stroked(
+    ax: Axes, camera: Camera, ends: np.ndarray, colours: Any, width: float, behind: bool = False
+) -> None:
     flat = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2)
-    ax.add_collection(LineCollection(list(flat), colors=colours, linewidths=width, zorder=2))
+    ax.add_collection(
+        LineCollection(list(flat), colors=colours, linewidths=width, zorder=0.5 if behind else 2)
+    )
 
 
 def _line_colours(seen: Surface, paint: Paint) -> Any:
@@ -181,14 +226,16 @@ def _line_colours(seen: Surface, paint: Paint) -> Any:
     return colormaps[paint.cmap]((mean - low) / max(high - low, 1e-300))
 
 
-def _colours(seen: Surface, paint: Paint) -> np.ndarray:
-    """(m, 4) colour of each face."""
+def _colours(seen: Surface, paint: Paint, k: int = 1) -> np.ndarray:
+    """(m, k², 3) colour of each tile of each face."""
     if paint.values is None:
-        return np.tile((*GREY, 1.0), (len(seen.faces), 1))
+        return np.tile(GREY, (len(seen.faces), 1, 1))
     values = np.asarray(paint.values, dtype=float)
     if len(values) == len(seen.points):
-        values = values[seen.faces].mean(axis=1)
+        tiles = _bilinear(values[seen.faces], k).mean(axis=2)
+    else:
+        tiles = values[:, None]
     low, high = paint.limits
-    rgba = colormaps[paint.cmap]((values - low) / max(high - low, 1e-300))
-    rgba[~np.isfinite(values)] = (*GREY, 1.0)
-    return np.asarray(rgba)
+    rgba = colormaps[paint.cmap]((tiles - low) / max(high - low, 1e-300))
+    rgba[~np.isfinite(tiles)] = (*GREY, 1.0)
+    return np.asarray(rgba[:, :, :3])

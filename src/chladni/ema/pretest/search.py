@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from .deletion import greedy, start
-from .exchange import _joinable, _regular, _swapped
+from .exchange import _joinable, _regular, _swapped, exchange
 from .information import Candidates, candidates, value
 from .rules import Rules
 
@@ -22,7 +22,8 @@ def annealed(
 ) -> np.ndarray:
     """Simulated annealing over single swaps: a loss Δ of log det is taken with odds e^(Δ/T).
 
-    T falls from ``hot`` to ``cold`` geometrically; the best layout met is returned (increasing).
+    T falls from ``hot`` to ``cold`` geometrically. The best layout met is returned (increasing),
+    quenched: single exchange until it helps no more.
     Kirkpatrick, Gelatt and Vecchi (1983), Science 220, 671-680.
     """
     c, rng = candidates(phi, noise), np.random.default_rng(seed)
@@ -39,7 +40,7 @@ def annealed(
             kept, now = new, after
         if now > best:
             best, found = now, kept
-    return found
+    return exchange(c, found, rules=rules)
 
 
 def _random_swap(

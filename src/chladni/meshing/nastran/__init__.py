@@ -1,5 +1,6 @@
 """Nastran decks in and out."""
 
+from .analysis import analysis as analysis
 from .connected import components as components
 from .convert import assembly as assembly
 from .deck import Deck as Deck

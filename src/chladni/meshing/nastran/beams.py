@@ -67,7 +67,7 @@ def _conrods(ctx: Context, parts: Parts, cards: Cards) -> Beams:
                 nonstructural=key[3] * ctx.scale.inertia / L, kind="rod",
             )  # fmt: skip
             eid = cards.integer(i, 1)
-            shared[key] = parts.add(Part(eid, f"CONROD {eid}", section))
+            shared[key] = parts.add(Part(eid, f"CONROD {eid}", section), cards, i)
         part[i] = shared[key]
     return _straight(ctx, cards, nodes, part)
 

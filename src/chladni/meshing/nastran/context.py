@@ -83,7 +83,7 @@ class Context:
 
     def row(self, cards: Cards, i: int, id: int, ground: bool = False) -> int:
         """Row of one point id of card i."""
-        at = int(np.searchsorted(self.ids, id))
+        at = int(np.searchsorted(self.ids, id)) if len(self.ids) else 0
         if ground and id == 0:
             return -1
         if at >= len(self.ids) or self.ids[at] != id:
@@ -94,7 +94,7 @@ class Context:
         return cards.refuse(
             i,
             f"grid {id} does not exist; the deck has {len(self.ids)} points, "
-            f"{self.ids.min(initial=0)} to {self.ids.max(initial=0)}",
+            f"{self.ids.min()} to {self.ids.max()}",
         )
 
     def frame_at(self, row: int) -> np.ndarray:

@@ -1,6 +1,7 @@
 """A deck as an :class:`~chladni.model.assembly.Assembly`: all that stiffens, weighs and holds."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,13 +55,15 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
     made_shells, made_solids = shells(ctx, parts), solids(ctx, parts)
     made_beams = beams(ctx, parts)
     filled_thickness(parts, made_shells)
+    order = parts.order()
+    at = np.argsort(order)
     return Assembly(
         ids=ctx.ids,
         points=ctx.places * ctx.scale.length,
-        parts=tuple(parts.made),
-        shells=made_shells,
-        solids=made_solids,
-        beams=made_beams,
+        parts=tuple(parts.made[k] for k in order),
+        shells=replace(made_shells, part=at[made_shells.part]),
+        solids=tuple(replace(s, part=at[s.part]) for s in made_solids),
+        beams=replace(made_beams, part=at[made_beams.part]),
         springs=joints.springs(ctx),
         dampers=joints.dampers(ctx),
         scalar_masses=joints.scalar_masses(ctx),

@@ -81,7 +81,7 @@ def _shells(assembly: Assembly, units: Units, ids: Ids) -> Iterator[str]:
         values: list[float | int | str | None] = [ids.shell[k], ids.part[s.part[k]], *nodes[k][:n]]
         values += [angle[k], s.offset[k] / units.length or None, *[None] * (6 - n)]
         if own[k]:
-            values += [None, *t[k, :n].tolist()] if not three else t[k, :n].tolist()
+            values += t[k, :n].tolist()
         yield from card(_SHELL[three], _tail(values), 1e-9)
 
 

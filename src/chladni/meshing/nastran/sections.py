@@ -30,6 +30,7 @@ class Parts:
         self.materials = Materials(ctx)
         self.made: list[Part] = []
         self.shift: list[float] = []  # offset of a laminate's middle from its reference [m]
+        self._line: list[tuple[int, int]] = []  # file and line of each part's property
         self._at: dict[tuple[str, int], int] = {}
         self._cards = {family: self._index(names) for family, names in _FAMILIES.items()}
 
@@ -65,14 +66,20 @@ class Parts:
             card = cards.single(k)
             section = READERS[cards.name](self._ctx, self.materials, card, pid)
             name = self._ctx.deck.names.get(pid) or f"{cards.name} {pid}"
-            self._at[family, pid] = self.add(Part(pid, name, section), _shift(self._ctx, card))
+            part = Part(pid, name, section)
+            self._at[family, pid] = self.add(part, cards, k, _shift(self._ctx, card))
         return self._at[family, pid]
 
-    def add(self, part: Part, shift: float = 0.0) -> int:
-        """Position of a new part."""
+    def add(self, part: Part, cards: Cards, i: int, shift: float = 0.0) -> int:
+        """Position of a new part, which card i describes."""
         self.made.append(part)
         self.shift.append(shift)
+        self._line.append((int(cards.file[i]), int(cards.lines[cards.line_start[i]])))
         return len(self.made) - 1
+
+    def order(self) -> np.ndarray:
+        """Positions of the parts as their properties stand in the deck."""
+        return np.array(sorted(range(len(self.made)), key=self._line.__getitem__), np.int64)
 
 
 def _positive(card: Cards, k: int, what: str) -> float:

@@ -46,11 +46,11 @@ def _made(
 ) -> Shells:
     """Elements of one kind; the fields that hold THETA, ZOFFS and TFLAG."""
     X = ctx.places[nodes]
-    normal = _normals(ctx, cards, nodes, X)
+    corners = 3 if cards.name in _TRIANGLES else 4
+    normal = _normals(ctx, cards, nodes[:, :corners])
     pid = cards.integers(2)
     pid = np.where(pid == 0, cards.integers(1), pid)
     part = parts.of("shell", cards, pid)
-    corners = 3 if np.all(nodes[:, 2] == nodes[:, 3]) else 4
     offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
     return Shells(
         cards.integers(1),
@@ -62,10 +62,9 @@ def _made(
     )
 
 
-def _normals(ctx: Context, cards: Cards, nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 3); coincident corners and zero area are refused."""
-    corners = nodes if np.any(nodes[:, 2] != nodes[:, 3]) else nodes[:, :3]
-    X = X[:, : corners.shape[1]]
+def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 3) of faces (n, 3 or 4); coincident corners and zero area are refused."""
+    X = ctx.places[corners]
     same = (np.diff(np.sort(corners, axis=1), axis=1) == 0).any(axis=1)
     if np.any(same):
         i = int(np.argmax(same))

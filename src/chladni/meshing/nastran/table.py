@@ -66,7 +66,7 @@ class Cards:
     def refuse(self, i: int, why: str) -> FileError:
         """The error about card i: file:line: NAME id: why."""
         who = self.words(1)[i].decode("latin-1")
-        return FileError(f"{self.where(i)}: {self.name} {who}: {why}")
+        return FileError(f"{self.where(i)}: {f'{self.name} {who}'.strip()}: {why}")
 
     def required(self, text: np.ndarray, k: int) -> None:
         """Refuse the first card whose field k is blank."""

@@ -1,0 +1,211 @@
+"""Sixty modes of a free shell box: this package against its peers, as ratios within one run.
+
+    python benchmarks/eigen.py                # 35 and 140 thousand dofs
+    python benchmarks/eigen.py 35 140 360 --without eigsh ccx
+
+Every figure is the processor time of one thread in a process of its own, from matrices in memory to
+modes in memory; the peak is that process's resident set. Peers that are not installed are left out.
+"""
+
+import argparse
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+COUNT = 60
+EDGE = {35: 0.0231, 140: 0.0115, 360: 0.00718}  # element size [m] for thousands of dofs
+BASELINE = "scipy eigsh(sigma=)"
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+def specimen(edge):
+    """A closed steel box 1.0 x 0.7 x 0.5 m of 1 mm sheet: assembly, system, places of the rows."""
+    from chladni.fem.assemble import structure
+    from chladni.model.plates import box
+
+    assembly = box(1.0, 0.7, 0.5, h=edge)
+    system = structure(assembly).system
+    return assembly, system, assembly.points[np.searchsorted(assembly.ids, system.dofs[:, 0])]
+
+
+def ours(system, places):
+    """Block Lanczos, own multifrontal Cholesky, Sturm count."""
+    from chladni.dynamics.eigen import normal_modes
+
+    return normal_modes(system, COUNT, points=places).frequency
+
+
+def ours_unplaced(system, places):
+    """The same, the places of the nodes not given."""
+    return ours(system, None)
+
+
+def ours_unproved(system, places):
+    """The same without the Sturm count, which no peer offers."""
+    from chladni.dynamics.eigen import normal_modes
+
+    return normal_modes(system, COUNT, points=places, proof=False).frequency
+
+
+def bare(system, places):
+    """Block Lanczos on CHOLMOD with METIS, nothing checked."""
+    from chladni.dynamics.factor import factorise
+    from chladni.dynamics.lanczos import block_lanczos
+
+    sigma = shift(system)
+    factor = factorise(system.K - sigma * system.M, backend="cholmod")
+    ritz = block_lanczos(factor.solve, system.M, COUNT)
+    ritz.vectors(COUNT)
+    return np.sqrt(np.maximum(sigma + 1 / ritz.theta[:COUNT], 0)) / (2 * np.pi)
+
+
+def superlu(system, places):
+    """Block Lanczos on SuperLU with minimum degree and diagonal pivots, nothing proved."""
+    from chladni.dynamics.eigen import normal_modes
+
+    return normal_modes(system, COUNT, backend="superlu", proof=False).frequency
+
+
+def eigsh(system, places):
+    """scipy.sparse.linalg.eigsh as documented: shift-invert with its own factorisation."""
+    from scipy.sparse.linalg import eigsh
+
+    K, M = (sp.csc_matrix(A) for A in (system.K, system.M))
+    lam, _ = eigsh(K, COUNT, M, sigma=shift(system))
+    return np.sort(np.sqrt(np.maximum(lam, 0))) / (2 * np.pi)
+
+
+def shift(system):
+    """σ = -(2π 5 Hz)²: half the first elastic frequency, kind to every peer."""
+    return -((2 * np.pi * 5.0) ** 2)
+
+
+METHODS = {
+    "chladni": ours,
+    "chladni, no places": ours_unplaced,
+    "chladni, no proof": ours_unproved,
+    "block Lanczos + CHOLMOD": bare,
+    "block Lanczos + SuperLU": superlu,
+    BASELINE: eigsh,
+}
+
+
+def run_here(name, folder):
+    """One method in this process; prints a line of JSON."""
+    from chladni.dynamics.system import System
+
+    K, M = (sp.csr_array(sp.load_npz(folder / f"{part}.npz")) for part in "KM")
+    system = System(M, sp.csr_array(M.shape), K, np.load(folder / "dofs.npy"))
+    places = np.load(folder / "places.npy")
+    begin = time.process_time()
+    frequency = METHODS[name](system, places)
+    seconds = time.process_time() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(json.dumps({"seconds": seconds, "peak": peak, "f": np.asarray(frequency).tolist()}))
+
+
+def run_apart(name, folder):
+    """One method in a process of its own; None where a library is missing."""
+    command = [sys.executable, __file__, "--run", name, "--folder", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | ONE_THREAD)
+    if done.returncode:
+        print(f"  {name}: {done.stderr.strip().splitlines()[-1]}")
+        return None
+    return json.loads(done.stdout)
+
+
+def calculix(assembly, folder):
+    """CalculiX on the same nodes and quadrilaterals (S4): the whole run, reading to writing."""
+    program = shutil.which("ccx")
+    if program is None:
+        return None
+    steel = assembly.parts[0].section.membrane
+    nodes = "\n".join(
+        f"{i}, {x:.9e}, {y:.9e}, {z:.9e}"
+        for i, (x, y, z) in zip(assembly.ids, assembly.points, strict=True)
+    )
+    cells = "\n".join(
+        f"{e}, " + ", ".join(map(str, assembly.ids[n]))
+        for e, n in zip(assembly.shells.ids, assembly.shells.nodes, strict=True)
+    )
+    (folder / "box.inp").write_text(
+        f"*NODE\n{nodes}\n*ELEMENT, TYPE=S4, ELSET=all\n{cells}\n"
+        f"*MATERIAL, NAME=steel\n*ELASTIC\n{steel.E}, {steel.nu}\n*DENSITY\n{steel.rho}\n"
+        f"*SHELL SECTION, ELSET=all, MATERIAL=steel\n{assembly.thickness()[0]}\n"
+        f"*STEP\n*FREQUENCY\n{COUNT}\n*END STEP\n"
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    environment = os.environ | ONE_THREAD
+    subprocess.run([program, "box"], cwd=folder, capture_output=True, env=environment, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    rows = re.findall(
+        r"^\s+\d+\s+\S+\s+\S+\s+(\S+)\s+\S+\s*$", (folder / "box.dat").read_text(), re.M
+    )
+    return {"seconds": seconds, "peak": float("nan"), "f": [float(x) for x in rows[:COUNT]]}
+
+
+def table(thousands, without):
+    """Run all methods on one size and print their lines."""
+    assembly, system, places = specimen(EDGE[thousands])
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for part in "KM":
+            sp.save_npz(folder / f"{part}.npz", sp.csr_array(getattr(system, part)))
+        np.save(folder / "dofs.npy", np.array(system.dofs))
+        np.save(folder / "places.npy", places)
+        results = {m: run_apart(m, folder) for m in METHODS if not skipped(m, without)}
+        if "ccx" not in without:
+            results["CalculiX, whole run"] = calculix(assembly, folder)
+    show(len(system.dofs), {name: r for name, r in results.items() if r})
+
+
+def skipped(method, without):
+    """Whether the user left a method out by any part of its name."""
+    return any(word.lower() in method.lower() for word in without)
+
+
+def show(n, results):
+    """A table in Markdown; ratios are times ours."""
+    due = np.array(results["chladni"]["f"])
+    print(f"\n{n} degrees of freedom, {COUNT} modes\n")
+    print("| route | seconds | times ours | peak MB | f7 [Hz] | f60 [Hz] | largest difference |")
+    print("|---|---|---|---|---|---|---|")
+    for name, r in results.items():
+        f = np.array(r["f"])
+        far = np.abs(f[6:] / due[6:] - 1).max() if len(f) == len(due) else np.nan
+        ratio = r["seconds"] / results["chladni"]["seconds"]
+        print(
+            f"| {name} | {r['seconds']:.1f} | {ratio:.1f} | {r['peak']:.0f} "
+            f"| {f[6]:.3f} | {f[-1]:.3f} | {far:.0e} |",
+            flush=True,
+        )
+
+
+def main():
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sizes", nargs="*", type=int, default=[35, 140], help="35, 140 or 360")
+    parser.add_argument("--without", nargs="*", default=[], help="parts of names to leave out")
+    parser.add_argument("--run", help=argparse.SUPPRESS)
+    parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.run:
+        run_here(arguments.run, arguments.folder)
+        return
+    for thousands in arguments.sizes or [35, 140]:
+        table(thousands, arguments.without)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,275 @@
+"""A case: one ``case.toml`` that names the deck, the recordings and what to do with them.
+
+Everything is resolved here once: files are read, labels become grids or places on the nearest
+shell, bands are held against the data. What does not fit is refused in one sentence.
+"""
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from ..dynamics.frf import FRF, Quantity
+from ..ema.keys import KeyFile, Section, read_keys
+from ..ema.sensors import read_sensors
+from ..ema.setup import Recording, TestSetup
+from ..ema.tables import read_recordings
+from ..errors import FileError, LabelError
+from ..meshing.nastran import Deck, assembly, read_deck
+from ..model.assembly import Assembly
+from ..units import UNITS, Units
+from .places import Places, grid_row, places
+
+FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
+EFFECTS = (
+    *("global-stiffness", "global-density", "part-stiffness", "stiffness-patch"),
+    *("thickness-scale", "thickness-distribution", "orthotropic-material", "membrane-prestress"),
+    *("adhesive-stiffness", "viscoelastic-joint", "hem-contact", "weld-missing"),
+    *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
+    *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
+    *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault"),
+)
+_TABLES = ("model", "test", "band", "held_out", "parameter")
+_TEST = ("recordings", "quantity", "gain", "sensors", "mass", "mass_sd", "hangers")
+_MASS_SD = 0.002  # of the mass, where the user gives none
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """A parameter the user frees: a field of parts, or an effect by name."""
+
+    name: str
+    field: str
+    parts: tuple[str, ...]  # names; empty: all
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What the user asked for, resolved.
+
+    Attributes
+    ----------
+    path : Path               of case.toml
+    deck, assembly, units     the model, SI
+    damping : float           fraction of critical the model is given, where nothing else says
+    recordings : tuple        one per file, article and level; FRFs share labels and quantity
+    setup : TestSetup         sensors as the user describes them, hangers, weighed mass
+    outputs, inputs : Places  of the FRFs' dofs, in the FRFs' order
+    band : (low, high) or None   to fit [Hz]; None: all
+    exclude : bands left out [Hz]
+    held_sensors : int, labels or None   None: chosen automatically
+    held_band : (low, high) or None
+    parameters : tuple        freed by the user; empty: a default set
+    gain_known : bool         else one real factor common to all channels is free
+    notes : tuple of str      what was read otherwise than it stands there
+    """
+
+    path: Path
+    deck: Deck
+    assembly: Assembly
+    units: Units
+    damping: float | None
+    recordings: tuple[Recording, ...]
+    setup: TestSetup
+    outputs: Places
+    inputs: Places
+    band: tuple[float, float] | None = None
+    exclude: tuple[tuple[float, float], ...] = ()
+    held_sensors: int | tuple[str, ...] | None = None
+    held_band: tuple[float, float] | None = None
+    parameters: tuple[FreeParameter, ...] = ()
+    gain_known: bool = True
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def frfs(self) -> tuple[FRF, ...]:
+        """The FRFs of all recordings that hold one."""
+        return tuple(r.frf for r in self.recordings if r.frf is not None)
+
+    def lines(self, frequency: np.ndarray) -> np.ndarray:
+        """Which of these frequencies are to be fitted (n_f,) bool: in the band, not left out."""
+        low, high = self.band or (0.0, np.inf)
+        use = (low <= frequency) & (frequency <= high) & (frequency > 0)
+        for a, b in self.exclude:
+            use &= ~((a <= frequency) & (frequency <= b))
+        return np.asarray(use)
+
+
+def load_case(path: str | Path) -> Case:
+    """Read a case from its folder or its case.toml.
+
+    Raises
+    ------
+    FileError, LabelError, ModelError
+        One sentence naming file, line, offender and alternatives.
+    """
+    path = Path(path)
+    path = path / "case.toml" if path.is_dir() else path
+    keys = read_keys(path, _TABLES)
+    model = keys.section("model", ("deck", "units", "damping"), due=True)
+    test = keys.section("test", _TEST)
+    units = UNITS[model.text("units", due=True, among=tuple(UNITS)) or "SI"]
+    deck = read_deck(_file(model, "deck", str(model.text("deck", due=True))))
+    made = assembly(deck, units)
+    recordings = _recordings(test)
+    setup = _setup(test, made)
+    notes = [note for r in recordings for note in r.notes]
+    band, exclude = _bands(keys, recordings, notes)
+    held_sensors, held_band = _held(keys, recordings, notes)
+    frf = next((r.frf for r in recordings if r.frf is not None), None)
+    return Case(
+        path=path,
+        deck=deck,
+        assembly=made,
+        units=units,
+        damping=model.number("damping", low=0.0, high=0.5),
+        recordings=recordings,
+        setup=setup,
+        outputs=places(test, setup, made, frf.outputs if frf else (), "output"),
+        inputs=places(test, setup, made, frf.inputs if frf else (), "input"),
+        band=band,
+        exclude=exclude,
+        held_sensors=held_sensors,
+        held_band=held_band,
+        parameters=tuple(_parameter(s, made) for s in keys.sections("parameter", _PARAMETER)),
+        gain_known=test.text("gain", among=("known", "unknown")) != "unknown",
+        notes=tuple(notes),
+    )
+
+
+def _file(section: Section, key: str, name: str) -> Path:
+    """A file the case names, beside it."""
+    path = section.file.parent / name
+    if not path.is_file():
+        there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
+        near = difflib.get_close_matches(Path(name).name, there, 1, 0.5)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise FileError(f"{section.at(key)}: there is no file {name!r}; {hint}there are {there}")
+    return path
+
+
+def _recordings(test: Section) -> tuple[Recording, ...]:
+    """All recordings, the FRFs with the labels of the first in its order."""
+    quantity = test.text("quantity", among=get_args(Quantity))
+    read: list[Recording] = []
+    for name in test.list("recordings", str) or []:
+        read += read_recordings(_file(test, "recordings", name), quantity)
+    held = [r for r in read if r.frf is not None]
+    return tuple(_like(held[0], r, test) if r.frf is not None else r for r in read)
+
+
+def _like(first: Recording, other: Recording, test: Section) -> Recording:
+    """The recording with the labels of the first, in its order."""
+    a, b = first.frf, other.frf
+    assert a is not None
+    assert b is not None
+    for word, ours, theirs in (("outputs", a.outputs, b.outputs), ("inputs", a.inputs, b.inputs)):
+        if set(ours) != set(theirs):
+            only = sorted(set(ours) ^ set(theirs))
+            raise FileError(
+                f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: "
+                f"{only[:6]} in one of them only"
+            )
+    if a.quantity != b.quantity:
+        raise FileError(
+            f"{test.at('recordings')}: {first.name} holds {a.quantity}, {other.name} {b.quantity}"
+        )
+    return replace(other, frf=b.sel(a.outputs, a.inputs))
+
+
+def _setup(test: Section, made: Assembly) -> TestSetup:
+    """Sensors, hangers and weighing as the user gives them."""
+    name = test.text("sensors")
+    sensors = read_sensors(_file(test, "sensors", name)) if name else ()
+    mass = test.number("mass", low=1e-9)
+    mass_sd = test.number("mass_sd", low=0.0)
+    hangers = test.list("hangers", int) or []
+    for grid in hangers:
+        grid_row(made, grid, test.at("hangers"))
+    return TestSetup(
+        outputs=tuple(s for s in sensors if s.role == "output"),
+        inputs=tuple(s for s in sensors if s.role == "input"),
+        hangers=tuple(hangers),
+        mass=mass,
+        mass_sd=_MASS_SD * (mass or 0.0) if mass_sd is None else mass_sd,
+    )
+
+
+def _bands(
+    keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
+) -> tuple[tuple[float, float] | None, tuple[tuple[float, float], ...]]:
+    section = keys.section("band", ("fit", "exclude"))
+    band = section.band("fit")
+    if band is not None:
+        band = _inside(section, "fit", band, recordings, notes)
+    return band, section.bands("exclude")
+
+
+def _inside(
+    section: Section,
+    key: str,
+    band: tuple[float, float],
+    recordings: Sequence[Recording],
+    notes: list[str],
+) -> tuple[float, float]:
+    """The band, cut to what every FRF holds; refused where less than half of it is there."""
+    for r in recordings:
+        if r.frf is None:
+            continue
+        f = r.frf.frequency[r.frf.frequency > 0]
+        low, high = max(band[0], float(f[0])), min(band[1], float(f[-1]))
+        lines = int(np.count_nonzero((low <= f) & (f <= high)))
+        if high - low < 0.5 * (band[1] - band[0]) or lines < 2:
+            raise FileError(
+                f"{section.at(key)} = [{band[0]:g}, {band[1]:g}] Hz lies outside of {r.name}, "
+                f"which holds {f[0]:g} to {f[-1]:g} Hz ({lines} lines in common)"
+            )
+        if (low, high) != band and max(low - band[0], band[1] - high) > 0.02 * (high - low):
+            notes.append(f"[{section.name}] {key} cut to {low:g}-{high:g} Hz, all {r.name} holds")
+        band = (low, high)
+    return band
+
+
+def _held(
+    keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
+) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
+    """Sensors (how many, or which) and band that no fit may see."""
+    section = keys.section("held_out", ("sensors", "band"))
+    band = section.band("band")
+    if band is not None:
+        band = _inside(section, "band", band, recordings, notes)
+    value = section.values.get("sensors")
+    outputs = next((r.frf.outputs for r in recordings if r.frf is not None), ())
+    if value is None:
+        return None, band
+    if isinstance(value, list):
+        labels = section.list("sensors", str) or []
+        for label in labels:
+            if label not in outputs:
+                raise LabelError(
+                    f"{section.at('sensors')}: no output {label!r}; there are {list(outputs)[:8]}"
+                )
+        return tuple(labels), band
+    count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0))
+    return int(count or 0), band
+
+
+_PARAMETER = ("name", "parts", "field")
+
+
+def _parameter(section: Section, made: Assembly) -> FreeParameter:
+    """A parameter the user frees."""
+    what = section.text("field", due=True, among=(*FIELDS, *EFFECTS)) or ""
+    parts: list[str] = []
+    given = section.values.get("parts", [])
+    for name in given if isinstance(given, list) else [given]:
+        try:
+            parts.append(made.parts[made.part(name)].name)
+        except LabelError as error:
+            near = difflib.get_close_matches(str(name), [p.name for p in made.parts], 1, 0.5)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            raise LabelError(f"{section.at('parts')}: {hint}{error}") from error
+    return FreeParameter(section.text("name") or what, what, tuple(parts))

@@ -1,0 +1,166 @@
+"""Pressures on faces as nodal forces, f_i = ∫ N_i p n dA."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .context import Context, id_list
+from .table import Cards
+
+_FACES = {
+    "CHEXA": ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "CPENTA": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "CTETRA": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+}
+_CORNERS = {
+    "CQUAD4": 4,
+    "CQUADR": 4,
+    "CTRIA3": 3,
+    "CTRIAR": 3,
+    "CHEXA": 8,
+    "CPENTA": 6,
+    "CTETRA": 4,
+}
+
+Nodal = tuple[int, np.ndarray, np.ndarray]  # load set, rows (k,), forces (k, 3) [N]
+
+
+def forces(ctx: Context) -> Iterator[Nodal]:
+    """Nodal forces of PLOAD4, PLOAD2 and PLOAD."""
+    elements: dict[int, tuple[str, np.ndarray]] = {}
+    if any(True for _ in ctx.deck.present("PLOAD4", "PLOAD2")):
+        elements = _elements(ctx)
+    unit = ctx.scale.stress * ctx.scale.length**2
+    for cards in ctx.deck.present("PLOAD4"):
+        for i in range(len(cards)):
+            yield from _pload4(ctx, cards, i, elements, unit)
+    for cards in ctx.deck.present("PLOAD2"):
+        for i in range(len(cards)):
+            yield from _pload2(ctx, cards, i, elements, unit)
+    for cards in ctx.deck.present("PLOAD"):
+        for i in range(len(cards)):
+            corners = [g for g in cards.single(i).ids(3, 4, 0)[0].tolist() if g]
+            rows = np.array([ctx.row(cards, i, g) for g in corners], np.int64)
+            if not 3 <= len(rows) <= 4:
+                raise cards.refuse(i, "a face has three or four corners")
+            p = np.full(len(rows), cards.real(i, 2) * unit)
+            yield cards.integer(i, 1), rows, on_face(ctx.places[rows], p)
+
+
+def _elements(ctx: Context) -> dict[int, tuple[str, np.ndarray]]:
+    """{id: (kind, rows of its corners)} of all shells and solids."""
+    out = {}
+    for name, count in _CORNERS.items():
+        for cards in ctx.deck.present(name):
+            nodes = ctx.rows(cards, cards.ids(3, count))
+            out.update(
+                {e: (name, n) for e, n in zip(cards.integers(1).tolist(), nodes, strict=True)}
+            )
+    return out
+
+
+def on_face(X: np.ndarray, p: np.ndarray, direction: np.ndarray | None = None) -> np.ndarray:
+    """Consistent forces (3 or 4, 3) of corner pressures on a face X, along its normal or a way.
+
+    Bilinear on quadrilaterals (2 x 2 Gauss points), exact on triangles:
+    f_i = A (p_i + Σ p) / 12.
+    """
+    if len(X) == 3:
+        area = np.cross(X[1] - X[0], X[2] - X[0]) / 2
+        way = area if direction is None else np.linalg.norm(area) * direction
+        return np.asarray((p + p.sum())[:, None] / 12 * way)
+    f = np.zeros((4, 3))
+    a = 1 / np.sqrt(3)
+    s, t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
+    for xi, eta in ((-a, -a), (a, -a), (a, a), (-a, a)):
+        N = (1 + s * xi) * (1 + t * eta) / 4
+        dA = np.cross((s * (1 + t * eta) / 4) @ X, (t * (1 + s * xi) / 4) @ X)
+        way = dA if direction is None else np.linalg.norm(dA) * direction
+        f += np.outer(N, way) * (N @ p)
+    return f
+
+
+def _known(
+    cards: Cards, i: int, id: int, elements: dict[int, tuple[str, np.ndarray]]
+) -> tuple[str, np.ndarray]:
+    if id not in elements:
+        raise cards.refuse(i, f"element {id} is no shell or solid of the deck")
+    return elements[id]
+
+
+def _pload2(
+    ctx: Context, cards: Cards, i: int, elements: dict[int, tuple[str, np.ndarray]], unit: float
+) -> Iterator[Nodal]:
+    """PLOAD2: SID P EID1 EID2... or THRU: along the normals of shells."""
+    p = cards.real(i, 2) * unit
+    ids = id_list(cards, i, 3)
+    if "THRU" in cards.fields(i):
+        ids = [e for e in ids if e in elements]
+    for id in ids:
+        name, rows = _known(cards, i, id, elements)
+        if name in _FACES:
+            raise cards.refuse(i, f"element {id} is a {name}, PLOAD2 loads shells")
+        yield cards.integer(i, 1), rows, on_face(ctx.places[rows], np.full(len(rows), p))
+
+
+def _pload4(
+    ctx: Context, cards: Cards, i: int, elements: dict[int, tuple[str, np.ndarray]], unit: float
+) -> Iterator[Nodal]:
+    """PLOAD4: shells along their normals, faces of solids inwards, or along N in system CID."""
+    sid, first = cards.integer(i, 1), cards.integer(i, 2)
+    card, ids, marks = cards.single(i), [first], (0, 0)
+    if cards.word(i, 7) == "THRU":
+        ids = [e for e in range(first, cards.integer(i, 8) + 1) if e in elements or e == first]
+    else:
+        marks = (cards.integer(i, 7, 0), cards.integer(i, 8, 0))
+    p = card.block(3, 4, np.nan)[0] * unit
+    p = np.where(np.isnan(p), 0.0 if np.isnan(p[0]) else p[0], p)
+    for id in ids:
+        name, rows = _known(cards, i, id, elements)
+        if name in _FACES:
+            rows = _face(ctx, cards, i, name, rows, marks)
+        X = ctx.places[rows]
+        way = _direction(ctx, cards, i, X.mean(axis=0))
+        yield sid, rows, on_face(X, p[: len(rows)], way)
+
+
+def _direction(ctx: Context, cards: Cards, i: int, place: np.ndarray) -> np.ndarray | None:
+    """Unit vector N in system CID; None: along the normal."""
+    N = cards.single(i).block(10, 3, 0.0)[0]
+    if not np.any(N):
+        return None
+    return np.asarray(N @ ctx.system_at(cards, i, cards.integer(i, 9, 0), place)) / np.linalg.norm(
+        N
+    )
+
+
+def _face(
+    ctx: Context, cards: Cards, i: int, name: str, rows: np.ndarray, marks: tuple[int, int]
+) -> np.ndarray:
+    """Corners of a solid's face, its normal inwards, beginning at G1.
+
+    G1 and G3 are opposite corners; a triangle of a CPENTA needs G1 only, and of a CTETRA G4 is
+    the node that is not on the face.
+    """
+    a = ctx.row(cards, i, marks[0])
+    b = ctx.row(cards, i, marks[1]) if marks[1] else -1
+    for corners in _FACES[name]:
+        face = rows[list(corners)]
+        if a not in face or not _marked(name, face, a, b):
+            continue
+        X = ctx.places[face]
+        normal = np.cross(X[1] - X[0], X[-1] - X[0])
+        if normal @ (ctx.places[rows].mean(axis=0) - X.mean(axis=0)) < 0:
+            face = face[::-1]
+        return np.roll(face, -int(np.flatnonzero(face == a)[0]))
+    raise cards.refuse(i, f"grids {marks[0]} and {marks[1]} mark no face of the {name}")
+
+
+def _marked(name: str, face: np.ndarray, a: int, b: int) -> bool:
+    """True where b (opposite corner, or for a CTETRA the node off the face) fits the face."""
+    if name == "CTETRA":
+        return b >= 0 and b not in face
+    if len(face) == 3:
+        return b < 0
+    opposite = face[(int(np.flatnonzero(face == a)[0]) + 2) % 4]
+    return bool(b == opposite)

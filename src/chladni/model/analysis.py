@@ -1,0 +1,138 @@
+"""What a deck asks of its structure: subcases, loads, frequencies, damping, excitation (SI)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Subcase:
+    """One subcase: the sets it selects, 0 where it selects none."""
+
+    id: int
+    spc: int = 0
+    mpc: int = 0
+    load: int = 0
+    method: int = 0
+    frequency: int = 0
+    dload: int = 0
+    damping: int = 0
+    suport: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A static load.
+
+    Attributes
+    ----------
+    rows : (k,) int         rows of points
+    components : (k,) int   1-6, in the basic frame (1 at a scalar point)
+    values : (k,)           [N] or [N m]
+    gravity : (3,)          acceleration field on all masses [m/s²]
+    """
+
+    rows: np.ndarray
+    components: np.ndarray
+    values: np.ndarray
+    gravity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Displacements prescribed at held dofs: rows, components (displacement frame), values."""
+
+    rows: np.ndarray
+    components: np.ndarray
+    values: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A tabulated function, piecewise linear, its end slopes continued (Nastran's TABLED1)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    log_x: bool = False
+    log_y: bool = False
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Values at x."""
+        x = np.asarray(x, float)
+        if len(self.x) == 1:
+            return np.full(x.shape, self.y[0])
+        X, Y = (
+            (np.log(self.x) if self.log_x else self.x),
+            (np.log(self.y) if self.log_y else self.y),
+        )
+        u = np.log(x) if self.log_x else x
+        k = np.clip(np.searchsorted(X, u) - 1, 0, len(X) - 2)
+        run = X[k + 1] - X[k]
+        slope = np.divide(Y[k + 1] - Y[k], run, out=np.zeros_like(u), where=run > 0)
+        y = Y[k] + slope * (u - X[k])
+        return np.asarray(np.exp(y) if self.log_y else y)
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """P_k(f) = A_k g(f) exp(i (θ_k - 2π f τ_k)), one harmonic load (RLOAD1, RLOAD2).
+
+    Attributes
+    ----------
+    kind : "force", "displacement", "velocity" or "acceleration"
+    rows, components : (k,) int   loaded dofs; forces in the basic frame, motions in the
+        displacement frame of the point
+    amplitude : (k,)              A [N, N m or m, m/s, m/s² and their rotations]
+    delay, phase : (k,)           τ [s], θ [rad]
+    first, second : Table or None real and imaginary part of g, or its modulus and phase [deg]
+    polar : bool                  g = first exp(i second), as RLOAD2 has it
+    """
+
+    kind: str
+    rows: np.ndarray
+    components: np.ndarray
+    amplitude: np.ndarray
+    delay: np.ndarray
+    phase: np.ndarray
+    first: Table | None = None
+    second: Table | None = None
+    polar: bool = False
+
+    def at(self, frequency: np.ndarray) -> np.ndarray:
+        """P (n_f, k) at frequencies [Hz]."""
+        f = np.asarray(frequency, float)
+        a = np.ones_like(f) if self.first is None and self.polar else np.zeros_like(f)
+        a = a if self.first is None else self.first(f)
+        b = np.zeros_like(f) if self.second is None else self.second(f)
+        g = a * np.exp(1j * np.radians(b)) if self.polar else a + 1j * b
+        turn = np.exp(1j * (self.phase - 2 * np.pi * f[:, None] * self.delay))
+        return np.asarray(self.amplitude * g[:, None] * turn)
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """All a deck holds beside its structure; dictionaries by set id.
+
+    Attributes
+    ----------
+    solution : int              SOL number, 0 where it is not stated
+    subcases : tuple            in order
+    loads : dict of Load        static loads, combinations (LOAD) resolved
+    prescribed : dict of Motion SPCD, and SPC with a displacement
+    frequency : dict            frequencies of response [Hz], increasing
+    damping : dict              (f (k,) [Hz], ζ (k,)) modal damping tables
+    eigen : dict                (lowest [Hz], highest [Hz], count) of eigenvalue requests, NaN or
+        0 where open
+    dynamic : dict              tuples of Excitation by DLOAD id
+    notes : tuple of str        what was approximated or left out, one sentence each
+    """
+
+    solution: int = 0
+    subcases: tuple[Subcase, ...] = ()
+    loads: dict[int, Load] = field(default_factory=dict)
+    prescribed: dict[int, Motion] = field(default_factory=dict)
+    frequency: dict[int, np.ndarray] = field(default_factory=dict)
+    damping: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    eigen: dict[int, tuple[float, float, int]] = field(default_factory=dict)
+    dynamic: dict[int, tuple[Excitation, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,191 @@
+"""Identification against models whose poles are known, on even and uneven frequency grids."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.frf import FRF
+from chladni.ema import fitting
+from chladni.ema.identification import DERIVATIVES, Identified, equalised, evaluate, identify
+from chladni.errors import FileError
+
+EVEN, LOG = np.linspace(20.0, 200.0, 500), np.geomspace(20.0, 200.0, 500)
+
+
+class Truth:
+    """Modes, residual terms and noise: H = s^q [Σ φφᵀ/(s²+2ζωs+ω²) + L/s² + U]."""
+
+    def __init__(self, f: np.ndarray, zeta: np.ndarray, n_out: int, n_in: int, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        self.omega, self.zeta = 2 * np.pi * f, zeta
+        self.phi = rng.normal(size=(n_out, len(f)))
+        self.psi = self.phi[:n_in]
+        self.lower, self.upper = rng.normal(size=(2, n_out, n_in)) * [[[0.1]], [[1e-6]]]
+        self.rng = rng
+
+    @property
+    def poles(self) -> np.ndarray:
+        return self.omega * (-self.zeta + 1j * np.sqrt(1 - self.zeta**2))
+
+    def values(self, s: np.ndarray, q: int, undamped: bool = False) -> np.ndarray:
+        s = s[:, None]
+        zeta = 0 * self.zeta if undamped else self.zeta
+        h = 1 / (s**2 + 2 * zeta * self.omega * s + self.omega**2)
+        H = np.einsum("ir,kr,jr->kij", self.phi, h, self.psi)
+        s = s[:, :, None]
+        return s**q * (H + self.lower / s**2 + self.upper)
+
+    def frf(self, f: np.ndarray, quantity: str, noise: float) -> FRF:
+        H = self.values(2j * np.pi * f, DERIVATIVES[quantity])
+        sd = noise * np.abs(H) + 0.1 * noise * np.sqrt((np.abs(H) ** 2).mean(axis=0))
+        hiss = self.rng.normal(size=(2, *H.shape)) / np.sqrt(2)
+        names = [f"{k}:+Z" for k in range(len(self.phi))]
+        inputs = tuple(names[: len(self.psi)])
+        H = H + sd * (hiss[0] + 1j * hiss[1])
+        return FRF(H, f, tuple(names), inputs, quantity, variance=sd**2)  # type: ignore[arg-type]
+
+
+def a_truth(seed: int, r: int, n_out: int, n_in: int = 1, spacing: float = 0.0) -> Truth:
+    rng = np.random.default_rng(1000 + seed)
+    f = np.exp(np.linspace(np.log(22), np.log(190), r) + rng.uniform(-0.3, 0.3, r) * 2 / r)
+    if spacing:
+        f[1::2] = f[: len(f[1::2]) * 2 : 2] * (1 + spacing)
+    return Truth(f, 10 ** rng.uniform(-3, -1.7, r), n_out, n_in, seed)
+
+
+def matched(found: Identified, truth: Truth) -> np.ndarray:
+    """Position of the pole nearest to each true one."""
+    return np.abs(found.poles[:, None] - truth.poles).argmin(axis=0)
+
+
+@pytest.mark.parametrize("f", [EVEN, LOG], ids=["even", "log"])
+@pytest.mark.parametrize("quantity", ["receptance", "mobility", "accelerance"])
+def test_poles_to_their_own_spread(f: np.ndarray, quantity: str) -> None:
+    """Twelve modes, 1 % noise: none missed, none invented, errors as large as the spread says."""
+    truth = a_truth(0, 12, 6)
+    found = identify(truth.frf(f, quantity, 0.01))
+    k = matched(found, truth)
+    assert found.order == 12
+    z = (found.frequency[k] - truth.omega / 2 / np.pi) / found.frequency_sd[k]
+    d = (found.damping[k] - truth.zeta) / found.damping_sd[k]
+    assert np.sqrt(np.mean([z**2, d**2])) == pytest.approx(1.0, abs=0.35)
+    assert found.chi == pytest.approx(1.0, abs=0.03)
+
+
+def test_spread_shrinks_as_the_noise() -> None:
+    """Standard deviations are proportional to the noise (Cramer-Rao bound)."""
+    truth = a_truth(3, 8, 6)
+    coarse, fine = (identify(truth.frf(EVEN, "mobility", noise)) for noise in (0.02, 0.002))
+    np.testing.assert_allclose(coarse.frequency_sd / fine.frequency_sd, 10, rtol=0.15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_single_response(seed: int) -> None:
+    truth = a_truth(seed, 8, 1)
+    found = identify(truth.frf(EVEN, "accelerance", 0.01))
+    error = np.abs(found.poles[matched(found, truth)] - truth.poles) / np.abs(truth.poles.real)
+    assert found.order == 8
+    assert error.max() < 0.2
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_close_modes_with_two_exciters(seed: int) -> None:
+    """Pairs 1 % apart."""
+    truth = a_truth(seed, 8, 5, n_in=2, spacing=0.01)
+    found = identify(truth.frf(EVEN, "accelerance", 0.01))
+    error = np.abs(found.poles[matched(found, truth)] - truth.poles) / np.abs(truth.poles.real)
+    assert found.order == 8
+    assert error.max() < 0.1
+
+
+def test_residues_and_residual_terms_without_noise() -> None:
+    """What is identified is what was put in, residual terms too, and the FRF is rebuilt."""
+    truth = a_truth(1, 8, 4, n_in=2)
+    H = truth.frf(LOG, "mobility", 1e-9)
+    found = identify(replace(H, variance=1e-8 * np.abs(H.values) ** 2))
+    k = matched(found, truth)
+    due = np.einsum("ir,jr->rij", truth.phi, truth.psi) / (2j * truth.poles.imag)[:, None, None]
+    np.testing.assert_allclose(found.poles[k], truth.poles, rtol=1e-7)
+    np.testing.assert_allclose(found.residues[k], due, atol=1e-6 * np.abs(due).max())
+    np.testing.assert_allclose(found.lower, truth.lower, atol=1e-5)
+    np.testing.assert_allclose(found.upper, truth.upper, atol=1e-10)
+    np.testing.assert_allclose(evaluate(found, 2j * np.pi * LOG), H.values, rtol=1e-5)
+
+
+def test_equalised_is_the_undamped_model() -> None:
+    """p -> i|p| on s = ω (ζ + i): Σ φφᵀ / (ω_r² + s²), whatever the damping was."""
+    truth = a_truth(2, 10, 5)
+    H = truth.frf(EVEN, "accelerance", 1e-9)
+    found = identify(replace(H, variance=1e-8 * np.abs(H.values) ** 2))
+    s = 2 * np.pi * LOG[::10] * (0.03 + 1j)
+    due = truth.values(s, 2, undamped=True)
+    np.testing.assert_allclose(equalised(found, s), due, rtol=1e-5)
+
+
+def test_a_gap_in_the_data_does_no_harm() -> None:
+    """Lines left out (the cord's band) take no modes elsewhere with them."""
+    truth = a_truth(4, 8, 6)
+    f = truth.omega / 2 / np.pi
+    between = np.sqrt(f[3] * f[4])
+    use = np.abs(EVEN - between) > 0.15 * (f[4] - f[3])
+    found = identify(truth.frf(EVEN, "accelerance", 0.01), use=use)
+    assert found.order == 8
+    assert (np.abs(found.frequency[matched(found, truth)] / f - 1) < 1e-3).all()
+
+
+def test_dead_and_broken_samples_are_passed_over() -> None:
+    truth = a_truth(5, 6, 5)
+    H = truth.frf(EVEN, "accelerance", 0.01)
+    values = H.values.copy()
+    values[:, 2] = 0
+    values[100:110, 3] = np.nan
+    found = identify(replace(H, values=values, variance=None))
+    assert found.order == 6
+
+
+def test_noise_alone_has_no_modes() -> None:
+    rng = np.random.default_rng(0)
+    shape = (400, 3, 1)
+    H = rng.normal(size=shape) + 1j * rng.normal(size=shape)
+    labels = ("1:+Z", "2:+Z", "3:+Z")
+    frf = FRF(H, np.linspace(10, 100, 400), labels, ("1:+Z",), variance=np.full(shape, 2.0))
+    assert identify(frf).order == 0
+
+
+def test_slope_is_the_derivative() -> None:
+    """Jᵀr against central differences of χ²: variable projection, exact at the optimum of x."""
+    truth = a_truth(6, 4, 3)
+    H = truth.frf(EVEN, "mobility", 1e-6)
+    top = 2 * np.pi * EVEN[-1]
+    y, w = H.values.reshape(500, -1), 1 / np.sqrt(H.variance.reshape(500, -1))  # type: ignore[union-attr]
+    data = fitting.Data(2j * np.pi * EVEN / top, y / top, w * top, 1)
+    p = truth.poles / top * (1 + 1e-4)
+    _, slope = fitting.solve(data, p, slope=True)
+    assert slope is not None
+    for k in range(4):
+        for part, unit in enumerate((1.0, 1j)):
+            h = 1e-6 * abs(p[k].real) * unit * (np.arange(4) == k)
+            rise = fitting.solve(data, p + h)[0].chi2 - fitting.solve(data, p - h)[0].chi2
+            due = -2 * slope.g[2 * k + part]
+            assert rise / (2 * abs(h[k])) == pytest.approx(
+                due, rel=2e-2, abs=1e-3 * abs(slope.g).max()
+            )
+
+
+def test_vector_fitting_finds_poles_from_afar() -> None:
+    """Without noise a few relocations lead to machine precision on a log grid."""
+    truth = a_truth(7, 6, 3)
+    H = truth.frf(LOG, "receptance", 0.0)
+    top = 2 * np.pi * LOG[-1]
+    y = H.values.reshape(500, -1)
+    data = fitting.Data(2j * np.pi * LOG / top, y, 1 / np.abs(y), 0)
+    p = np.linspace(0.15, 0.95, 6) * (-0.01 + 1j)
+    for _ in range(15):
+        p = fitting.relocated(data, p)
+    np.testing.assert_allclose(np.sort(p.imag), np.sort(truth.poles.imag) / top, rtol=1e-8)
+
+
+def test_a_band_without_lines_is_refused() -> None:
+    with pytest.raises(FileError, match=r"0 lines between .* holds 20 to 200 Hz"):
+        identify(a_truth(0, 4, 2).frf(EVEN, "mobility", 0.01), band=(300, 400))

@@ -1,0 +1,228 @@
+"""A test plan of a structure: where a sensor may sit, what is seen, what is written down."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.ema import pretest
+from chladni.ema.sensors import read_sensors
+from chladni.errors import ModelError, ShapeError
+from chladni.fem.assemble import structure
+from chladni.model.assembly import Scalars
+from chladni.model.plates import box, folded_panel, plate
+from chladni.planning import Wishes, find_places, plan, sensors_csv, summary
+from chladni.planning.places import spread
+from chladni.planning.plan import target_modes
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def panel():
+    return folded_panel()
+
+
+@pytest.fixture(scope="module")
+def built(panel):
+    return structure(panel)
+
+
+@pytest.fixture(scope="module")
+def found(panel, built):
+    return plan(panel, Wishes(sensors=14, modes=10, candidates=150), built=built)
+
+
+def test_places_keep_off_edges_and_folds(panel):
+    """No place within a foot of the outline of panel or flanges; all grids are of the panel."""
+    places = find_places(panel, 1000, foot=0.015)
+    x, y, _ = places.points.T
+    on_top = np.abs(places.normals[:, 2]) > 0.9
+    assert 50 < len(places) < len(panel.points)
+    assert np.all((x > 0.0149) & (x < 0.6 - 0.0149))
+    assert np.all((y[on_top] > 0.0149) & (y[on_top] < 0.3 - 0.0149))
+
+
+def test_normals_are_those_of_the_surface():
+    """On a flat plate they are the normal, all with the sense of its shells."""
+    places = find_places(plate(0.4, 0.3, 8, 6, 1e-3), 1000)
+    np.testing.assert_allclose(places.normals, np.tile([0, 0, 1.0], (len(places), 1)), atol=1e-12)
+    assert len(places) == 7 * 5
+    assert np.all(places.side == 1)
+
+
+def test_a_closed_box_is_reached_from_outside_only():
+    """The side that can be reached is the one that looks away from the middle."""
+    specimen = box()
+    places = find_places(specimen, 500)
+    outward = np.einsum("ij,ij->i", places.normals, places.points - specimen.points.mean(axis=0))
+    np.testing.assert_array_equal(places.side, np.sign(outward))
+
+
+def test_a_covered_sheet_is_not_reachable():
+    """Two plates 20 mm apart: each can be reached from its free side; 3 mm apart likewise."""
+    lower = plate(0.4, 0.3, 8, 6, 1e-3)
+    for gap in (0.02, 0.003):
+        upper = replace(lower, points=lower.points + gap * UP)
+        both = _joined(lower, upper)
+        places = find_places(both, 500)
+        assert np.all(places.side == np.where(places.points[:, 2] > gap / 2, 1, -1))
+        three = _joined(both, replace(lower, points=lower.points + gap / 2 * UP))
+        middle = find_places(three, 500).points[:, 2]
+        inner = np.abs(middle - gap / 2) < 1e-9
+        assert not inner.any() or find_places(three, 500).points[inner][:, 0].min() < 0.1
+
+
+def _joined(a, b):
+    """One assembly of two that share nothing."""
+    n = len(a.points)
+    s, t = a.shells, b.shells
+    shells = replace(
+        s,
+        ids=np.r_[s.ids, t.ids + s.ids.max()],
+        nodes=np.r_[s.nodes, t.nodes + n],
+        part=np.r_[s.part, t.part],
+        thickness=np.r_[s.thickness, t.thickness],
+        axis=np.r_[s.axis, t.axis],
+        offset=np.r_[s.offset, t.offset],
+    )
+    return replace(
+        a, ids=np.r_[a.ids, b.ids + a.ids.max()], points=np.r_[a.points, b.points], shells=shells
+    )
+
+
+def test_places_do_not_depend_on_the_unit_of_length(panel):
+    """A deck in an unknown unit gets a foot in proportion to its size: the same places in mm."""
+    here = find_places(panel, 100, unit="")
+    mm = replace(panel, points=1e3 * panel.points)
+    np.testing.assert_array_equal(find_places(mm, 100, unit="").ids, here.ids)
+
+
+def test_a_mesh_of_edges_only_is_refused():
+    with pytest.raises(ModelError, match="refine the mesh"):
+        find_places(plate(0.4, 0.3, 1, 1, 1e-3))
+
+
+def test_spread_covers():
+    """Every point is within the distance of the last one chosen (Gonzalez)."""
+    points = np.random.default_rng(0).uniform(size=(200, 2))
+    order = spread(points, 20)
+    assert len(set(order)) == 20
+    nearest = np.linalg.norm(points[:, None] - points[order], axis=2).min(axis=1)
+    before = np.linalg.norm(points[order[-1]] - points[order[:-1]], axis=1).min()
+    assert nearest.max() <= before + 1e-12
+
+
+def test_target_modes_are_flexible(built):
+    modal, above, first = target_modes(built, Wishes(modes=5))
+    assert first == 6
+    assert len(modal) == 5
+    assert modal.frequency[0] > 1
+    assert above.frequency[5] > modal.frequency[-1]
+    with pytest.raises(ModelError, match="no flexible mode below 1 Hz"):
+        target_modes(built, Wishes(top=1.0))
+
+
+def test_the_plan_is_that_of_the_methods(found):
+    """EFI and exchange on the plan's own shapes; ranked so that the last is least needed."""
+    m = found.mounts
+    normals = found.phi[m.normal]
+    best = pretest.log_det_fisher(normals[pretest.best_layout(normals, 14)])
+    assert found.log_det["with exchange"] == pytest.approx(best)
+    assert found.log_det["pivoted QR"] <= found.log_det["with exchange"]
+    if not found.moves:
+        left = pretest.log_det_fisher(found.phi[found.layout[:-1]])
+        others = [
+            pretest.log_det_fisher(np.delete(found.phi[found.layout], k, axis=0)) for k in range(14)
+        ]
+        assert left == pytest.approx(max(others))
+    assert found.observable == (20, 20)
+    assert np.all(found.auto_mac >= 0)
+
+
+def test_sensors_load_the_structure(found):
+    """Mass lowers every frequency, and the more so the more it weighs."""
+    assert np.all(found.loaded <= found.modal.frequency + 1e-9)
+    assert found.loaded.min() > 0
+
+
+def test_every_mode_is_seen_or_said_not_to_be(found):
+    result = summary(found)
+    for k, mode in enumerate(result["modes"]):
+        assert mode["seen"] == (found.visible[k] >= 0.2)
+    assert np.all(found.visible[found.visible_before >= 0.2] >= 0.2)
+
+
+def test_an_in_plane_mode_is_seen_with_a_block():
+    """A plate on soft springs along x: two modes are along the sheet, unseen by any normal.
+
+    The plan says so, gives up its least ranked sensors and puts them along the sheet.
+    """
+    sheet = plate(0.4, 0.3, 10, 8, 1e-3)
+    x, y, _ = sheet.points.T
+    corners = np.flatnonzero(((x == 0) | (x == x.max())) & ((y == 0) | (y == y.max())))
+    springs = Scalars(
+        ids=np.arange(4) + 1,
+        nodes=np.column_stack([corners, np.full(4, -1)]),
+        component=np.ones((4, 2), dtype=np.int64),
+        value=np.full(4, 100.0),
+        damping=np.zeros(4),
+    )
+    held = replace(sheet, springs=springs)
+    planned = plan(held, Wishes(sensors=10, modes=7))
+    due = np.sqrt(4 * 100.0 / (0.4 * 0.3 * 1e-3 * 7850)) / (2 * np.pi)
+    assert planned.modal.frequency[0] == pytest.approx(due, rel=1e-3)
+    np.testing.assert_array_equal(planned.aimed, 2 * [False] + 5 * [True])  # shift, turn in plane
+    result = summary(planned)
+    assert {m["mode"] for m in result["moves"]} <= {planned.first + 1, planned.first + 2}
+    for move in result["moves"]:
+        assert move["taken"].endswith((":+X", ":+Y"))
+        assert move["before"] < 1e-6
+    assert np.all(planned.visible[:2] > 0.5)
+    assert all(m["seen"] for m in result["modes"])
+    assert np.isfinite(result["actuators"][0]["condition"])
+    assert result["sensors"][-1]["mounted"] == "on a block"
+
+
+def test_hang_points_are_quiet_and_apart(found):
+    """Quieter than most places, and not side by side."""
+    assert len(np.unique(found.hangers)) == len(found.hangers) >= 2
+    assert found.quiet[0] <= np.median(found.quiet)
+    at = found.places.points[[list(found.places.ids).index(g) for g in found.hangers]]
+    apart = np.linalg.norm(at[:, None] - at, axis=2)
+    size = np.linalg.norm(np.ptp(found.places.points, axis=0))
+    assert apart[np.triu_indices(len(at), 1)].min() >= 0.3 * size - 1e-12
+
+
+def test_spacing_is_kept(panel, built):
+    planned = plan(panel, Wishes(sensors=12, modes=8, candidates=120, spacing=0.08), built=built)
+    x = planned.mounts.points[planned.layout]
+    apart = np.linalg.norm(x[:, None] - x, axis=2)[np.triu_indices(12, 1)]
+    assert apart.min() >= 0.08
+
+
+def test_a_layout_for_an_ensemble(panel, built):
+    """Drawn models move the layout; it serves their mean better than the nominal one does."""
+    wishes = Wishes(sensors=10, modes=8, candidates=60)
+    nominal = plan(panel, wishes, built=built)
+    robust = plan(panel, replace(wishes, draws=3, spread=0.2), built=built)
+    assert robust.log_det["with exchange"] != nominal.log_det["with exchange"]
+    assert set(robust.log_det) == {"greedy", "effective independence", "with exchange"}
+
+
+def test_fewer_sensors_than_modes_is_refused(panel, built):
+    with pytest.raises(ShapeError, match="4 sensors cannot tell 6 modes"):
+        plan(panel, Wishes(sensors=4, modes=6, candidates=60), built=built)
+
+
+def test_the_table_of_sensors_can_be_read_back(found, tmp_path):
+    path = tmp_path / "sensors.csv"
+    path.write_text(sensors_csv(found))
+    sensors = read_sensors(path)
+    assert [s.label for s in sensors[:-1]] == [found.mounts.labels[i] for i in found.layout]
+    assert sensors[-1].role == "input"
+    directions = np.array([s.direction for s in sensors[:-1]])
+    np.testing.assert_allclose(directions, found.mounts.directions[found.layout], atol=1e-8)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert all(float(r["mass"]) == (0.005 if r["role"] == "output" else 0) for r in rows)
