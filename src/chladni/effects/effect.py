@@ -133,6 +133,22 @@ class Effect:
         """The structure with the effect written into it."""
         return assembly
 
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """Parameters as diagnosis.json has them: name, value, unit, 95 % interval.
+
+        Laplace's intervals are doubled: model error makes them too narrow by about that much.
+        """
+        out = []
+        for k, p in enumerate(self.parameters):
+            low, high = p.interval(x[k], 2 * sd[k])
+            row = {"name": p.name, "value": p.value(x[k]), "unit": p.unit, "low": low, "high": high}
+            out.append(row)
+        return out
+
+    def settled(self, x: np.ndarray) -> dict[str, Any]:
+        """Where it is once it has been fitted."""
+        return self.where()
+
     def starts(self) -> list[np.ndarray]:
         """Points from which a fit begins: every combination of its parameters' starts."""
         options = [p.starts or (p.mean,) for p in self.parameters]

@@ -1,6 +1,7 @@
 """The sheet's material: a grain, a rolling direction."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .sheet import Sheet
 class OrthotropicMaterial(Effect):
     """E1, E2, G12 and nu12 in place of one isotropic E and nu.
 
-    x = ln(E1/E), ln(E2/E), ln(G12/G), nu12 - nu·sqrt(E1/E2) ... see :func:`orthotropic`.
+    x = ln(E1/E), ln(E2/E), ln(G12/G) and the logit of sqrt(nu12 nu21) / 0.6.
     """
 
     name = "orthotropic-material"
@@ -31,6 +32,13 @@ class OrthotropicMaterial(Effect):
         E1, E2 = self.E * np.exp(x[0]), self.E * np.exp(x[1])
         G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """E1, E2, G12 and nu12."""
+        rows = super().reported(x, sd)
+        nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * 2 * sd[3]))[3] for s in (-1, 0, 1)]
+        last = {"name": "nu12", "value": nu[1], "unit": "-", "low": nu[0], "high": nu[2]}
+        return [*rows[:3], last]
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
         """Ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""

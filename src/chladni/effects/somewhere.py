@@ -6,6 +6,7 @@ slope.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -89,6 +90,18 @@ class Somewhere(Effect):
         """The place in the basic frame (3,) [m]."""
         assert self.patch is not None
         return np.asarray(self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane)
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """The strength; the place stands in ``settled``."""
+        return super().reported(x, sd)[:1]
+
+    def settled(self, x: np.ndarray) -> dict[str, Any]:
+        """The place a fit moved it to."""
+        assert self.patch is not None
+        point, grid = [float(v) for v in self.at(x)], self.nearest(x)
+        text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        own = {"text": text, "grids": [grid], "point_m": point, "radius_m": self.patch.size}
+        return {**self.where(), **own}
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""

@@ -1,6 +1,7 @@
 """Thickness that is not what the deck says, here and there."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,8 @@ class ThicknessDistribution(Effect):
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     size: float = 1.0
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
+    structure_points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    structure_ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def _bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
         """Q at points X (n,), averaged over a group of variance ``blur``."""
@@ -53,6 +56,22 @@ class ThicknessDistribution(Effect):
         q = self._bump(x, assembly.points)[shells.nodes]
         factor = np.where(chosen[:, None], 1 - thinning(x[0]) * q, 1.0)
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """Thinning α and radius R; the place stands in ``settled``."""
+        rows = super().reported(x, sd)
+        low, high = (thinning(x[0] + s * 1.96 * 2 * sd[0]) for s in (-1, 1))
+        return [{**rows[0], "value": thinning(x[0]), "low": low, "high": high}, rows[1]]
+
+    def settled(self, x: np.ndarray) -> dict[str, Any]:
+        """The place a fit moved it to."""
+        point = [float(v) for v in self.at(x)]
+        text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        d2 = ((self.structure_points - self.at(x)) ** 2).sum(axis=1)
+        grid = int(self.structure_ids[np.argmin(d2)])
+        radius = float(self.size * np.exp(x[1]))
+        own = {"text": text, "point_m": point, "radius_m": radius, "grids": [grid]}
+        return {**self.where(), **own}
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """The centre in the basic frame (3,) [m]."""
@@ -84,4 +103,5 @@ def thickness_distribution(
         unknown, f"on {name}", (name,), places=places,
         position=position, inside=(sheet.part == position).astype(float), centre=sheet.centre,
         plane=plane, origin=origin, size=size, variance=sheet.area / 12,
+        structure_points=sheet.structure.assembly.points, structure_ids=sheet.structure.assembly.ids,
     )  # fmt: skip

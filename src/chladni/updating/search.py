@@ -13,6 +13,7 @@ from .likelihood import Data, Poles
 from .reduced import Reduced, State, evaluate
 from .workbench import Workbench
 
+NEVER_WRITTEN = ("scatter", "jitter")  # nuisances no deck can hold; gain and mesh error stay
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
@@ -149,7 +150,7 @@ def deck_state(trial: Trial, gradient: bool = False) -> np.ndarray:
     at = 0
     for e in trial.fit.effects:
         n = len(e.parameters)
-        if e.kind == "nuisance" and e.name != "gain":
+        if e.name in NEVER_WRITTEN:
             x[at : at + n] = [p.mean for p in e.parameters]
         at += n
     return x

@@ -1,0 +1,162 @@
+"""The changes that turn one assembly's deck into another's: what was repaired, and only that."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import ModelError
+from ..meshing.nastran import Add, Deck, Replace, SetColumns, SetField
+from ..meshing.nastran.edits import Change
+from ..model.assembly import Assembly, Shells
+from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
+from ..units import UNITS, Units
+
+
+def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
+    """Edits of the deck: materials, thickness, masses and springs to ground that differ.
+
+    Raises
+    ------
+    ModelError
+        If the two differ in something no card here can say.
+    """
+    units = units or UNITS["SI"]
+    out: list[Change] = []
+    out += _materials(deck, before, after, units)
+    out += _thickness(deck, before, after, units)
+    cards = [*_masses(before, after, units), *_springs(before, after, units)]
+    if cards:
+        out.append(Add(cards, "put in by the diagnosis"))
+    return out
+
+
+def _sheets(assembly: Assembly) -> dict[int, Material]:
+    """Shell materials in use, by id."""
+    out: dict[int, Material] = {}
+    for part in assembly.parts:
+        if isinstance(part.section, ShellSection):
+            for name in ("membrane", "bending", "shear", "coupling"):
+                if (material := getattr(part.section, name)) is not None:
+                    out[material.id] = material
+    return out
+
+
+def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
+    old, new = _sheets(before), _sheets(after)
+    out: list[Change] = []
+    turned = False
+    for id, material in new.items():
+        was = old.get(id)
+        if was is None:
+            raise ModelError(f"material {id} is not in the deck; it has {sorted(old)}")
+        if isinstance(material, Orthotropic) and isinstance(was, Isotropic):
+            out.append(Replace("MAT1", id, _mat8(material, units)))
+            turned = True
+        else:
+            out += _numbers(id, was, material, units)
+    if turned:
+        out += _axes(deck, before, after)
+    return out
+
+
+def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Change]:
+    """Fields of MAT1 or MAT8 whose values differ."""
+    names = {"rho": ("RHO", units.density)}
+    if isinstance(now, Isotropic):
+        kind = "MAT1"
+        names |= {"E": ("E", units.stress), "G": ("G", units.stress)}
+    elif isinstance(now, Orthotropic):
+        kind = "MAT8"
+        names |= {k: (k.upper(), units.stress) for k in ("E1", "E2", "G12", "G1z", "G2z")}
+    else:
+        return
+    for name, (field, unit) in names.items():
+        a, b = getattr(was, name), getattr(now, name)
+        if a is not None and b is not None and not np.isclose(a, b, rtol=1e-9, atol=0):
+            yield SetField(kind, id, field, b / unit)
+
+
+def _mat8(m: Orthotropic, units: Units) -> list[float | int | str | None]:
+    s = units.stress
+    moduli: list[float | int | str | None] = [m.E1 / s, m.E2 / s, m.nu12, m.G12 / s]
+    shear = [m.G1z / s or None, m.G2z / s or None]
+    return ["MAT8", m.id, *moduli, *shear, m.rho / units.density]
+
+
+def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
+    """A coordinate system whose x is the grain, named by the shells it turned."""
+    moved = np.flatnonzero(np.any(before.shells.axis != after.shells.axis, axis=1))
+    if not len(moved):
+        return []
+    x = after.shells.axis[moved[0]]
+    x = x / np.linalg.norm(x)
+    z = np.eye(3)[int(np.argmin(np.abs(x)))]
+    z = z - x * (x @ z)
+    z = z / np.linalg.norm(z)
+    ids = [int(i) for kind in ("CORD2R", "CORD1R") if kind in deck.cards for i in _ids(deck, kind)]
+    cid = 1 + max(ids, default=900)
+    out: list[Change] = [Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "grain of the sheet")]
+    for kind, chosen in _by_kind(after.shells, moved):
+        if len(chosen):
+            out += [SetField(kind, int(i), "THETA", cid) for i in after.shells.ids[chosen]]
+    return out
+
+
+def _ids(deck: Deck, kind: str) -> list[int]:
+    words = deck[kind].words(1).tolist()
+    return [int(w) for w in words if w.isdigit()]
+
+
+def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    tri = shells.triangle[rows]
+    return [("CQUAD4", rows[~tri]), ("CTRIA3", rows[tri])]
+
+
+def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
+    """PSHELL T where a whole part scales, T1 to T4 where it does not."""
+    out: list[Change] = []
+    ratio = after.shells.thickness / before.shells.thickness
+    for k, part in enumerate(after.parts):
+        mine = np.flatnonzero(after.shells.part == k)
+        if not len(mine) or not isinstance(part.section, ShellSection):
+            continue
+        was = before.parts[k].section
+        assert isinstance(was, ShellSection)
+        if np.allclose(ratio[mine], 1, rtol=0, atol=1e-9):
+            continue
+        plain = np.allclose(before.shells.thickness[mine], was.thickness, rtol=1e-9)
+        if plain and np.ptp(ratio[mine]) < 1e-9:
+            t = was.thickness * ratio[mine[0], 0] / units.length
+            out.append(SetField("PSHELL", part.id, "T", float(t)))
+            continue
+        touched = mine[np.abs(ratio[mine] - 1).max(axis=1) > 1e-9]
+        for kind, rows in _by_kind(after.shells, touched):
+            n = 4 if kind == "CQUAD4" else 3
+            if len(rows):
+                fields = tuple(f"T{c + 1}" for c in range(n))
+                t = after.shells.thickness[rows, :n] / units.length
+                out.append(SetColumns(kind, after.shells.ids[rows], fields, t))
+    return out
+
+
+def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CONM2 of every mass that was added, offset where it sits beside its grid."""
+    used = [int(after.shells.ids.max(initial=0)), int(after.masses.ids.max(initial=0))]
+    first = 1 + max(used + [int(after.beams.ids.max(initial=0)), int(after.springs.ids.max(initial=0))])
+    for k in range(len(before.masses), len(after.masses)):
+        M = after.masses.matrix[k]
+        m = M[0, 0]
+        arm = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m
+        card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.mass]
+        yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
+
+
+def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CELAS2 of every spring that was added."""
+    s, n = after.springs, len(before.springs)
+    used = [after.shells.ids, after.masses.ids, after.beams.ids, before.springs.ids]
+    first = 1 + max(int(a.max(initial=0)) for a in used) + len(after.masses)
+    unit = units.force / units.length
+    for k in range(n, len(s)):
+        grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
+        yield ["CELAS2", first + k, s.value[k] / unit, grid, component]

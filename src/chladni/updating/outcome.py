@@ -1,0 +1,254 @@
+"""A diagnosis in numbers: Q on fitted and held-out data, frequencies, alternatives."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import ModalModel
+from ..ema.correlation import mac
+from ..ema.pairing import pair
+from ..fem.assemble import Structure, structure
+from ..fem.energy import mass_properties
+from ..model.assembly import Assembly
+from .diagnosis import THRESHOLD, Diagnosis
+from .likelihood import Poles, Responses
+from .prepare import Prepared, Question
+from .reduced import State, evaluate
+from .search import Search, Trial, deck_state
+
+FIRST = 8  # paired frequencies over which the rms is reported
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """The structure as the deck has it, calibrated without new physics, and with the effect."""
+
+    nominal: Assembly
+    calibrated: Assembly
+    final: Assembly
+
+
+def models(question: Question, diagnosis: Diagnosis) -> Models:
+    """Every stage written into the assembly."""
+    found = diagnosis.found
+    nothing = diagnosis.verdict == "nothing missing"
+    calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.null)
+    keep = found is not None and found.effect.kind != "test"
+    final = applied(question.assembly, found) if keep and found is not None else calibrated
+    return Models(question.assembly, calibrated, final)
+
+
+def applied(assembly: Assembly, trial: Trial) -> Assembly:
+    """The assembly with the ordinary parameters and the effect of a trial in it."""
+    for effect in trial.fit.effects:
+        assembly = effect.apply(assembly, trial.fit.of(effect))
+    return assembly
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Q nominal, calibrated and with the effect, and what is left when scatter is fitted too."""
+
+    nominal: float
+    calibrated: float
+    effect: float
+    floor: float
+
+    def as_dict(self) -> dict[str, float]:
+        """The keys of diagnosis.json."""
+        return {
+            "Q_nominal": self.nominal,
+            "Q_calibrated": self.calibrated,
+            "Q_with_effect": self.effect,
+            "Q_floor": self.floor,
+        }
+
+
+def scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[Scores, Scores]:
+    """Q on the data that were fitted, and on those held out."""
+    winner = diagnosis.found or diagnosis.null
+    stages = _states(prepared.search, diagnosis, winner)
+    out = []
+    for use in (prepared.score.use, prepared.held):
+        values = [_data(prepared, trial).Q(state, use) for trial, state in stages]
+        out.append(Scores(*values))
+    return out[0], out[1]
+
+
+def _data(prepared: Prepared, trial: Trial) -> Responses | Poles:
+    return prepared.score.over(trial.model)
+
+
+def _states(
+    search: Search, diagnosis: Diagnosis, winner: Trial
+) -> list[tuple[Trial, State]]:
+    """Nominal, calibrated, with the effect; and the last with all it was fitted with."""
+    null = diagnosis.null
+    mean = search.mean()
+    nominal = evaluate(null.model, search.base, mean, False)
+    calibrated = evaluate(null.model, null.fit.effects, deck_state(null), False)
+    final = evaluate(winner.model, winner.fit.effects, deck_state(winner), False)
+    return [(null, nominal), (null, calibrated), (winner, final), (winner, winner.fit.state)]
+
+
+def effect_entry(trial: Trial) -> dict[str, Any]:
+    """One effect as diagnosis.json has it."""
+    effect, x = trial.effect, trial.fit.of(trial.effect)
+    return {
+        "name": effect.name,
+        "claim": effect.claim,
+        "log_evidence": -trial.S / 2,
+        "where": effect.settled(x),
+        "parameters": effect.reported(x, trial.fit.sd(effect)),
+    }
+
+
+def alternatives(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Everything that was tried and is not the answer, with the reason."""
+    found = diagnosis.found
+    best = found if found is not None else diagnosis.null
+    out = []
+    for trial in diagnosis.trials:
+        if trial is found:
+            continue
+        out.append(
+            {
+                "name": trial.effect.name,
+                "log_evidence": -trial.S / 2,
+                "why_not": why_not(trial, best, found is not None, diagnosis.gain(trial)),
+                "where": trial.effect.settled(trial.fit.of(trial.effect)),
+            }
+        )
+    if found is not None:
+        gap = (diagnosis.null.S - best.S) / 2
+        name = "calibration only"
+        reason = f"E, rho and t alone are e^{gap:.0f} times less probable"
+        out.append({"name": name, "log_evidence": -diagnosis.null.S / 2, "why_not": reason})
+    return sorted(out, key=lambda a: -a["log_evidence"])
+
+
+def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
+    """Why a hypothesis was not named, with a number."""
+    if not named:
+        return (
+            f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
+            f"{THRESHOLD:.0f} are needed before anything is named"
+        )
+    gap = (trial.S - best.S) / 2
+    return (
+        f"e^{gap:.0f} times less probable than {best.effect.name}; leaves {trial.fit.misfit:.0f} "
+        f"of weighted squares, {best.effect.name} {best.fit.misfit:.0f}"
+    )
+
+
+def frequency_table(
+    question: Question, prepared: Prepared, before: Assembly, after: Assembly
+) -> list[dict[str, float | None]]:
+    """Identified frequencies beside those of the deck before and after, full models."""
+    test, shapes = _test_modes(prepared)
+    if not len(test):
+        return []
+    top = 1.3 * float(test.max())
+    rows: list[dict[str, float | None]] = [{"test_hz": float(f)} for f in test]
+    for name, made in (("before", before), ("after", after)):
+        built = structure(made)
+        modes = _flexible(normal_modes(built.system, band=top), 0.02 * float(test.min()))
+        at, value = _paired(question, prepared, built, modes, test, shapes)
+        for k in range(len(test)):
+            rows[k][f"{name}_hz"] = None if at[k] < 0 else float(modes.frequency[at[k]])
+            rows[k][f"mac_{name}"] = None if at[k] < 0 or np.isnan(value[k]) else float(value[k])
+    return rows
+
+
+def _flexible(modes: ModalModel, lowest: float) -> ModalModel:
+    keep = modes.frequency > lowest
+    return ModalModel(modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs)
+
+
+def _test_modes(prepared: Prepared) -> tuple[np.ndarray, np.ndarray | None]:
+    """Frequencies of the test and, where there are sensors enough, shapes (n_out, n)."""
+    if isinstance(prepared.score, Poles):
+        return prepared.score.frequency, None
+    found = prepared.identified
+    assert found is not None
+    low, high = found.band
+    keep = (found.frequency >= low) & (found.frequency <= high) & (found.damping < 0.05)
+    keep &= found.gain > 3.0
+    shapes = np.imag(found.residues[keep, :, 0] * 1j).T if found.residues.shape[1] >= 4 else None
+    if shapes is not None:
+        residues = found.residues[keep, :, 0]
+        turn = np.exp(-0.5j * np.angle((residues**2).sum(axis=1)))
+        shapes = (residues * turn[:, None]).real.T
+    return found.frequency[keep], shapes
+
+
+def _paired(
+    question: Question, prepared: Prepared, built: Structure, modes: ModalModel,
+    test: np.ndarray, shapes: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Model mode of every test mode (-1: none) and their MAC (n,)."""
+    n = len(test)
+    at, value = np.full(n, -1), np.full(n, np.nan)
+    if shapes is not None:
+        phi = question.outputs.rows(built) @ modes.shapes
+        pairs = pair(modes.frequency, test, mac(phi, shapes))
+        at[pairs.test], value[pairs.test] = pairs.model, pairs.mac
+        return at, value
+    assert isinstance(prepared.score, Poles)
+    eye = np.eye(len(modes.frequency))
+    score = prepared.score
+    lam = (2 * np.pi * modes.frequency) ** 2
+    state = State(lam, eye, np.zeros(0), np.zeros(0), 0.0, np.zeros(0), None, None)
+    if score.outputs is not None:
+        a, b = (rows @ modes.shapes for rows in (score.outputs, score.inputs))  # type: ignore[operator]
+        score = Poles(**{**vars(score), "a": a, "b": b})
+    forced = Poles(**{**vars(score), "scale": 0.1})
+    t, m, _ = forced.pairs(state, np.ones(n, bool))
+    at[t] = m
+    return at, value
+
+
+def rms(rows: Sequence[dict[str, float | None]], key: str, first: int = FIRST) -> float | None:
+    """Root mean square of ln(model/test) over the first paired frequencies, in per cent."""
+    both = [(r[key], r["test_hz"]) for r in rows if r.get(key)][:first]
+    if not both:
+        return None
+    d = np.log([float(a or 1) / float(b or 1) for a, b in both])
+    return float(100 * np.sqrt(np.mean(d**2)))
+
+
+def as_dict(
+    question: Question, prepared: Prepared, diagnosis: Diagnosis, stages: Models
+) -> dict[str, Any]:
+    """``diagnosis.json`` but for the files."""
+    fitted, held = scores(prepared, diagnosis)
+    found = diagnosis.found
+    rows = frequency_table(question, prepared, stages.nominal, stages.final)
+    weighing = question.weighing
+    last = found or diagnosis.null
+    return {
+        "verdict": diagnosis.verdict,
+        "effects": [] if found is None else [effect_entry(found)],
+        "alternatives": alternatives(diagnosis),
+        "fit": {
+            **fitted.as_dict(),
+            "held_out": {**held.as_dict(), "what": prepared.what},
+            "gain_over_calibration": None if found is None else diagnosis.gain(found),
+            "threshold": THRESHOLD,
+        },
+        "calibrated": [
+            {"where": e.text, **row}
+            for e in last.fit.effects
+            if e.kind == "ordinary"
+            for row in e.reported(last.fit.of(e), last.fit.sd(e))
+        ],
+        "mass": {
+            "weighed_kg": None if weighing is None else weighing.mass,
+            "model_kg": mass_properties(stages.final)[0],
+        },
+        "frequencies": rows,
+        "notes": [*prepared.notes, *diagnosis.notes],
+    }
