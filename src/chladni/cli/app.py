@@ -15,6 +15,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "render",
     "plan",
     "identify",
+    "correlate",
     "report",
     "specimen",
 )

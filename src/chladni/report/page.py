@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from ..output import write_text
-from .blocks import Block, Picture, Section
+from .blocks import Picture, Section
 from .verdict import HEADING, TONE, sections, sentence
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -89,11 +89,6 @@ def made_with() -> str:
     tools = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     today = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return f"chladni {own_version()}, Python {platform.python_version()}, {tools}; {today}"
-
-
-def pictures(named: Mapping[str, tuple[Path, str]]) -> list[Block]:
-    """Pictures with captions, in order."""
-    return [Picture(path, caption) for path, caption in named.values()]
 
 
 def own_version() -> str:
