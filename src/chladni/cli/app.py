@@ -10,6 +10,10 @@ import typer
 from ..errors import AccuracyError, ChladniError
 
 COMMANDS = (  # each a module here with a function ``run``
+    "diagnose",
+    "calibrate",
+    "demo",
+    "study",
     "modes",
     "frf",
     "render",

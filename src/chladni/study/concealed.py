@@ -18,11 +18,7 @@ from ..effects import catalogue, points
 from ..ema.uff_write import write_uff
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
-
-try:
-    from ..meshing.nastran import write_assembly
-except ImportError:
-    write_assembly = None
+from ..meshing.nastran import write_assembly
 from ..model.assembly import Assembly
 from ..model.holed import holed_plate
 from ..model.plates import STEEL, folded_panel

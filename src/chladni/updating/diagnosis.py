@@ -54,11 +54,15 @@ class Diagnosis:
         return self.null.S - trial.S
 
 
-def diagnose(search: Search, progress: Progress = lambda text, share: None) -> Diagnosis:
-    """Name the missing physics, or say that none is missing."""
+def diagnose(
+    search: Search, progress: Progress = lambda text, share: None, effects: bool = True
+) -> Diagnosis:
+    """Name the missing physics, or say that none is missing; without ``effects``, calibrate."""
     progress("calibration without new physics", 0.05)
     nominal = _base_trial(search, search.nuisance, _nominal_starts(search))
     null = _base_trial(search, search.base, _null_starts(search))
+    if not effects:
+        return Diagnosis(nominal, null, (), verdict(nominal, null, ()))
     progress("scan of the catalogue", 0.2)
     tried = candidates(search, null)
     trials = []

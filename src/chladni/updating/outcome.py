@@ -145,15 +145,15 @@ def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
 
 
 def frequency_table(
-    question: Question, prepared: Prepared, before: Assembly, after: Assembly
+    question: Question, prepared: Prepared, stages: Sequence[tuple[str, Assembly]]
 ) -> list[dict[str, float | None]]:
-    """Identified frequencies beside those of the deck before and after, full models."""
+    """Identified frequencies beside those of every stage, by full models: before_hz, mac_before ..."""
     test, shapes = _test_modes(prepared)
     if not len(test):
         return []
     top = 1.3 * float(test.max())
     rows: list[dict[str, float | None]] = [{"test_hz": float(f)} for f in test]
-    for name, made in (("before", before), ("after", after)):
+    for name, made in stages:
         built = structure(made)
         modes = _flexible(normal_modes(built.system, band=top), 0.02 * float(test.min()))
         at, value = _paired(question, prepared, built, modes, test, shapes)
@@ -226,7 +226,8 @@ def as_dict(
     """``diagnosis.json`` but for the files."""
     fitted, held = scores(prepared, diagnosis)
     found = diagnosis.found
-    rows = frequency_table(question, prepared, stages.nominal, stages.final)
+    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
+    rows = frequency_table(question, prepared, every)
     weighing = question.weighing
     last = found or diagnosis.null
     return {

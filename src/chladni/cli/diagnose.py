@@ -1,0 +1,126 @@
+"""``chladni diagnose``: the name of the physics a deck left out, and the deck with it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..case import Case, load_case
+from ..case.question import question
+from ..case.repair import changes
+from ..dynamics.eigen import normal_modes
+from ..dynamics.frf import FRF
+from ..errors import FileError
+from ..meshing.nastran import assembly, read_deck, write_deck
+from ..model.assembly import Assembly
+from ..progress import Progress, within
+from ..report.page import write_page
+from ..updating.diagnosis import Diagnosis, diagnose
+from ..updating.outcome import Models, as_dict, models, rms
+from ..updating.prepare import Prepared, Question, prepare
+from .case_model import DAMPING, markers, model_frf
+from .figures import Shown, figures
+from .frf import REACH
+from .model import Model, is_case
+from .run import Out, Run, command_line, started
+
+
+def run(
+    source: Annotated[Path, typer.Argument(metavar="CASE")],
+    out: Out = None,
+) -> None:
+    """Name the missing physics, write the updated deck, diagnosis.json and a page."""
+    with started("diagnose", source, out) as job:
+        answer(job, opened(source))
+
+
+def opened(source: Path) -> Case:
+    """The case of a folder or a case.toml."""
+    if source.exists() and not is_case(source):
+        raise FileError(f"{source} is no case; give a folder with case.toml")
+    return load_case(source)
+
+
+def answer(job: Run, case: Case, search: bool = True) -> dict[str, Any]:
+    """Diagnose (or only calibrate) a case into the folder of the run."""
+    job.progress("identifying the recording", 0.02)
+    asked = question(case)
+    prepared = prepare(asked)
+    found = diagnose(prepared.search, within(job.progress, 0.1, 0.8), search)
+    stages = models(asked, found)
+    job.progress("writing the deck", 0.82)
+    updated = write_deck(
+        case.deck,
+        job.folder / case.deck.path.with_name("updated.bdf").name,
+        changes(case.deck, case.assembly, stages.final, case.units),
+    )
+    stages = Models(stages.nominal, stages.calibrated, assembly(read_deck(updated), case.units))
+    d = as_dict(asked, prepared, found, stages)
+    d["files"] = {"deck": updated.name, "report": "report.html", "diagnosis": "diagnosis.json"}
+    d["frequency_rms_percent"] = {
+        k: rms(d["frequencies"], f"{k}_hz") for k in ("before", "calibrated", "after")
+    }
+    job.json("diagnosis.json", d)
+    page(job, case, asked, prepared, found, stages, d, within(job.progress, 0.85, 1.0))
+    return d
+
+
+def page(
+    job: Run, case: Case, asked: Question, prepared: Prepared, found: Diagnosis, stages: Models,
+    d: dict[str, Any], progress: Progress,
+) -> None:  # fmt: skip
+    """Pictures and report.html."""
+    progress("pictures", 0.0)
+    drawn = figures(job.folder, d, shown(case, prepared, stages))
+    write_page(
+        job.folder, d, drawn, [*d["notes"], *case.notes], command=command_line(),
+        title=f"Diagnosis – {case.path.parent.name}",
+    )  # fmt: skip
+    job.say(said(d))
+
+
+def shown(case: Case, prepared: Prepared, stages: Models) -> Shown:
+    """What the pictures need: the mesh, the sensors, test and model responses."""
+    model = Model(case.path, case.assembly)
+    curves: dict[str, FRF] = {}
+    if case.frfs:
+        low, high = case.band or (0.0, 1e9)
+        if case.held_band is not None:
+            high = max(high, case.held_band[1])
+        test = case.frfs[0].sel(band=(max(low, 1e-6), high))
+        curves = {"test": test, "before": _response(case, stages.nominal, test)}
+        curves["after"] = _response(case, stages.final, test)
+    held = [
+        label for label, h in zip(case.outputs.labels, _held(prepared, case), strict=True) if h
+    ]
+    return Shown(
+        model.seen,
+        [p.name for p in case.assembly.parts],
+        case.assembly.ids,
+        curves,
+        held,
+        [case.band] if case.band else [],
+        list(case.exclude),
+        markers(case.outputs),
+        markers(case.inputs),
+    )
+
+
+def _held(prepared: Prepared, case: Case) -> list[bool]:
+    use = prepared.search.data.use
+    n = len(case.outputs.labels)
+    return [not use[:, k].any() for k in range(n)] if use.ndim == 2 else [False] * n
+
+
+def _response(case: Case, made: Assembly, test: FRF) -> FRF:
+    model = Model(case.path, made)
+    top = REACH * float(test.frequency[-1])
+    modal = normal_modes(model.structure.system, band=top, points=model.places)
+    return model_frf(case, model, modal.with_damping(case.damping or DAMPING), test)
+
+
+def said(d: dict[str, Any]) -> str:
+    """The verdict for a terminal."""
+    from ..report.verdict import sentence
+
+    return sentence(d)

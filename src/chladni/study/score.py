@@ -1,0 +1,73 @@
+"""Answers against sealed truths: who was called what, how far off, how much better."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+NULLS = ("nothing", "calibration")
+Row = dict[str, Any]
+
+
+def scored(answer: Row, truth: Row) -> Row:
+    """One case: what it was called, distance of the place [mm], held-out Q after over before."""
+    effects = answer["effects"]
+    called = effects[0]["name"] if effects else answer["verdict"]
+    place = None
+    if effects and "point_m" in truth and effects[0]["where"]["point_m"]:
+        apart = np.subtract(effects[0]["where"]["point_m"], truth["point_m"])
+        place = 1e3 * float(np.linalg.norm(apart))
+    held = answer["held_out"]
+    ratio = held["Q_with_effect"] / held["Q_calibrated"] if effects and held else None
+    channel = not effects or "channel" not in truth or truth["channel"] in effects[0]["where"]["channels"]
+    return {
+        "specimen": truth["specimen"],
+        "seed": truth["seed"],
+        "effect": truth["effect"],
+        "called": called,
+        "right": _right(called, truth["effect"]) and channel,
+        "place_mm": place,
+        "ratio": ratio,
+        "gain": max(answer.get("gain", {"": 0.0}).values()),
+    }
+
+
+def _right(called: str, effect: str) -> bool:
+    if effect in NULLS:
+        return called in ("nothing missing", "calibration only")
+    return called == effect
+
+
+def confusion(rows: Sequence[Row]) -> str:
+    """The confusion matrix as text: concealed effects down, names given across."""
+    names = sorted({r["effect"] for r in rows})
+    given = sorted({r["called"] for r in rows})
+    count = Counter((r["effect"], r["called"]) for r in rows)
+    wide = max(map(len, names), default=1) + 2
+    heads = "".join(f"{k:>6}" for k in range(1, len(given) + 1))
+    lines = [f"{'concealed':<{wide}}{heads}"]
+    for n in names:
+        cells = "".join(f"{count[n, g] or '.':>6}" for g in given)
+        lines.append(f"{n:<{wide}}{cells}")
+    legend = [f"{k}: {g}" for k, g in enumerate(given, 1)]
+    return "\n".join([*lines, "called " + ", ".join(legend)])
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Rates by effect: right name, place within 60 mm, held-out Q at least halved."""
+    lines = []
+    for n in sorted({r["effect"] for r in rows}):
+        mine = [r for r in rows if r["effect"] == n]
+        right = sum(r["right"] for r in mine)
+        text = f"{n}: {right} of {len(mine)} right"
+        places = [r["place_mm"] for r in mine if r["right"] and r["place_mm"] is not None]
+        if places:
+            near = sum(p <= 60 for p in places)
+            text += f"; place within 60 mm {near} of {len(places)}, median {np.median(places):.0f} mm"
+        ratios = [r["ratio"] for r in mine if r["right"] and r["ratio"] is not None]
+        if ratios:
+            half = sum(q <= 0.5 for q in ratios)
+            text += f"; held-out Q halved {half} of {len(ratios)}, median x {np.median(ratios):.2f}"
+        lines.append(text)
+    return "\n".join(lines)
