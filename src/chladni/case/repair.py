@@ -142,7 +142,9 @@ def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
 def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CONM2 of every mass that was added, offset where it sits beside its grid."""
     used = [int(after.shells.ids.max(initial=0)), int(after.masses.ids.max(initial=0))]
-    first = 1 + max(used + [int(after.beams.ids.max(initial=0)), int(after.springs.ids.max(initial=0))])
+    first = 1 + max(
+        used + [int(after.beams.ids.max(initial=0)), int(after.springs.ids.max(initial=0))]
+    )
     for k in range(len(before.masses), len(after.masses)):
         M = after.masses.matrix[k]
         m = M[0, 0]

@@ -1,5 +1,6 @@
 """``chladni diagnose``: the name of the physics a deck left out, and the deck with it."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +18,7 @@ from ..progress import Progress, within
 from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
 from ..updating.outcome import Models, as_dict, models, rms
-from ..updating.prepare import Prepared, Question, prepare
+from ..updating.prepare import Prepared, Question, prepare, renewed
 from .case_model import DAMPING, markers, model_frf
 from .figures import Shown, figures
 from .frf import REACH
@@ -47,6 +48,9 @@ def answer(job: Run, case: Case, search: bool = True) -> dict[str, Any]:
     asked = question(case)
     prepared = prepare(asked)
     found = diagnose(prepared.search, within(job.progress, 0.1, 0.8), search)
+    if found.found is not None:
+        first = renewed(asked, prepared, found.found)
+        found = replace(found, trials=(first, *found.trials[1:]))
     stages = models(asked, found)
     job.progress("writing the deck", 0.82)
     updated = write_deck(
@@ -90,9 +94,7 @@ def shown(case: Case, prepared: Prepared, stages: Models) -> Shown:
         test = case.frfs[0].sel(band=(max(low, 1e-6), high))
         curves = {"test": test, "before": _response(case, stages.nominal, test)}
         curves["after"] = _response(case, stages.final, test)
-    held = [
-        label for label, h in zip(case.outputs.labels, _held(prepared, case), strict=True) if h
-    ]
+    held = [label for label, h in zip(case.outputs.labels, _held(prepared, case), strict=True) if h]
     return Shown(
         model.seen,
         [p.name for p in case.assembly.parts],

@@ -1,7 +1,7 @@
 """The sheet's material: a grain, a rolling direction."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -26,6 +26,11 @@ class OrthotropicMaterial(Effect):
     positions: tuple[int, ...] = ()
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    begun: np.ndarray | None = None  # x that the structure's own material has already
+
+    def begun_at(self, x: np.ndarray) -> Self:
+        """The same effect on a structure that has the material of x."""
+        return replace(self, begun=x.copy())
 
     def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
         """(E1, E2, G12 [Pa], nu12) with nu12 = nu_m sqrt(E1/E2), nu_m the geometric mean."""
@@ -50,7 +55,7 @@ class OrthotropicMaterial(Effect):
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Ln factors of the four components of the plane stiffness."""
-        logs, h = self._logs(x), 1e-6
+        logs, h = self._logs(x) - (0.0 if self.begun is None else self._logs(self.begun)), 1e-6
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
         )

@@ -20,7 +20,9 @@ def scored(answer: Row, truth: Row) -> Row:
         place = 1e3 * float(np.linalg.norm(apart))
     held = answer["held_out"]
     ratio = held["Q_with_effect"] / held["Q_calibrated"] if effects and held else None
-    channel = not effects or "channel" not in truth or truth["channel"] in effects[0]["where"]["channels"]
+    channel = (
+        not effects or "channel" not in truth or truth["channel"] in effects[0]["where"]["channels"]
+    )
     return {
         "specimen": truth["specimen"],
         "seed": truth["seed"],
@@ -64,7 +66,9 @@ def summary(rows: Sequence[Row]) -> str:
         places = [r["place_mm"] for r in mine if r["right"] and r["place_mm"] is not None]
         if places:
             near = sum(p <= 60 for p in places)
-            text += f"; place within 60 mm {near} of {len(places)}, median {np.median(places):.0f} mm"
+            text += (
+                f"; place within 60 mm {near} of {len(places)}, median {np.median(places):.0f} mm"
+            )
         ratios = [r["ratio"] for r in mine if r["right"] and r["ratio"] is not None]
         if ratios:
             half = sum(q <= 0.5 for q in ratios)

@@ -113,9 +113,8 @@ class Responses:
         """The same responses on other lines and channels."""
         return replace(self, use=use)
 
-    def Q(self, state: State, use: np.ndarray | None = None) -> float:
-        """Mean |δ|² over the lines and channels in use."""
-        use = self.use if use is None else use
+    def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
+        """Mean |δ|² over the lines and channels in use (``real`` is for poles)."""
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
 
 
@@ -178,7 +177,8 @@ class Poles:
 
     def _alone(self) -> np.ndarray:
         """Price of a lonely pole, on the scale on which a pair costs δ²/σ²."""
-        return price_alone(self.strength) - 2 * np.log(self.spread())
+        price = np.where(np.isinf(self.strength), 1e4, price_alone(self.strength))
+        return price - 2 * np.log(self.spread())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
         """How strongly each mode shows, 1 = as the strongest: rms residue over likely places."""
@@ -215,9 +215,17 @@ class Poles:
         """The same poles, others in use."""
         return replace(self, use=use)
 
-    def Q(self, state: State, use: np.ndarray | None = None) -> float:
-        """Mean |log10(f_model / f_test)|² over the paired poles in use."""
-        use = self.use if use is None else use
-        delta, test, _ = self.deviation(state, self.use | use)
-        mine = use[test]
-        return float(np.mean((delta[mine] / LN10) ** 2)) if mine.any() else float("nan")
+    def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """ln(f_model / f_test) and the model mode of every real pole (n,): none is left alone."""
+        wide = replace(self, scale=0.1, strength=np.full(len(self.strength), np.inf))
+        delta, mode = np.full(len(real), np.nan), np.full(len(real), -1)
+        d, test, model = wide.deviation(state, real)
+        delta[test], mode[test] = d, model
+        return delta, mode
+
+    def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
+        """Mean |log10(f_model / f_test)|² over the poles in use that are real ones."""
+        real = np.ones(len(use), bool) if real is None else real
+        delta = self.forced(state, real)[0][use & real]
+        known = np.isfinite(delta)
+        return float(np.mean((delta[known] / LN10) ** 2)) if known.any() else float("nan")

@@ -71,20 +71,30 @@ def scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[Scores, Scores]:
     """Q on the data that were fitted, and on those held out."""
     winner = diagnosis.found or diagnosis.null
     stages = _states(prepared.search, diagnosis, winner)
-    out = []
+    out, real = [], real_poles(prepared, winner)
     for use in (prepared.score.use, prepared.held):
-        values = [_data(prepared, trial).Q(state, use) for trial, state in stages]
+        values = [_data(prepared, trial).Q(state, use, real) for trial, state in stages]
         out.append(Scores(*values))
     return out[0], out[1]
+
+
+def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
+    """Poles of the test that have a partner in the winning model; the rest are strangers."""
+    if not isinstance(prepared.score, Poles):
+        return None
+    data = prepared.score.over(winner.model)
+    fitted = winner.fit.data
+    wide = Poles(**{**vars(data), "scale": max(3 * getattr(fitted, "scale", 0.01), 0.02)})
+    real = np.zeros(len(data.frequency), bool)
+    real[wide.pairs(winner.fit.state, np.ones(len(real), bool))[0]] = True
+    return real
 
 
 def _data(prepared: Prepared, trial: Trial) -> Responses | Poles:
     return prepared.score.over(trial.model)
 
 
-def _states(
-    search: Search, diagnosis: Diagnosis, winner: Trial
-) -> list[tuple[Trial, State]]:
+def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
     """Nominal, calibrated, with the effect; and the last with all it was fitted with."""
     null = diagnosis.null
     mean = search.mean()
@@ -145,18 +155,21 @@ def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
 
 
 def frequency_table(
-    question: Question, prepared: Prepared, stages: Sequence[tuple[str, Assembly]]
+    question: Question,
+    prepared: Prepared,
+    stages: Sequence[tuple[str, Assembly]],
+    real: np.ndarray | None = None,
 ) -> list[dict[str, float | None]]:
     """Identified frequencies beside those of every stage, by full models: before_hz, mac_before ..."""
     test, shapes = _test_modes(prepared)
     if not len(test):
         return []
-    top = 1.3 * float(test.max())
+    top = 2.0 * float(test.max())
     rows: list[dict[str, float | None]] = [{"test_hz": float(f)} for f in test]
     for name, made in stages:
         built = structure(made)
         modes = _flexible(normal_modes(built.system, band=top), 0.02 * float(test.min()))
-        at, value = _paired(question, prepared, built, modes, test, shapes)
+        at, value = _paired(question, prepared, built, modes, test, shapes, real)
         for k in range(len(test)):
             rows[k][f"{name}_hz"] = None if at[k] < 0 else float(modes.frequency[at[k]])
             rows[k][f"mac_{name}"] = None if at[k] < 0 or np.isnan(value[k]) else float(value[k])
@@ -187,7 +200,7 @@ def _test_modes(prepared: Prepared) -> tuple[np.ndarray, np.ndarray | None]:
 
 def _paired(
     question: Question, prepared: Prepared, built: Structure, modes: ModalModel,
-    test: np.ndarray, shapes: np.ndarray | None,
+    test: np.ndarray, shapes: np.ndarray | None, real: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Model mode of every test mode (-1: none) and their MAC (n,)."""
     n = len(test)
@@ -205,10 +218,8 @@ def _paired(
     if score.outputs is not None:
         a, b = (rows @ modes.shapes for rows in (score.outputs, score.inputs))  # type: ignore[operator]
         score = Poles(**{**vars(score), "a": a, "b": b})
-    forced = Poles(**{**vars(score), "scale": 0.1})
-    t, m, _ = forced.pairs(state, np.ones(n, bool))
-    at[t] = m
-    return at, value
+    _, mode = score.forced(state, np.ones(n, bool) if real is None else real)
+    return mode, value
 
 
 def rms(rows: Sequence[dict[str, float | None]], key: str, first: int = FIRST) -> float | None:
@@ -226,10 +237,10 @@ def as_dict(
     """``diagnosis.json`` but for the files."""
     fitted, held = scores(prepared, diagnosis)
     found = diagnosis.found
-    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
-    rows = frequency_table(question, prepared, every)
-    weighing = question.weighing
     last = found or diagnosis.null
+    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
+    rows = frequency_table(question, prepared, every, real_poles(prepared, last))
+    weighing = question.weighing
     return {
         "verdict": diagnosis.verdict,
         "effects": [] if found is None else [effect_entry(found)],

@@ -6,7 +6,7 @@ here, before anything is fitted.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,17 +14,18 @@ import scipy.sparse as sp
 from ..dynamics.frf import FRF
 from ..effects import catalogue
 from ..effects.effect import Effect
+from ..effects.material import OrthotropicMaterial
 from ..effects.mesh import jitter, mesh_error
-from ..effects.ordinary import PartScale, gain, scatter
+from ..effects.ordinary import PartScale, gain, ordinary, scatter
 from ..ema.identification import Identified, equalised, identify
 from ..errors import FileError
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..fem.locate import locate, rows_at
 from ..model.assembly import Assembly
-from .calibration import Weighing
-from .diagnosis import Search
-from .likelihood import Poles, Responses
+from .calibration import Weighing, fit
+from .likelihood import LN10, Poles, Responses
+from .search import Search, Trial
 from .workbench import Workbench, workbench
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
@@ -161,7 +162,7 @@ def _by_responses(question: Question) -> Prepared:
     data = []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
-        use = np.outer((f >= low) & (f <= fit_top), ~held_sensors)
+        use = _training(f, low, fit_top, held_sensors)
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
@@ -172,6 +173,15 @@ def _by_responses(question: Question) -> Prepared:
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = _search(question, bench, data[0], nuisance, top)
+    swapped = (
+        held_sensors if isinstance(question.held_sensors, tuple) else _swapped(search, held_sensors)
+    )
+    if not np.array_equal(swapped, held_sensors):
+        held_sensors = swapped
+        data = [
+            d.only(_training(f, low, fit_top, swapped)) for d, f in zip(data, lines, strict=True)
+        ]
+        search = replace(search, data=data[0])
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
     what = (
         f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
@@ -240,6 +250,34 @@ def _held_sensors(question: Question) -> np.ndarray:
     order = np.random.default_rng(20250101).permutation(len(labels))
     chosen = [k for k in order if not driven[k]][:count]
     return np.isin(np.arange(len(labels)), chosen)
+
+
+def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.ndarray:
+    """Lines and channels that are fitted (n_f, n_out)."""
+    return np.asarray(np.outer((f >= low) & (f <= high), ~held))
+
+
+def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
+    """Held-out sensors, but for those whose level stands out: a fault must be fitted to be found.
+
+    Only the choice of what is held out looks at them, by the median level against a model with
+    ordinary parameters alone.
+    """
+    data = search.data
+    assert isinstance(data, Responses)
+    rough = fit(search.bench.model, search.base, data, search.weighing, search.mean(), max_steps=8)
+    lines = data.use.any(axis=1)
+    delta = data.deviation(rough.state)[lines].reshape(lines.sum(), len(held), -1)
+    level = np.median(delta.real, axis=(0, 2))
+    turned = np.median(np.abs(delta.imag), axis=(0, 2)) > np.pi / 2 / LN10
+    spread = max(0.02, 1.5 * float(np.median(np.abs(level - np.median(level)))))
+    odd = (np.abs(level - np.median(level)) > 4 * spread) | turned
+    if not np.any(odd & held):
+        return held
+    calm = np.flatnonzero(~odd & ~held)[: int((odd & held).sum())]
+    out = held & ~odd
+    out[calm] = True
+    return out
 
 
 # -- poles ----------------------------------------------------------------------------------------
@@ -365,8 +403,6 @@ def _search(
 
 def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
     """The parameters the user frees, or E and rho of every material and t of every part."""
-    from ..effects.ordinary import ordinary
-
     chosen = [
         ordinary(bench.sheet, name, [question.assembly.part(p) for p in parts])
         for name, parts in question.parameters
@@ -382,3 +418,30 @@ def _mass_note(question: Question) -> list[str]:
         ]
     w = question.weighing
     return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]
+
+
+def renewed(question: Question, prepared: Prepared, trial: Trial) -> Trial:
+    """A strong change of material fitted again on a structure that has it already.
+
+    Mesh error, jitter and the basis belong to the structure they were made for; where the material
+    is another one they are made anew, and the same parameters are fitted from where they were.
+    """
+    effect = trial.effect
+    if not isinstance(effect, OrthotropicMaterial):
+        return trial
+    x = trial.fit.of(effect)
+    changed = replace(question, assembly=effect.apply(question.assembly, x))
+    built = structure(changed.assembly)
+    data, old = prepared.search.data, prepared.search
+    top = old.setup.top
+    rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
+    bench = workbench(
+        changed.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
+        groups=64 if rows else 48,
+    )  # fmt: skip
+    extra = [e for e in old.nuisance if e.name == "gain"]
+    fresh = _search(
+        changed, bench, data.over(bench.model), [*_nuisance(bench, built, top), *extra], top
+    )
+    again = fresh.trial(effect.begun_at(x), x, fresh.mean())
+    return again
