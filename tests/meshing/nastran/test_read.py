@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.errors import FileError
-from chladni.meshing.nastran import numbers, read_deck
+from chladni.meshing.nastran import SetField, numbers, read_deck, write_deck
 
 from .conftest import ANCHORS, PLATE, real_decks
 
@@ -156,6 +156,25 @@ def test_case_control():
     assert twenty.selects == {"SPC": 2, "METHOD": 7, "LOAD": 8, "SUPORT": 3}
 
 
+@pytest.mark.parametrize("pattern", ["=,*1,,*10.,==", "=       *(1)            *10.    =="])
+def test_replicated_cards(bulk, pattern):
+    """Rows of grids as a row's first two lines and a count say."""
+    deck = bulk(f"GRID,1,,0.,5.,-1.5+1\n{pattern} $ and so on\n=3\nGRID,9\n", fold=False)
+    grid = deck["GRID"]
+    assert grid.integers(1).tolist() == [1, 2, 3, 4, 5, 9]
+    assert grid.reals(3, 0.0).tolist() == [0, 10, 20, 30, 40, 0]
+    assert grid.block(4, 2, 0.0)[:5].tolist() == [[5, -15]] * 5
+    assert grid.where(4).endswith(":3")
+    assert bulk("PBAR,1,5,1.,2.\nPBAR,2,==\n", fold=False)["PBAR"].fields(1) == [
+        "2",
+        "5",
+        "1.",
+        "2.",
+    ]
+    with pytest.raises(FileError, match=r":3: GRID 4: it is replicated"):
+        write_deck(deck, deck.path.parent / "new.bdf", [SetField("GRID", 4, "X1", 1.0)])
+
+
 NAMES = {
     "ANSA": "$ANSA_NAME_COMMENT;101;PSHELL;Inner Panel;NO;NO;NO;",
     "HyperMesh property": '$HMNAME PROP                 101"Inner Panel" 4',
@@ -198,7 +217,9 @@ BROKEN = {
         "CBAR           1       2       3       4      1.      0.      0.        +AB\nGRID,1",
         r":1: the continuation \+AB is missing",
     ),
-    "replication": ("GRID,1\n=,*1,=\n", r":2: replicated"),
+    "nothing to repeat": ("=,*1,=\n", r":1: there is no card of one line above"),
+    "no pattern": ("GRID,1\n=5\n", r":2: =5 has no replicated card above it"),
+    "step of nothing": ("GRID,1,,A\n=,*1,,*2.\n", r":2: 'A' \+ '2.' cannot be added"),
     "columns": ("GRID 1 0 0.0 0.0 0.0\n", r":1: 'GRID 1 0' is no card name"),
     "too many free fields": ("SPC1,1,123,1,2,3,4,5,6,7\n", r"'7' stands beyond field 9"),
     "no BEGIN BULK": ("SOL 103\nCEND\nGRID,1\n", r":2: CEND without a BEGIN BULK"),

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...errors import FileError
 from .numbers import bytes_matrix
+from .replicate import expanded
 from .sources import Source
 from .table import Cards
 
@@ -58,6 +59,10 @@ def _classified(source: Source) -> _Lines:
     """Blank out comments, drop empty lines, tell the formats apart."""
     first, past = source.bulk
     raw = [t.expandtabs(8) if b"\t" in t else t for t in source.lines[first:past]]
+    origin: np.ndarray = np.arange(first, past)
+    if any(b"=" in t and t[:1] != b"$" for t in raw):
+        raw, at = expanded(raw, source.path, first)
+        origin = np.array(at)
     text = np.zeros((len(raw), 80), np.uint8)
     if raw:
         text = bytes_matrix(np.array(raw, dtype="S80"))
@@ -69,13 +74,13 @@ def _classified(source: Source) -> _Lines:
     text[dollar] = np.where(_ARITHMETIC >= at[:, None], _BLANK, text[dollar])
     keep = (text != _BLANK).any(axis=1)
     for include in source.includes:
-        keep[max(include.first - first, 0) : max(include.past - first, 0)] = False
+        keep &= (origin < include.first) | (origin >= include.past)
     number = np.flatnonzero(keep)
     text = text[number]
     tokens = {
         int(i): _split(raw[number[i]]) for i in np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
     }
-    return _formats(number + first, text, tokens)
+    return _formats(origin[number], text, tokens)
 
 
 def _split(line: bytes) -> list[bytes]:
@@ -170,13 +175,13 @@ def _named(
 def _checked(word: bytes, path: Path, number: int) -> str:
     """The card's name, if it can be one."""
     name = word.decode("latin-1")
+    if name.startswith("BEGIN "):
+        raise FileError(f"{path}:{number + 1}: superelement sections are not supported")
     if " " in name:
         raise FileError(
             f"{path}:{number + 1}: {name!r} is no card name; "
             "fields stand in columns of 8 or 16, or are separated by commas"
         )
-    if name.startswith("="):
-        raise FileError(f"{path}:{number + 1}: replicated cards (=) are not supported")
     return name
 
 
