@@ -25,7 +25,7 @@ class Shown:
     ----------
     seen : Surface                 of the model
     parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
-    curves : {"test", "before", "after"} to FRF over the same channels and lines
+    curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
     held_out : labels of outputs that were not fitted
     fitted, excluded : bands [Hz]
     outputs, inputs : sensors and shakers as markers
@@ -112,11 +112,12 @@ def _frequencies(folder: Path, d: Mapping[str, Any], shown: Shown) -> dict[str, 
             for key in ("test_hz", "before_hz", "after_hz")
         )
         path = folder / "frequencies.png"
-        made["frequencies"] = plots.frequency_ladder(path, test, before, after)
+        changed = after if np.isfinite(after).any() else None
+        made["frequencies"] = plots.frequency_ladder(path, test, before, changed)
     if shown.mac is not None:
         mac, test, model = shown.mac
         rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
-        title = "MAC: test (rows) and model after (columns)"
+        title = "MAC: test (rows), model (columns)"
         made["mac"] = plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)
     return made
 
@@ -167,7 +168,8 @@ def _channel(shown: Shown, output: str, drive: str) -> dict[str, tuple[np.ndarra
 def _typical(shown: Shown, outputs: Sequence[str]) -> tuple[str, str]:
     """The channel whose deviation after is the median one."""
     test = shown.curves["test"].sel(outputs=outputs)
-    model = shown.curves.get("after") or shown.curves.get("before")
+    names = [name for name in ("after", "before", "model") if name in shown.curves]
+    model = shown.curves[names[0]] if names else None
     if model is None:
         return test.outputs[0], test.inputs[0]
     delta = np.abs(deviation(model.sel(outputs=outputs), test)) ** 2

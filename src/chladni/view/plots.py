@@ -110,7 +110,8 @@ def frequency_ladder(
     test = np.asarray(test, dtype=float)
     figure = Figure(figsize=(max(5.0, 0.55 * len(test) + 1.6), 3.4), layout="constrained")
     ax, at = figure.subplots(), np.arange(len(test))
-    series = [("before", before, BEFORE)] + ([("after", after, AFTER)] if after is not None else [])
+    series = [("before" if after is not None else "model", before, BEFORE)]
+    series += [("after", after, AFTER)] if after is not None else []
     wide = 0.8 / len(series)
     for k, (name, model, colour) in enumerate(series):
         offset = (k - (len(series) - 1) / 2) * wide
