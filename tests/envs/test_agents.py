@@ -192,8 +192,9 @@ def test_freeing_what_explains_the_misfit_pays():
 def test_held_out_data_do_not_reach_the_observation():
     """Other held-out data, the same observations: the agent cannot peek."""
     problem = drawn(np.random.default_rng(0), 5)
+    other = np.random.default_rng(1).normal(size=problem.held_residual.shape)
     blind = type(problem)(
-        problem.residual, problem.jacobian, -problem.held_residual, problem.held_jacobian
+        problem.residual, problem.jacobian, other, 2 * problem.held_jacobian[::-1]
     )
     stories = []
     for p in (problem, blind):
