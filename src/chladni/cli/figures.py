@@ -68,16 +68,21 @@ def _where(path: Path, effect: Mapping[str, Any], shown: Shown) -> Path | None:
     """A marked point, else the middle of the grids, else the parts in colour."""
     where = effect.get("where") or {}
     point, grids = where.get("point_m"), list(where.get("grids") or [])
-    named = np.isin(list(shown.parts), [str(p) for p in where.get("parts") or []])
-    faces = named[np.asarray(shown.seen.part)] if named.any() and shown.parts else None
     if point is None and grids and len(shown.ids):
         point = shown.seen.points[np.isin(shown.ids, grids)].mean(axis=0)  # rows as ids
+    faces = None if point is not None else _of_parts(where, shown)
     if point is None and faces is None:
         return None
     text = " – ".join(str(t) for t in (effect.get("name"), where.get("text")) if t)
     radius = float(where.get("radius_m") or 0.0)
     place = None if point is None else np.asarray(point, dtype=float)
     return scene.location(path, shown.seen, place, radius, text, faces)
+
+
+def _of_parts(where: Mapping[str, Any], shown: Shown) -> np.ndarray | None:
+    """Faces of the parts that are named (m,) bool."""
+    named = np.isin(list(shown.parts), [str(p) for p in where.get("parts") or []])
+    return named[np.asarray(shown.seen.part)] if named.any() else None
 
 
 def _scores(folder: Path, d: Mapping[str, Any]) -> dict[str, Path]:

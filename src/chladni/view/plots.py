@@ -122,7 +122,7 @@ def frequency_ladder(
     ax.set_xticks(at, [f"{f:.4g}" for f in test], rotation=60, fontsize=8)
     ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
     ax.grid(axis="y", lw=0.3, alpha=0.6)
-    ax.legend(ncols=2, **LEGEND)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, **LEGEND)
     return save(figure, path)
 
 
