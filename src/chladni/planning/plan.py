@@ -86,7 +86,7 @@ class Plan:
     first : int                   number of the first of them in the deck (rigid modes before it)
     mounts : Mount                every candidate: normals first, then directions on blocks
     phi : (m, r)                  target shapes at the mounts
-    aimed : (r,) bool             modes that sensors glued flat can see at all: the layout is for them
+    aimed : (r,) bool             modes a sensor glued flat sees at all: the layout is for them
     layout : (n_sensors,) int     mounts, the most informative first
     moves : tuple of Move         sensors given up so that a mode is seen
     visible_before, visible : (r,)  before and after the moves
