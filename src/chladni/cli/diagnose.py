@@ -41,6 +41,8 @@ def finished(
     what: str,
 ) -> int:
     """Let ``answering`` write its files, then the JSON, the pictures and the page."""
+    from ..view.probe import advice
+
     answer = answering(case, job.folder, within(job.progress, 0.0, 0.9))
     d = {**answer.diagnosis, "notes": list(answer.notes)}
     d["files"] = {**(d.get("files") or {}), "diagnosis": "diagnosis.json", "report": "report.html"}
@@ -48,7 +50,7 @@ def finished(
     job.progress("pictures", 0.9)
     drawn = _drawn(job, case, model, d, answer)
     title = f"{what} – {job.source.resolve().name}"
-    notes = [*case.notes, *answer.notes]
+    notes = [*case.notes, *answer.notes, *advice()]
     write_page(job.folder, d, drawn, notes, command=command_line(), title=title)
     job.say(sentence(d))
     return answer.exit_code
