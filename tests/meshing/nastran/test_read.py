@@ -105,6 +105,12 @@ def test_include_is_relative_nested_and_long(tmp_path):
     assert places[4].endswith("main.bdf:5")
 
 
+def test_include_in_other_capitals(tmp_path):
+    (tmp_path / "Grids.BDF").write_text("GRID,1\n")
+    (tmp_path / "main.bdf").write_text("INCLUDE 'grids.bdf'\n")
+    assert len(read_deck(tmp_path / "main.bdf")["GRID"]) == 1
+
+
 def test_include_cycle_and_missing_file(tmp_path):
     a, b = tmp_path / "a.bdf", tmp_path / "b.bdf"
     a.write_text("GRID,1\nINCLUDE 'b.bdf'\n")
@@ -179,6 +185,7 @@ NAMES = {
     "ANSA": "$ANSA_NAME_COMMENT;101;PSHELL;Inner Panel;NO;NO;NO;",
     "HyperMesh property": '$HMNAME PROP                 101"Inner Panel" 4',
     "HyperMesh component": '$HMNAME COMP                   3"Inner Panel"\n$HWCOLOR COMP 3 5',
+    "HyperMesh assigned": '$HMNAME COMP                   3"Inner Panel"  101 "PSHELL_101" 4',
     "Femap": "$ Femap Property 101 : Inner Panel",
     "Femap with NX": "$ Femap with NX Nastran Property 101 : Inner Panel",
     "Patran": '$ Pset: "Inner Panel" will be imported as: "pshell.101"',
@@ -189,7 +196,10 @@ NAMES = {
 
 @pytest.mark.parametrize("comment", NAMES.values(), ids=NAMES)
 def test_part_names_in_comments(bulk, comment):
-    assert bulk(f"{comment}\n{PLATE[PLATE.index('PSHELL') :]}").names == {101: "Inner Panel"}
+    deck = bulk(
+        f"$ANSA_NAME_COMMENT;101;PBUSH;rubber;\n{comment}\n{PLATE[PLATE.index('PSHELL') :]}"
+    )
+    assert deck.names == {101: "Inner Panel"}
 
 
 @pytest.mark.parametrize("card", ["CGAP", "CWELD", "CFAST", "CQUAD8", "CTRIA6", "GENEL", "CPYRAM"])
