@@ -12,15 +12,8 @@ _FACES = {
     "CPENTA": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "CTETRA": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
 }
-_CORNERS = {
-    "CQUAD4": 4,
-    "CQUADR": 4,
-    "CTRIA3": 3,
-    "CTRIAR": 3,
-    "CHEXA": 8,
-    "CPENTA": 6,
-    "CTETRA": 4,
-}
+_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CTRIA3": 3, "CTRIAR": 3}
+_CORNERS = {**_SHELLS, "CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
 
 Nodal = tuple[int, np.ndarray, np.ndarray]  # load set, rows (k,), forces (k, 3) [N]
 
