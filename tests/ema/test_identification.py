@@ -189,3 +189,16 @@ def test_vector_fitting_finds_poles_from_afar() -> None:
 def test_a_band_without_lines_is_refused() -> None:
     with pytest.raises(FileError, match=r"0 lines between .* holds 20 to 200 Hz"):
         identify(a_truth(0, 4, 2).frf(EVEN, "mobility", 0.01), band=(300, 400))
+
+
+def test_a_distorted_resonance_is_one_mode() -> None:
+    """4 % of distortion across the peak (a joint that slips a little) makes no second mode."""
+    f0, zeta = 90.0, 0.008
+    f = np.linspace(60, 130, 700)
+    H = -(f**2) / (f0**2 - f**2 + 2j * zeta * f0 * f)
+    H = H * (1 + 0.04 * np.tanh((f - f0) / (zeta * f0)))
+    H = H + 0.002 * np.random.default_rng(0).normal(size=(2, 700)).T @ [1, 1j] * np.abs(H)
+    found = identify(FRF(H[:, None, None], f, ("1:+Z",), ("1:+Z",), "accelerance"))
+    near = np.abs(found.frequency - f0) < 3 * zeta * f0
+    assert near.sum() == 1
+    np.testing.assert_allclose(found.frequency[near], f0, rtol=1e-3)
