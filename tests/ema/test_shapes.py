@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from chladni.dynamics.frf import FRF
 from chladni.dynamics.modes import ModalModel
 from chladni.ema.correlation import mac
-from chladni.ema.identification import Identified, identify
+from chladni.ema.identification import DERIVATIVES, Identified, evaluate, identify
+from chladni.ema.realisation import realised
 from chladni.ema.selection import Sweep
 from chladni.ema.shapes import collinearity, lines_per_bandwidth, modal_model, shapes
 from chladni.errors import LabelError
@@ -89,3 +90,18 @@ def test_lines_per_half_bandwidth() -> None:
     f = np.arange(50, 150, 0.25)
     assert lines_per_bandwidth(found, f)[0] == pytest.approx(4, abs=0.51)
     assert lines_per_bandwidth(replace(found, poles=0.5 * found.poles), f)[0] <= 2.01
+
+
+@pytest.mark.parametrize("quantity", ["receptance", "mobility", "accelerance"])
+def test_the_first_order_system_is_the_identified_model(quantity: str) -> None:
+    """C (iω - A)⁻¹ B + D in the band, in every quantity; D = C B = 0 for the velocity."""
+    identified = identify(recorded(("2:+X", "3:+Z"), noise=1e-6))
+    system = realised(identified, quantity)  # type: ignore[arg-type]
+    due = evaluate(identified, 2j * np.pi * F) / (2j * np.pi * F[:, None, None]) ** 2
+    due = due * (2j * np.pi * F[:, None, None]) ** DERIVATIVES[quantity]
+    H = system.frf(F).values
+    assert np.abs(H - due).max() < 1e-3 * np.abs(due).max()
+    assert len(system.A) == 2 * (5 + 2 * 2)
+    assert (system.A.real == system.A).all()
+    if quantity == "mobility":
+        assert np.abs(system.D).max() < 1e-3 * np.abs(H).max()
