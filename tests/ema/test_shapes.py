@@ -48,6 +48,16 @@ def test_shapes_are_mass_normalised_by_the_drive_point(inputs: tuple[str, ...]) 
     np.testing.assert_allclose(found.values.real * sign, due, atol=0.01 * np.abs(due).max())
     np.testing.assert_allclose(found.collinearity, 1, atol=1e-3)
     np.testing.assert_allclose(found.rank, 1, atol=1e-3)
+    assert (found.polarity == 1).all()
+
+
+def test_a_reversed_drive_point_is_noticed() -> None:
+    """Φ_d² cannot be negative: the accelerometer (or the gauge) at the drive point is reversed."""
+    frf = recorded(("1:+Z",))
+    values = frf.values.copy()
+    values[:, 0] *= -1
+    found = shapes(identify(replace(frf, values=values)))
+    assert (found.polarity == -1).all()
 
 
 def test_without_a_drive_point_shapes_have_no_scale() -> None:

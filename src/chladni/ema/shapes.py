@@ -26,6 +26,8 @@ class MeasuredShapes:
     collinearity : (r,)       1: all channels move in phase (a normal mode); 0: none do
     rank : (r,)               share of the residue one mode explains (1 for one input)
     scaled : bool             1/√kg, by a drive point; else of largest entry 1
+    polarity : (r,)           sign of the modal constant at the drive point: -1 is impossible, so
+                              that sensor or force gauge is reversed
     """
 
     outputs: tuple[str, ...]
@@ -34,6 +36,7 @@ class MeasuredShapes:
     collinearity: np.ndarray
     rank: np.ndarray
     scaled: bool
+    polarity: np.ndarray
 
 
 def shapes(identified: Identified) -> MeasuredShapes:
@@ -50,7 +53,7 @@ def shapes(identified: Identified) -> MeasuredShapes:
         factor = 1 / np.where(peak == 0, 1, peak)
         turned = _turned(left * factor)
         values = turned / np.abs(turned).max(axis=1, keepdims=True)
-        factor = np.ones_like(factor)
+        factor, polarity = np.ones_like(factor), np.ones(len(A))
     else:
         i, j, sign = drive
         at_output, at_input = sign * left[:, i], right[:, j]
@@ -58,6 +61,7 @@ def shapes(identified: Identified) -> MeasuredShapes:
         values = left * factor
         flip = np.where((values * values).sum(axis=1).real < 0, 1j, 1.0)[:, None]
         values, factor = values * flip, factor * flip
+        polarity = np.where((sign * A[:, i, j]).real < 0, -1.0, 1.0)
     return MeasuredShapes(
         identified.outputs,
         values.T,
@@ -65,6 +69,7 @@ def shapes(identified: Identified) -> MeasuredShapes:
         collinearity(values.T),
         S[:, 0] ** 2 / np.maximum((S**2).sum(axis=1), 1e-300),
         drive is not None,
+        polarity,
     )
 
 
