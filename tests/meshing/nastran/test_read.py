@@ -44,6 +44,16 @@ def test_every_format_says_the_same(bulk, text):
     assert cards.real(0, 11) == 0.25
 
 
+def test_a_small_line_begins_a_row_of_eight(bulk):
+    """One wide line holds four fields; the small line after it goes on with the ninth."""
+    wide = "".join(f"{k:16}" for k in (1, 2, 3, 4))
+    cards = bulk(
+        f"CBAR*   {wide}\n+       {5:8}{6:8}\nCBAR*   {wide}\n*\n+       {7:8}\n", fold=False
+    )
+    assert [cards["CBAR"].word(i, 9) for i in (0, 1)] == ["5", "7"]
+    assert cards["CBAR"].word(0, 5) == ""
+
+
 def test_continuations_find_their_card_by_name(bulk):
     """Sorted decks of old put all continuations after all cards."""
     text = (
