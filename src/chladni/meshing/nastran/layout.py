@@ -1,6 +1,6 @@
 """From the lines of a file to its cards: formats, continuations, columns, all lines at once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,12 +47,7 @@ def tables(source: Source, file: int, files: tuple[Path, ...]) -> dict[str, Card
     for k, name in enumerate(names):
         mine = np.flatnonzero(name_of_card[card] == k)
         out[name] = _table(name, lines, order[mine], card[mine], offset[mine], card_size, file)
-    return {name: _with_files(cards, files) for name, cards in out.items()}
-
-
-def _with_files(cards: Cards, files: tuple[Path, ...]) -> Cards:
-    object.__setattr__(cards, "files", files)
-    return cards
+    return {name: replace(cards, files=files) for name, cards in out.items()}
 
 
 def _classified(source: Source) -> _Lines:
