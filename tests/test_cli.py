@@ -1,6 +1,8 @@
 """The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,12 +33,12 @@ ENDDATA
 """
 
 
-def deck_text(n=2, side=0.3, t=1e-3):
-    """A free square steel plate of n by n CQUAD4, SI."""
+def deck_text(n=2, side=0.3, t=1e-3, width=None):
+    """A free steel plate of n by n CQUAD4, square unless told, SI."""
     lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", f"PSHELL,1,1,{t},1,,1"]
-    x = np.linspace(0, side, n + 1)
+    x, y = np.linspace(0, side, n + 1), np.linspace(0, width or side, n + 1)
     lines += [
-        f"GRID,{1 + j + (n + 1) * i},,{x[i]:.5f},{x[j]:.5f},0.0"
+        f"GRID,{1 + j + (n + 1) * i},,{x[i]:.5f},{y[j]:.5f},0.0"
         for i in range(n + 1)
         for j in range(n + 1)
     ]
@@ -152,6 +154,97 @@ def test_render(deck, tmp_path):
     assert done.exit_code == 0, done.output
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
     assert {p.name for p in out.iterdir()} == due | {"report.html"}
+
+
+CASE = """
+[model]
+deck = "plate.bdf"
+units = "SI"
+damping = 0.01
+[test]
+recordings = ["frf.npz"]
+[band]
+fit = [25.0, 180.0]
+"""
+
+
+@pytest.fixture
+def case(deck, tmp_path):
+    """A test of the model itself: six sensors, one shaker, 1 % damping."""
+    deck.write_text(deck_text(6, width=0.22))  # no two modes alike, none with a node at the shaker
+    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
+    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", tmp_path]
+    assert call("frf", deck, *options).exit_code == 0
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path
+
+
+def test_a_model_correlates_with_itself(case, tmp_path):
+    """Every mode finds itself, Q is nothing; MAC is 1 but for faintly driven modes."""
+    done = call("correlate", case, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out" / "correlation.json").read_text())
+    assert len(found["modes"]) >= 4
+    assert found["alone_test_hz"] == []
+    assert max(abs(m["deviation"]) for m in found["modes"]) < 1e-3
+    assert min(m["mac"] for m in found["modes"]) > 0.95
+    assert np.median([m["mac"] for m in found["modes"]]) > 0.999
+    assert found["Q"]["mean"] < 1e-6
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"correlation.json", "mac.png", "frequencies.png", "frf_fitted.png"} < names
+
+
+def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
+    out = tmp_path / "out"
+    done = call("identify", case, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert call("modes", case, "--count", 12, "--out", out).exit_code == 0
+    (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
+    f = np.array(json.loads((out / "modes.json").read_text())["frequency_hz"])
+    f = f[(f > 25) & (f < 180)]
+    found = np.array(entry["frequency_hz"])[entry["firm"]]
+    near = np.abs(found[:, None] / f - 1).min(axis=1)
+    assert near.max() < 1e-3
+    assert len(found) == len(f)
+    np.testing.assert_allclose(np.array(entry["damping"])[entry["firm"]], 0.01, rtol=0.02)
+    assert (out / "poles.csv").read_text().startswith("mode,frequency_hz")
+
+
+def test_an_answer_becomes_json_pictures_and_a_page(case, tmp_path):
+    """Whatever a diagnosis answers is shown: typical channels, the marked place, the sentence."""
+    from chladni.cli.correlate import opened
+    from chladni.cli.diagnose import finished
+    from chladni.cli.run import started
+
+    def answering(held, folder, progress):
+        (folder / "updated.bdf").write_text("ENDDATA")
+        test = held.frfs[0]
+        effect = {"name": "point-mass", "where": {"text": "a corner", "grids": [1]}}
+        fit = {"Q_nominal": 0.2, "Q_calibrated": 0.1, "Q_with_effect": 0.01}
+        return SimpleNamespace(
+            diagnosis={
+                "verdict": "missing physics",
+                "effects": [effect],
+                "fit": {**fit, "held_out": fit},
+                "frequencies": [{"test_hz": 30.0, "before_hz": 31.0, "after_hz": 30.1}],
+            },
+            notes=("what was done",),
+            curves={"test": test, "before": replace(test, values=1.2 * test.values)},
+            held_out=test.outputs[:2],
+            mac=None,
+            exit_code=3,
+        )
+
+    out = tmp_path / "answer"
+    with started("diagnose", case, out) as job:
+        assert finished(job, *opened(case), answering, "Diagnosis") == 3
+    names = {p.name for p in out.iterdir()}
+    assert {"where.png", "frf_fitted.png", "frf_held_out.png", "waterfall.png"} < names
+    assert {"diagnosis.json", "report.html", "updated.bdf", "frequencies.png"} < names
+    assert json.loads((out / "diagnosis.json").read_text())["notes"] == ["what was done"]
+    page = (out / "report.html").read_text()
+    assert "The model lacks point-mass, a corner" in page
+    assert "what was done" in page
 
 
 def test_specimen_comes_back_as_a_deck(tmp_path):

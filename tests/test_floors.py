@@ -29,7 +29,7 @@ MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},
     "dynamics": {"sksparse"},
-    "meshing": {"meshio", "pyvista", "trimesh"},
+    "meshing": {"meshio", "pyvista", "trimesh", "pyyeti"},
     "ema": {"pyuff"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "study": {"dask"},

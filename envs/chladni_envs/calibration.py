@@ -52,6 +52,8 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
     ----------
     question : model and recording; by default a simply supported plate with unknown E, ρ, a mass
                and a spring, the truth drawn at every reset
+    case : folder              a case with FRFs: its ordinary parameters within two prior standard
+                               deviations, its fitted lines and channels, damping equalised
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -60,10 +62,15 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         self,
         question: Question | None = None,
         *,
+        case: str | None = None,
         bands: int = 8,
         max_steps: int = 60,
         render_mode: str | None = None,
     ) -> None:
+        if case is not None:
+            from .cases import Recorded
+
+            question = Recorded(case).calibration()
         self.question = question or plate_question()
         self.p, self.bands = len(self.question.names), bands
         self.max_steps, self.render_mode = max_steps, render_mode

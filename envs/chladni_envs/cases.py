@@ -1,13 +1,26 @@
-"""Candidates and target modes of a case folder or deck, for the placement environments."""
+"""A case folder or deck as the problem of an environment."""
 
 from pathlib import Path
 
-from chladni.cli.model import load_model
-from chladni.planning import Wishes
-from chladni.planning.places import find_places
-from chladni.planning.plan import mounts_at, shapes, target_modes
+import numpy as np
 
+from chladni.case import Places as CasePlaces
+from chladni.case import load_case
+from chladni.cli.model import load_model
+from chladni.effects.effect import Effect, Parameter
+from chladni.ema.pretest import Linearised
+from chladni.errors import FileError
+from chladni.planning import Wishes, find_places
+from chladni.planning.plan import mounts_at, shapes, target_modes
+from chladni.updating.calibration import Weighing
+from chladni.updating.likelihood import Responses
+from chladni.updating.prepare import Places, Prepared, Question, prepare
+from chladni.updating.reduced import State, evaluate
+
+from .calibration import Question as Calibration
 from .specimens import Specimen
+
+REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
 
 
 def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None = None) -> Specimen:
@@ -28,3 +41,87 @@ def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None 
     labels = tuple(name for name, flat in zip(mounts.labels, normal, strict=True) if flat)
     phi = shapes(model.structure, target, mounts)[normal]
     return Specimen(mounts.points[normal], phi, target.frequency, target.damping, labels)
+
+
+class Recorded:
+    """A case with FRFs, made ready for updating: residuals over x/sd of its ordinary effects.
+
+    Attributes
+    ----------
+    names : tuple of str      parameters, as "E of inner"
+    effects : tuple of Effect
+    score : Responses         what is compared, damping equalised
+    """
+
+    def __init__(self, case: str) -> None:
+        self.prepared = _prepared(case)
+        search = self.prepared.search
+        score = self.prepared.score
+        if not isinstance(score, Responses):
+            raise FileError(f"{case}: these environments compare FRFs; the case has none that can")
+        self.score = score
+        self.effects: tuple[Effect, ...] = tuple(
+            e for e in search.base if not any(e is n for n in search.nuisance)
+        )
+        pairs = [(e, p) for e in self.effects for p in e.parameters]
+        self.names = tuple(_name(e, p) for e, p in pairs)
+        self.mean = np.array([p.mean for _, p in pairs])
+        self.sd = np.array([p.sd for _, p in pairs])
+
+    def state(self, theta: np.ndarray, gradient: bool = False) -> State:
+        """The reduced model at x = mean + sd θ."""
+        model = self.prepared.search.bench.model
+        return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
+
+    def linearised(self) -> Linearised:
+        """Fitted and held-out residuals and their slopes at the prior mean."""
+        state = self.state(np.zeros(len(self.sd)), True)
+        r, J = self.score.residual(state, True)
+        h, H = self.score.only(self.prepared.held).residual(state, True)
+        return Linearised(r, J * self.sd, h, H * self.sd)
+
+    def calibration(self) -> Calibration:
+        """The fitted lines and channels; bounds at two prior standard deviations."""
+        lines = np.flatnonzero(self.score.use.any(axis=1))
+        outputs = np.flatnonzero(self.score.use.any(axis=0))
+
+        def fitted(values: np.ndarray) -> np.ndarray:
+            return np.asarray(values[np.ix_(lines, outputs)].reshape(len(lines), -1))
+
+        def predict(x: np.ndarray) -> np.ndarray:
+            return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))
+
+        frequency = self.score.s.imag[lines] / (2 * np.pi)
+        return Calibration(self.names, frequency, predict, fitted(self.score.values))
+
+
+def _name(effect: Effect, parameter: Parameter) -> str:
+    return f"{parameter.name}, {effect.text}" if effect.text else parameter.name
+
+
+def _prepared(path: str) -> Prepared:
+    """The case's first FRF, made ready for updating."""
+    case = load_case(path)
+    frf = next((r.frf for r in case.recordings if r.frf is not None), None)
+    if frf is None:
+        raise FileError(f"{case.path}: no recording holds an FRF")
+    mass, everywhere = case.setup.mass, tuple(p.name for p in case.assembly.parts)
+    question = Question(
+        assembly=case.assembly,
+        outputs=_places(case.outputs),
+        inputs=_places(case.inputs),
+        frf=frf,
+        weighing=None if mass is None else Weighing(mass, case.setup.mass_sd),
+        hangers=case.setup.hangers,
+        band=case.band or (0.0, np.inf),
+        exclude=case.exclude,
+        held_sensors=case.held_sensors,
+        held_band=case.held_band,
+        gain_known=case.gain_known,
+        parameters=tuple((p.field, p.parts or everywhere) for p in case.parameters),
+    )
+    return prepare(question)
+
+
+def _places(p: CasePlaces) -> Places:
+    return Places(p.labels, p.grids, p.points, p.directions, p.sd)

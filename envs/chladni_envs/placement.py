@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 
 from chladni.ema.pretest import Candidates, Rules, Walk, candidates
+from chladni.errors import LabelError
 
 from . import drawing
 from .specimens import of_case, plate
@@ -37,7 +38,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     ----------
     phi : (n, p), (n_draws, n, p), (n_draws, n, k, p) or Candidates
         Target shapes, see :func:`chladni.ema.pretest.candidates`; a plate by default.
-    n_sensors : int
+    n_sensors : int               by default five for four modes
     moves : "delete" or "add"
     points : (n, 2) or (n, 3)     places [m], for pictures
     noise, prior, rules : as in :func:`chladni.ema.pretest.effective_independence`
@@ -69,7 +70,10 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             phi, points = specimen.phi, specimen.points
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
-        self.n_sensors = n_sensors or min(n, -(-5 * self.candidates.unknowns // 4))
+        usual = min(n, -(-5 * self.candidates.unknowns // 4))
+        self.n_sensors = usual if n_sensors is None else n_sensors
+        if moves not in ("delete", "add"):
+            raise LabelError(f"moves {moves!r}; there are delete and add")
         self.grow, self.rules, self.unusable = moves == "add", rules or Rules(), unusable
         self.points, self.render_mode = points, render_mode
         self.walk = self._walk(np.zeros(n, bool))  # refuses an impossible request at once

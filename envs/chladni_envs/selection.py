@@ -33,6 +33,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
     problem : Linearised       residuals and sensitivities; by default one is drawn anew at every
                                reset: p parameters of which one to three are off, two of them
                                nearly twins
+    case : folder              a case with FRFs: its ordinary parameters, linearised at the deck
     p : int                    parameters of the drawn problems
     cost : float               decades a parameter that is not learned costs
     """
@@ -43,10 +44,15 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         self,
         problem: Linearised | None = None,
         *,
+        case: str | None = None,
         p: int = 8,
         cost: float = 0.2,
         render_mode: str | None = None,
     ) -> None:
+        if case is not None:
+            from .cases import Recorded
+
+            problem = Recorded(case).linearised()
         self.given, self.cost, self.render_mode = problem, cost, render_mode
         self.p = len(problem) if problem is not None else p
         self.action_space = gym.spaces.Discrete(self.p + 1)

@@ -178,7 +178,8 @@ def test_searches_are_seeded_and_obey(search):
     rng = np.random.default_rng(0)
     phi = rng.normal(size=(30, 4))
     rules = Rules([3], [4, 5])
-    a, b = (search(phi, 6, seed=1, rules=rules) for _ in range(2))
+    length = {"steps": 500} if search is annealed else {"generations": 15}
+    a, b = (search(phi, 6, seed=1, rules=rules, **length) for _ in range(2))
     np.testing.assert_array_equal(a, b)
     assert 3 in a
     assert not {4, 5} & set(a)

@@ -246,3 +246,52 @@ def test_the_case_may_say_the_quantity(tmp_path: Path) -> None:
     frf = read_uff(foreign(tmp_path / "a.uff", silent), quantity="mobility").frf
     assert frf is not None
     assert frf.quantity == "mobility"
+
+
+VARIANTS = {
+    "Windows line ends": lambda t: t.replace(b"\n", b"\r\n"),
+    "no last line end": lambda t: t.rstrip(b"\n"),
+    "some blanks after the mark": lambda t: t.replace(b"    -1\n", b"    -1" + 20 * b" " + b"\n"),
+    "80 columns": lambda t: t.replace(b"    -1\n", b"    -1" + 74 * b" " + b"\n"),
+    "mark in column one": lambda t: t.replace(b"    -1\n", b"-1\n"),
+    "byte order mark": lambda t: b"\xef\xbb\xbf" + t,
+    "Fortran exponents": lambda t: t.replace(b"e+0", b"D+0").replace(b"e-0", b"D-0"),
+    "trimmed lines": lambda t: b"\n".join(line.rstrip() for line in t.split(b"\n")),
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_files_as_other_programs_write_them(tmp_path: Path, name: str) -> None:
+    H = a_frf()
+    write_uff(tmp_path / "a.uff", H, {1: np.zeros(3)})
+    (tmp_path / "b.uff").write_bytes(VARIANTS[name]((tmp_path / "a.uff").read_bytes()))
+    back = read_uff(tmp_path / "b.uff").frf
+    assert back is not None
+    np.testing.assert_allclose(back.values, H.values, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("double", [False, True])
+@pytest.mark.parametrize("even", [False, True])
+@pytest.mark.parametrize("end", [b"", b"\n", b"\r\n"])
+def test_binary_records_of_every_kind(
+    tmp_path: Path, order: int, double: bool, even: bool, end: bytes
+) -> None:
+    """58b by either byte order and precision, end mark behind the data or on a line of its own."""
+    H = a_frf(outputs=("1:+Z",), inputs=("1:+Z",), quantity="mobility")
+    y, f = H.values[:, 0, 0], H.frequency
+    columns = (y.real, y.imag) if even else (f, y.real, y.imag)
+    raw = np.column_stack(columns).astype(" <>"[order] + ("f8" if double else "f4")).tobytes()
+    head = ["    -1", f"    58b{order:6d}{2:6d}{11:12d}{len(raw):12d}{0:6d}{0:6d}{0:12d}{0:12d}"]
+    head += ["NONE"] * 5
+    head.append(f"{4:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{1:10d}{3:4d} {'NONE':10}{1:10d}{3:4d}")
+    start, step = (f[0], f[1] - f[0]) if even else (0, 0)
+    kind = 6 if double else 5
+    head.append(f"{kind:10d}{len(f):10d}{int(even):10d}{start:13.5e}{step:13.5e}{0:13.5e}")
+    head += [f"{k:10d}{0:5d}{0:5d}{0:5d} {'NONE':20} {'NONE':20}" for k in (18, 11, 13, 0)]
+    text = "\n".join(head) + "\n"
+    (tmp_path / "a.uff").write_bytes(text.encode() + raw + end + b"    -1\n")
+    back = read_uff(tmp_path / "a.uff").frf
+    assert back is not None
+    np.testing.assert_allclose(back.values[:, 0, 0], y, rtol=1e-12 if double else 3e-7)
+    np.testing.assert_allclose(back.frequency, f, rtol=1e-7)

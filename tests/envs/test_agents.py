@@ -17,7 +17,7 @@ from chladni.ema.pretest import (
     too_near,
     value,
 )
-from chladni.errors import ShapeError
+from chladni.errors import LabelError, ShapeError
 from chladni_envs import agents
 from chladni_envs.selection import drawn
 from chladni_envs.specimens import plate
@@ -111,6 +111,10 @@ def test_exchange_agent_walks_to_its_layout_under_rules(moves):
 def test_impossible_environments_are_refused_when_made():
     with pytest.raises(ShapeError, match="3 sensors cannot tell 6 modes"):
         gym.make(SENSORS, phi=random_shapes(), n_sensors=3)
+    with pytest.raises(ShapeError, match="0 sensors cannot tell"):
+        gym.make(SENSORS, n_sensors=0)
+    with pytest.raises(LabelError, match="there are delete and add"):
+        gym.make(SENSORS, moves="swap")
     with pytest.raises(ShapeError, match="access and rattle leave 0"):
         gym.make("chladni/ActuatorPlacement-v0", access=np.zeros(49, bool))
 
@@ -192,8 +196,9 @@ def test_freeing_what_explains_the_misfit_pays():
 def test_held_out_data_do_not_reach_the_observation():
     """Other held-out data, the same observations: the agent cannot peek."""
     problem = drawn(np.random.default_rng(0), 5)
+    other = np.random.default_rng(1).normal(size=problem.held_residual.shape)
     blind = type(problem)(
-        problem.residual, problem.jacobian, -problem.held_residual, problem.held_jacobian
+        problem.residual, problem.jacobian, other, 2 * problem.held_jacobian[::-1]
     )
     stories = []
     for p in (problem, blind):

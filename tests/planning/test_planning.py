@@ -74,6 +74,21 @@ def test_a_covered_sheet_is_not_reachable():
         assert not inner.any() or find_places(three, 500).points[inner][:, 0].min() < 0.1
 
 
+def test_a_sensor_needs_room():
+    """Under a narrow strip 10 mm above there is no room for it, though light falls in: below."""
+    lower = plate(0.4, 0.3, 16, 12, 1e-3)
+    strip = plate(0.4, 0.008, 16, 1, 1e-3)
+    strip = replace(strip, points=strip.points + np.array([0.0, 0.146, 0.01]))
+    both = _joined(lower, strip)
+    for room, below in ((0.03, True), (0.004, False)):
+        places = find_places(both, 500, room=room)
+        under = (np.abs(places.points[:, 1] - 0.15) < 0.006) & (places.points[:, 2] == 0)
+        assert under.sum() > 5
+        assert np.all((places.side[under] == -1) == below)
+        far = (np.abs(places.points[:, 1] - 0.15) > 0.06) & (places.points[:, 2] == 0)
+        assert np.all(places.side[far] == 1)
+
+
 def _joined(a, b):
     """One assembly of two that share nothing."""
     n = len(a.points)

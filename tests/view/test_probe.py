@@ -22,6 +22,7 @@ def test_a_child_that_crashes_means_no(monkeypatch):
     assert not probe.opens("vtkEGLRenderWindow")
     assert probe.window() is None
     assert not probe.prepare()
+    assert "libosmesa6" in probe.advice()[0]
 
 
 def test_the_answer_is_asked_for_once(monkeypatch):
@@ -45,6 +46,7 @@ def test_another_machine_or_version_is_asked_again(monkeypatch):
 def test_a_wish_overrides_and_a_wrong_one_is_refused(monkeypatch):
     monkeypatch.setenv("CHLADNI_GRAPHICS", "egl")
     assert probe.window() == probe.WINDOWS["egl"]
+    assert probe.advice() == []
     monkeypatch.setenv("CHLADNI_GRAPHICS", "glide")
     probe.window.cache_clear()
     with pytest.raises(FileError, match="osmesa, egl, matplotlib"):

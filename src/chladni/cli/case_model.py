@@ -1,5 +1,7 @@
 """The model of a case seen through its sensors: rows, responses, places of the test."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -11,8 +13,10 @@ from ..errors import FileError
 from ..fem.assemble import Structure
 from ..fem.locate import locate, rows_at
 from ..fem.solve import inertia_load
-from ..view.scene import Marker
 from .model import Model
+
+if TYPE_CHECKING:
+    from ..view.scene import Marker
 
 DAMPING = 0.01  # where neither case nor test says
 
@@ -61,8 +65,10 @@ def _drives(case: Case, s: Structure) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(load), case.outputs.directions @ axes
 
 
-def markers(places: Places) -> list[Marker]:
+def markers(places: Places) -> list["Marker"]:
     """Sensors and shakers for a picture; the base has no place."""
+    from ..view.scene import Marker
+
     return [
         Marker((x[0], x[1], x[2]), (n[0], n[1], n[2]), text)
         for x, n, text, base in zip(

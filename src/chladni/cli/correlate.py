@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -18,11 +18,13 @@ from ..errors import ChladniError, FileError
 from ..report.blocks import Block, Facts, Picture, Table
 from ..report.words import number, percent
 from .case_model import DAMPING, markers, model_frf, rows
-from .figures import Shown, figures
 from .frf import REACH
 from .identify import firm
 from .model import Model, is_case
 from .run import Out, Run, started
+
+if TYPE_CHECKING:
+    from .figures import Shown
 
 _BANDS = 6
 
@@ -175,6 +177,8 @@ def summary(case: Case, found: Correlation) -> dict[str, Any]:
 
 
 def _page(job: Run, case: Case, model: Model, found: Correlation, d: dict[str, Any]) -> None:
+    from .figures import figures
+
     off = [abs(m["deviation"]) for m in d["modes"]]
     mean = f"{number(100 * float(np.mean(off)), 2)} %" if off else "–"
     q = "" if found.quality is None else f", Q = {number(found.quality.Q, 3)}"
@@ -190,12 +194,14 @@ def _page(job: Run, case: Case, model: Model, found: Correlation, d: dict[str, A
     job.say(job.lead)
 
 
-def _shown(case: Case, model: Model, found: Correlation) -> Shown:
+def _shown(case: Case, model: Model, found: Correlation) -> "Shown":
+    from .figures import Shown
+
     curves, mac_of = {}, None
     if found.model is not None:
         f = found.model.frequency
         test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
-        curves = {"test": test, "before": found.model}
+        curves = {"test": test, "model": found.model}
     if found.mac is not None:
         mac_of = (found.mac.T, found.f_test, found.f_model)
     return Shown(

@@ -25,7 +25,7 @@ class Shown:
     ----------
     seen : Surface                 of the model
     parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
-    curves : {"test", "before", "after"} to FRF over the same channels and lines
+    curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
     held_out : labels of outputs that were not fitted
     fitted, excluded : bands [Hz]
     outputs, inputs : sensors and shakers as markers
@@ -68,16 +68,21 @@ def _where(path: Path, effect: Mapping[str, Any], shown: Shown) -> Path | None:
     """A marked point, else the middle of the grids, else the parts in colour."""
     where = effect.get("where") or {}
     point, grids = where.get("point_m"), list(where.get("grids") or [])
-    named = np.isin(list(shown.parts), [str(p) for p in where.get("parts") or []])
-    faces = named[np.asarray(shown.seen.part)] if named.any() and shown.parts else None
     if point is None and grids and len(shown.ids):
         point = shown.seen.points[np.isin(shown.ids, grids)].mean(axis=0)  # rows as ids
+    faces = None if point is not None else _of_parts(where, shown)
     if point is None and faces is None:
         return None
     text = " – ".join(str(t) for t in (effect.get("name"), where.get("text")) if t)
     radius = float(where.get("radius_m") or 0.0)
     place = None if point is None else np.asarray(point, dtype=float)
     return scene.location(path, shown.seen, place, radius, text, faces)
+
+
+def _of_parts(where: Mapping[str, Any], shown: Shown) -> np.ndarray | None:
+    """Faces of the parts that are named (m,) bool."""
+    named = np.isin(list(shown.parts), [str(p) for p in where.get("parts") or []])
+    return named[np.asarray(shown.seen.part)] if named.any() else None
 
 
 def _scores(folder: Path, d: Mapping[str, Any]) -> dict[str, Path]:
@@ -112,11 +117,12 @@ def _frequencies(folder: Path, d: Mapping[str, Any], shown: Shown) -> dict[str, 
             for key in ("test_hz", "before_hz", "after_hz")
         )
         path = folder / "frequencies.png"
-        made["frequencies"] = plots.frequency_ladder(path, test, before, after)
+        changed = after if np.isfinite(after).any() else None
+        made["frequencies"] = plots.frequency_ladder(path, test, before, changed)
     if shown.mac is not None:
         mac, test, model = shown.mac
         rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
-        title = "MAC: test (rows) and model after (columns)"
+        title = "MAC: test (rows), model (columns)"
         made["mac"] = plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)
     return made
 
@@ -167,7 +173,8 @@ def _channel(shown: Shown, output: str, drive: str) -> dict[str, tuple[np.ndarra
 def _typical(shown: Shown, outputs: Sequence[str]) -> tuple[str, str]:
     """The channel whose deviation after is the median one."""
     test = shown.curves["test"].sel(outputs=outputs)
-    model = shown.curves.get("after") or shown.curves.get("before")
+    names = [name for name in ("after", "before", "model") if name in shown.curves]
+    model = shown.curves[names[0]] if names else None
     if model is None:
         return test.outputs[0], test.inputs[0]
     delta = np.abs(deviation(model.sel(outputs=outputs), test)) ** 2

@@ -7,7 +7,6 @@ import typer
 
 from ..output import write_text
 from ..planning import Wishes, plan, sensors_csv, summary
-from ..planning.page import PICTURES, lead, notes, sections
 from ..progress import within
 from .model import load_model
 from .run import Out, Units, started
@@ -45,6 +44,8 @@ def run(
         mass=mass,
         draws=drawn,
     )
+    from ..planning.page import PICTURES, lead, notes, sections
+
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units)

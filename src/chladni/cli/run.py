@@ -58,8 +58,11 @@ class Run:
 
     def page(self) -> Path:
         """Write ``report.html`` of what was gathered."""
+        from ..view.probe import advice
+
+        notes = [*self.notes, *advice()]
         foot = [
-            Section("What was done, and why", [Items(self.notes)] if self.notes else []),
+            Section("What was done, and why", [Items(notes)] if notes else []),
             Section("Files", [Links(self.files)] if self.files else []),
             Section("Run it again", [Code([command_line()])]),
         ]

@@ -92,10 +92,11 @@ def spread(frf: FRF, averages: int = 1) -> np.ndarray:
 
 
 def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
-    """Moving mean over the first axis."""
-    from scipy.ndimage import uniform_filter1d
-
-    return np.asarray(uniform_filter1d(x, min(width, len(x)), axis=0, mode="nearest"))
+    """Moving mean over the first axis, ends held."""
+    half = min(width, len(x)) // 2
+    padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
+    total = padded.cumsum(axis=0)
+    return np.asarray((total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1))
 
 
 def identify(

@@ -16,11 +16,11 @@ from ..dofs import label
 from ..dynamics.frf import FRF
 from ..errors import ChladniError, FileError
 from .setup import Function, Recording, Shapes
+from .uff_source import readable
 from .uff_units import FileUnits, Meaning, file_units, meaning
 from .uff_write import write_uff as write_uff
 
 _KINDS = {1: "time", 2: "auto spectrum", 3: "cross spectrum", 9: "psd", 12: "spectrum"}
-_MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _SAME_LINE = 1e-5  # single precision abscissas: relative
 
 
@@ -82,15 +82,15 @@ def _datasets(path: Path) -> Iterator[tuple[int, dict]]:
     """(number from 1, dataset) of every dataset pyuff knows."""
     import pyuff
 
-    _complete(path)
-    file = pyuff.UFF(str(path))
-    for k, kind in enumerate(file.get_set_types()):
-        where = f"{path.name}, dataset {k + 1} (type {int(kind)})"
-        try:
-            dataset: dict[str, Any] = file.read_sets(k)
-        except Exception as error:  # pyuff raises nothing narrower
-            raise FileError(f"{where}: cannot be read ({_why(error)})") from error
-        yield k + 1, dataset
+    with readable(path) as source:
+        file = pyuff.UFF(str(source))
+        for k, kind in enumerate(file.get_set_types()):
+            where = f"{path.name}, dataset {k + 1} (type {int(kind)})"
+            try:
+                dataset: dict[str, Any] = file.read_sets(k)
+            except Exception as error:  # pyuff raises nothing narrower
+                raise FileError(f"{where}: cannot be read ({_why(error)})") from error
+            yield k + 1, dataset
 
 
 def _why(error: BaseException) -> str:
@@ -98,19 +98,6 @@ def _why(error: BaseException) -> str:
     while error.__context__ is not None:
         error = error.__context__
     return str(error) or type(error).__name__
-
-
-def _complete(path: Path) -> None:
-    """Refuse what pyuff would read in part without a word."""
-    if not path.is_file():
-        near = sorted(p.name for p in path.parent.glob("*.u*") if p.is_file())[:6]
-        raise FileError(f"no file {path}; beside it there are {near}")
-    data = path.read_bytes()
-    marks = len(_MARK.findall(data))
-    if marks == 0:
-        raise FileError(f"{path.name} is no universal file: no line '    -1' in {len(data)} bytes")
-    if marks % 2:
-        raise FileError(f"{path.name} is truncated: dataset {marks // 2 + 1} has no closing '-1'")
 
 
 def _dof(node: int, direction: int) -> str:

@@ -159,10 +159,10 @@ def _text(f: np.ndarray, y: np.ndarray, even: bool) -> str:
     """Record 12 in double precision: 4E20.12, E13.5 2E20.12 or 2(E13.5 E20.12)."""
     table = _columns(f, y)
     if even:
-        flat = table[:, 1:].ravel()
-        rows = [flat[k : k + 4] for k in range(0, len(flat), 4)]
-        return "".join("".join(f"{v:20.12e}" for v in row) + "\n" for row in rows) + "    -1\n"
-    pieces = [f"{row[0]:13.7e}" + "".join(f"{v:20.12e}" for v in row[1:]) for row in table]
-    if table.shape[1] == 2:
-        pieces = ["".join(pieces[k : k + 2]) for k in range(0, len(pieces), 2)]
-    return "\n".join(pieces) + "\n    -1\n"
+        row, flat = ("%20.12e",) * 4, table[:, 1:].ravel()
+    else:
+        row, flat = ("%13.7e", *("%20.12e",) * (table.shape[1] - 1)), table.ravel()
+        row = row * 2 if len(row) == 2 else row
+    whole, rest = divmod(len(flat), len(row))
+    form = ("".join(row) + "\n") * whole + "".join(row[:rest]) + "\n" * bool(rest)
+    return form % tuple(flat) + "    -1\n"

@@ -171,8 +171,9 @@ def average_weights(r: np.ndarray, R: float) -> tuple[np.ndarray, np.ndarray]:
     With it the radius of a spider is a continuous parameter: weights fade to zero, with zero
     slope, where points enter or leave.
 
-    >>> average_weights(np.array([0.0, 1.0, 3.0]), 2.0)
-    (array([1.    , 0.5625, 0.    ]), array([0.    , 0.375 , 0.    ]))
+    >>> w, dw = average_weights(np.array([0.0, 1.0, 3.0]), 2.0)
+    >>> w.tolist(), dw.tolist()
+    ([1.0, 0.5625, 0.0], [0.0, 0.375, 0.0])
     """
     s = np.minimum(np.asarray(r, dtype=float) / R, 1.0)
     return (1 - s**2) ** 2, 4 * (1 - s**2) * s**2 / R

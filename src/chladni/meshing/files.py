@@ -1,14 +1,15 @@
-"""The reference meshes and cases that ship with the package."""
+"""Mesh files that ship with the package, and what is written for other programs."""
 
 from pathlib import Path
 
 from ..errors import FileError
+from .vtu import write_vtu as write_vtu
 
 _HERE = Path(__file__).resolve().parents[1]
 
 
 def mesh_path(name: str) -> Path:
-    """Path of a reference mesh or case, whether installed (wheel) or in a checkout (editable).
+    """Path of a reference mesh, whether installed (wheel) or in a checkout (editable).
 
     Raises
     ------
@@ -19,5 +20,5 @@ def mesh_path(name: str) -> Path:
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
-    known = sorted(p.name for folder in folders if folder.is_dir() for p in folder.iterdir())
-    raise FileError(f"no reference mesh {name!r}; there are {', '.join(known)}")
+    there = sorted({p.name for f in folders if f.is_dir() for p in f.iterdir() if p.is_file()})
+    raise FileError(f"no reference mesh {name!r}; there are {', '.join(there) or 'none'}")

@@ -39,11 +39,12 @@ class TailgateDesign:
     """
 
     size: float = 0.016  # mesh size
+    inner_size: float = 0.8  # of the inner panel, in mesh sizes: its ribs carry the global modes
     # the skin: centre line, crown, outline, window
     height: float = 1.022
     slope: tuple[float, float, float, float] = (-4.0, 14.0, 52.0, 60.0)  # [degrees] along s
     bend: tuple[float, float] = (0.480, 0.095)  # place and half width of the bend at the waist
-    radius: tuple[float, float] = (2.6, 2.2)  # crown across, bottom and top
+    radius: tuple[float, float] = (2.8, 2.2)  # crown across, bottom and top
     outline: tuple[Corner, ...] = (
         (-0.478, 0.0, 0.090),
         (0.478, 0.0, 0.090),
@@ -75,8 +76,8 @@ class TailgateDesign:
     flange: tuple[float, float] = (0.018, 0.014)  # hem flange, then wall
     window_flange: tuple[float, float] = (0.015, 0.012)
     depth: tuple[tuple[float, float], ...] = (  # box depth over s
-        (0.0, 0.036),
-        (0.330, 0.036),
+        (0.0, 0.033),
+        (0.330, 0.033),
         (0.430, 0.072),
         (0.880, 0.072),
         (0.962, 0.014),
@@ -140,8 +141,8 @@ class TailgateDesign:
     accelerometers: int = 0  # how many, 5 g each
 
     def __post_init__(self) -> None:
-        if not 0.006 <= self.size <= 0.032:
-            raise ModelError(f"mesh size {self.size * 1e3:g} mm is not within 6 to 32 mm")
+        if not 0.005 <= self.size <= 0.032:
+            raise ModelError(f"mesh size {self.size * 1e3:g} mm is not within 5 to 32 mm")
         for name, allowed in (("hem", HEMS), ("hem_stretch", STRETCHES)):
             if (value := getattr(self, name)) not in allowed:
                 raise ModelError(f"{name} is {value!r}; it may be {', '.join(allowed)}")

@@ -194,7 +194,7 @@ def corner_thickness(field: Callable[[np.ndarray], np.ndarray], cells: np.ndarra
 
 def forming_mesh(skin: Skin, finest: float = 5.5e-3) -> FormedMesh:
     """All pressings, hems unfolded, on a graded mesh of their own with formed thickness."""
-    fine = replace(skin, design=replace(skin.design, size=0.010))
+    fine = skin.at_size(0.010)
     made = {part: forming(skin, part) for part in STRENGTH}
     sheets = [
         _formed_sheet(skin, sheet, made[without_side(name)], finest)

@@ -92,7 +92,7 @@ def _seam(skin: Skin) -> np.ndarray:
 def _upper_rows(skin: Skin) -> np.ndarray:
     """Two rows along the left upper reinforcement, clear of the hinge, close to both ends."""
     d = skin.design
-    a, b = upper_edges(replace_size(skin, 0.008))
+    a, b = upper_edges(skin.at_size(0.008))  # the same places on every mesh
     hem = skin.outline.offset(a, sum(d.flange) + 0.001)
     window = skin.window.offset(b, -(sum(d.window_flange) + 0.001))
     rows = []
@@ -105,11 +105,6 @@ def _upper_rows(skin: Skin) -> np.ndarray:
     places = np.vstack(rows)
     y, s, radius, wall, _ = d.hinge
     return places[np.hypot(places[:, 0] - y, places[:, 1] - s) > radius + wall + 0.004]
-
-
-def replace_size(skin: Skin, size: float) -> Skin:
-    """The same skin at another mesh size: places of joints do not depend on the mesh."""
-    return replace(skin, design=replace(skin.design, size=size))
 
 
 def _lower_rows(skin: Skin) -> np.ndarray:

@@ -285,9 +285,10 @@ def bracket(skin: Skin) -> Sheet:
 def pressings(skin: Skin) -> dict[str, Sheet]:
     """All sheets by name; those of a pair end in left (+y) and right."""
     edge = borders(skin)
+    fine = skin.at_size(skin.design.inner_size * skin.design.size)
     upper, lower = upper_left(skin), lower_left(skin)
     sheets = [
-        inner_panel(skin, edge),
+        inner_panel(fine, borders(fine)),
         outer_upper_panel(skin, edge),
         outer_lower_panel(skin, edge),
         upper,

@@ -4,7 +4,7 @@ P(y, s, d) = skin(y, s) - d n(y, s): a point lies the depth d below the skin alo
 normal n, into the car. x points rearward, y to the left, z up.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -68,6 +68,10 @@ class Skin:
             Loop.through(rounded(design.plateau), _SPACING),
             readonly(_centre_line(design)),
         )
+
+    def at_size(self, size: float) -> Self:
+        """The same skin to be meshed at another size."""
+        return replace(self, design=replace(self.design, size=size))
 
     def _crown(self, s: np.ndarray) -> np.ndarray:
         bottom, top = (0.5 / r for r in self.design.radius)

@@ -48,9 +48,9 @@ def notes(found: Plan) -> list[str]:
     if not found.aimed.all():
         blind = ", ".join(str(found.first + 1 + k) for k in np.flatnonzero(~found.aimed))
         out.append(
-            f"Mode {blind} moves along the sheets: no sensor glued flat sees it and no shaker at a "
-            "normal drives it well; the layout was made for the others, and a sensor on a block "
-            "was moved to it where that helps."
+            f"No sensor glued flat sees mode {blind}, which moves along the sheets or where no "
+            "sensor fits, and no shaker at a normal drives it well; the layout was made for the "
+            "others, and a sensor on a block was moved to it where that helps."
         )
     if found.wishes.draws:
         out.append(

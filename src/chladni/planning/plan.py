@@ -16,6 +16,7 @@ from ..progress import Progress, silent
 from .places import Places, find_places
 
 SPARE = 6  # modes computed beyond those wanted, so that the sweep sees what lies above
+BLIND = 0.25  # of the floor: what no place sees better than this is not aimed at
 TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting block
 
 
@@ -85,7 +86,7 @@ class Plan:
     first : int                   number of the first of them in the deck (rigid modes before it)
     mounts : Mount                every candidate: normals first, then directions on blocks
     phi : (m, r)                  target shapes at the mounts
-    aimed : (r,) bool             modes that sensors glued flat can see: the layout is made for them
+    aimed : (r,) bool             modes a sensor glued flat sees at all: the layout is for them
     layout : (n_sensors,) int     mounts, the most informative first
     moves : tuple of Move         sensors given up so that a mode is seen
     visible_before, visible : (r,)  before and after the moves
@@ -150,7 +151,7 @@ def plan(
     largest = np.linalg.norm(motion(built, modal), axis=1).max(axis=0)
     progress("sensors", 0.6)
     r, normal = len(modal), mounts.normal
-    aimed = pretest.visibility(phi[normal, :r], largest) >= wishes.floor
+    aimed = pretest.visibility(phi[normal, :r], largest) >= BLIND * wishes.floor
     flat = phi[normal, :r][:, aimed]
     draws = _draws(assembly, wishes, mounts, r, progress)[:, :, aimed] if wishes.draws else flat
     ranked, log_det = _layout(draws, mounts, wishes)

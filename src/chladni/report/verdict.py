@@ -27,9 +27,9 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "frf": ("frf", "One channel: test, model before, model after."),
     "frf_fitted": ("frf", "A channel that was fitted."),
     "frf_held_out": ("frf", "A channel the fit never saw."),
-    "frf_grid": ("frf", "All channels."),
+    "frf_grid": ("frf", "Channels spread evenly over the list."),
     "nyquist": ("frf", "Nyquist."),
-    "waterfall": ("scores", "Deviation Q, step by step."),
+    "waterfall": ("scores", "Deviation Q on fitted data, step by step."),
     "held_out": ("scores", "Deviation Q on held-out data."),
     "deviation": ("scores", "Where the deviation is left: channel by band."),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
@@ -39,6 +39,7 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "evidence": ("why", "Log evidence of every explanation tried, relative to the best."),
     "setup": ("test", "Where sensors and shaker sit."),
 }
+_HALF = ("waterfall", "held_out")  # two of them stand side by side
 _FILES = {
     "deck": "the updated deck",
     "report": "this page",
@@ -82,7 +83,7 @@ def sections(
 
     def shown(place: str) -> list[Block]:
         return [
-            Picture(path, PLACES[name][1])
+            Picture(path, PLACES[name][1], wide=name not in _HALF)
             for name, path in figures.items()
             if name in PLACES and PLACES[name][0] == place
         ]

@@ -110,7 +110,8 @@ def frequency_ladder(
     test = np.asarray(test, dtype=float)
     figure = Figure(figsize=(max(5.0, 0.55 * len(test) + 1.6), 3.4), layout="constrained")
     ax, at = figure.subplots(), np.arange(len(test))
-    series = [("before", before, BEFORE)] + ([("after", after, AFTER)] if after is not None else [])
+    series = [("before" if after is not None else "model", before, BEFORE)]
+    series += [("after", after, AFTER)] if after is not None else []
     wide = 0.8 / len(series)
     for k, (name, model, colour) in enumerate(series):
         offset = (k - (len(series) - 1) / 2) * wide
@@ -121,7 +122,7 @@ def frequency_ladder(
     ax.set_xticks(at, [f"{f:.4g}" for f in test], rotation=60, fontsize=8)
     ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
     ax.grid(axis="y", lw=0.3, alpha=0.6)
-    ax.legend(ncols=2, **LEGEND)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, **LEGEND)
     return save(figure, path)
 
 

@@ -21,8 +21,8 @@ from ..output import write_json
 
 WINDOWS = {"osmesa": "vtkOSOpenGLRenderWindow", "egl": "vtkEGLRenderWindow"}
 ADVICE = (
-    "pictures are drawn with matplotlib; for smoothly shaded ones install a graphics library "
-    "(Debian, Ubuntu: apt-get install libosmesa6, or libegl1 libgl1-mesa-dri)"
+    "Pictures are drawn with matplotlib; for smoothly shaded ones install a graphics library "
+    "(Debian, Ubuntu: apt-get install libosmesa6, or libegl1 libgl1-mesa-dri)."
 )
 _CHILD = """
 import pyvista
@@ -69,6 +69,11 @@ def prepare() -> bool:
         return False
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", found)
     return True
+
+
+def advice() -> list[str]:
+    """What to install for better pictures; nothing where VTK works or matplotlib was wished for."""
+    return [] if os.environ.get("CHLADNI_GRAPHICS") or window() else [ADVICE]
 
 
 def cache_folder() -> Path:

@@ -11,8 +11,10 @@ from chladni.units import UNITS
 
 from .conftest import ANCHORS, real_files
 
-WORDS = (b"0", b"-1", b"1.5-3", b"", b"NAN", b"99999999", b"THRU", b"1.+308", b"ABC", b"123456",
-         b"-5.", b"1e400", b"0.", b"*", b"=", b",", b"'", b"7777777777777777", b"\xfc")  # fmt: skip
+WORDS = (
+    b"0 -1 1.5-3 NAN 99999999 THRU 1.+308 ABC 123456 -5. 1e400 0. * = , ' =3 *1 == "
+    b"7777777777777777 \xfc "
+).split(b" ")  # the last one is blank
 
 
 def damaged(data, rng):

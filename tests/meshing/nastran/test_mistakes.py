@@ -34,6 +34,7 @@ MISTAKES = {
     "system": (("3,4\n", "3,4,77\n"), "coordinate system 77 does not exist"),
     "cyclic system": (("3,4\n", f"3,4,8\nCORD2R,8,9,{Z}\nCORD2R,9,8,{Z}\n"), "defined by itself"),
     "flat system": (("3,4\n", "3,4,8\nCORD2R,8,,0.,0.,0.,0.,0.,1.,0.,0.,2.\n"), "lie on one line"),
+    "wtmass text": (("MAT1", "PARAM,WTMASS,HALF\nMAT1"), "WTMASS is 'HALF', not a number"),
     "wtmass": (("MAT1", "PARAM,WTMASS,0.\nMAT1"), "WTMASS is 0"),
     "component": (("MAT1", "CELAS2,8,1.,1,7\nMAT1"), "not one of 1 to 6"),
     "spring to nothing": (("MAT1", "CELAS2,8,1.\nMAT1"), "joins nothing"),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.errors import FileError
-from chladni.meshing.nastran import numbers, read_deck
+from chladni.meshing.nastran import SetField, numbers, read_deck, write_deck
 
 from .conftest import ANCHORS, PLATE, real_decks
 
@@ -42,6 +42,16 @@ def test_every_format_says_the_same(bulk, text):
     assert cards.block(5, 3).tolist() == [[1.5, 0.002, 0.3]]
     assert [cards.word(0, k) for k in (8, 9, 10)] == ["", "", "456"]
     assert cards.real(0, 11) == 0.25
+
+
+def test_a_small_line_begins_a_row_of_eight(bulk):
+    """One wide line holds four fields; the small line after it goes on with the ninth."""
+    wide = "".join(f"{k:16}" for k in (1, 2, 3, 4))
+    cards = bulk(
+        f"CBAR*   {wide}\n+       {5:8}{6:8}\nCBAR*   {wide}\n*\n+       {7:8}\n", fold=False
+    )
+    assert [cards["CBAR"].word(i, 9) for i in (0, 1)] == ["5", "7"]
+    assert cards["CBAR"].word(0, 5) == ""
 
 
 def test_continuations_find_their_card_by_name(bulk):
@@ -105,6 +115,12 @@ def test_include_is_relative_nested_and_long(tmp_path):
     assert places[4].endswith("main.bdf:5")
 
 
+def test_include_in_other_capitals(tmp_path):
+    (tmp_path / "Grids.BDF").write_text("GRID,1\n")
+    (tmp_path / "main.bdf").write_text("INCLUDE 'grids.bdf'\n")
+    assert len(read_deck(tmp_path / "main.bdf")["GRID"]) == 1
+
+
 def test_include_cycle_and_missing_file(tmp_path):
     a, b = tmp_path / "a.bdf", tmp_path / "b.bdf"
     a.write_text("GRID,1\nINCLUDE 'b.bdf'\n")
@@ -156,10 +172,30 @@ def test_case_control():
     assert twenty.selects == {"SPC": 2, "METHOD": 7, "LOAD": 8, "SUPORT": 3}
 
 
+@pytest.mark.parametrize("pattern", ["=,*1,,*10.,==", "=       *(1)            *10.    =="])
+def test_replicated_cards(bulk, pattern):
+    """Rows of grids as a row's first two lines and a count say."""
+    deck = bulk(f"GRID,1,,0.,5.,-1.5+1\n{pattern} $ and so on\n=3\nGRID,9\n", fold=False)
+    grid = deck["GRID"]
+    assert grid.integers(1).tolist() == [1, 2, 3, 4, 5, 9]
+    assert grid.reals(3, 0.0).tolist() == [0, 10, 20, 30, 40, 0]
+    assert grid.block(4, 2, 0.0)[:5].tolist() == [[5, -15]] * 5
+    assert grid.where(4).endswith(":3")
+    assert bulk("PBAR,1,5,1.,2.\nPBAR,2,==\n", fold=False)["PBAR"].fields(1) == [
+        "2",
+        "5",
+        "1.",
+        "2.",
+    ]
+    with pytest.raises(FileError, match=r":3: GRID 4: it is replicated"):
+        write_deck(deck, deck.path.parent / "new.bdf", [SetField("GRID", 4, "X1", 1.0)])
+
+
 NAMES = {
     "ANSA": "$ANSA_NAME_COMMENT;101;PSHELL;Inner Panel;NO;NO;NO;",
     "HyperMesh property": '$HMNAME PROP                 101"Inner Panel" 4',
     "HyperMesh component": '$HMNAME COMP                   3"Inner Panel"\n$HWCOLOR COMP 3 5',
+    "HyperMesh assigned": '$HMNAME COMP                   3"Inner Panel"  101 "PSHELL_101" 4',
     "Femap": "$ Femap Property 101 : Inner Panel",
     "Femap with NX": "$ Femap with NX Nastran Property 101 : Inner Panel",
     "Patran": '$ Pset: "Inner Panel" will be imported as: "pshell.101"',
@@ -170,7 +206,10 @@ NAMES = {
 
 @pytest.mark.parametrize("comment", NAMES.values(), ids=NAMES)
 def test_part_names_in_comments(bulk, comment):
-    assert bulk(f"{comment}\n{PLATE[PLATE.index('PSHELL') :]}").names == {101: "Inner Panel"}
+    deck = bulk(
+        f"$ANSA_NAME_COMMENT;101;PBUSH;rubber;\n{comment}\n{PLATE[PLATE.index('PSHELL') :]}"
+    )
+    assert deck.names == {101: "Inner Panel"}
 
 
 @pytest.mark.parametrize("card", ["CGAP", "CWELD", "CFAST", "CQUAD8", "CTRIA6", "GENEL", "CPYRAM"])
@@ -198,7 +237,9 @@ BROKEN = {
         "CBAR           1       2       3       4      1.      0.      0.        +AB\nGRID,1",
         r":1: the continuation \+AB is missing",
     ),
-    "replication": ("GRID,1\n=,*1,=\n", r":2: replicated"),
+    "nothing to repeat": ("=,*1,=\n", r":1: there is no card of one line above"),
+    "no pattern": ("GRID,1\n=5\n", r":2: =5 has no replicated card above it"),
+    "step of nothing": ("GRID,1,,A\n=,*1,,*2.\n", r":2: 'A' \+ '2.' cannot be added"),
     "columns": ("GRID 1 0 0.0 0.0 0.0\n", r":1: 'GRID 1 0' is no card name"),
     "too many free fields": ("SPC1,1,123,1,2,3,4,5,6,7\n", r"'7' stands beyond field 9"),
     "no BEGIN BULK": ("SOL 103\nCEND\nGRID,1\n", r":2: CEND without a BEGIN BULK"),

@@ -8,7 +8,7 @@ import numpy as np
 from ...model.properties import BeamSection, Section
 from .context import Context
 from .materials import Materials
-from .profiles import SHAPES, Profile, _tube
+from .profiles import SHAPES, Profile, tube
 from .table import Cards
 
 
@@ -102,7 +102,7 @@ def _ptube(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSecti
     wall = float(card.reals(4, 0.0)[0]) or outer
     if not 0 < wall <= outer:
         raise card.refuse(0, f"a wall of {wall:g} does not fit a tube of radius {outer:g}")
-    p = _tube(outer, outer - wall)
+    p = tube(outer, outer - wall)
     nsm = float(card.reals(5, 0.0)[0])
     return _section(ctx, materials, card, (p.area, 0.0, 0.0, 0.0, p.J), (0.0, 0.0), nsm, "rod")
 

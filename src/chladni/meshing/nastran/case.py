@@ -20,6 +20,7 @@ _SELECTS: Final = {
 }  # fmt: skip
 _COMMAND = re.compile(r"^\s*([A-Z]\w*)\s*(?:\([^)]*\))?\s*=\s*([\w.]+)")
 _SUBCASE = re.compile(r"^\s*(SUBCASE|SUBCOM|SYM|REPCASE)\s*=?\s*(\d+)", re.I)
+_PARAM = re.compile(r"^\s*PARAM\s*,\s*(\w+)\s*,\s*([^,\s]+)", re.I)
 _SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
 
 
@@ -43,11 +44,12 @@ class CaseControl:
     sol: int = 0
     subcases: tuple[Subcase, ...] = ()
     present: bool = False
+    parameters: dict[str, str] = field(default_factory=dict)  # PARAM above BEGIN BULK
 
 
 def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
     """Parse the lines before BEGIN BULK; ``sections``: there is a case control at all."""
-    sol, common, cases, current = 0, _Case(0), [], None
+    sol, common, cases, current, parameters = 0, _Case(0), [], None, {}
     for line in lines:
         text = line.split("$")[0]
         if found := _SOL.match(text):
@@ -55,10 +57,12 @@ def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
         elif found := _SUBCASE.match(text):
             current = _Case(int(found[2]))
             cases.append(current)
+        elif found := _PARAM.match(text):
+            parameters[found[1].upper()] = found[2].upper()
         elif found := _COMMAND.match(text.upper()):
             (current or common).add(found[1], found[2])
     made = [case.over(common) for case in cases] or [common.over(_Case(0))]
-    return CaseControl(sol, tuple(made) if sections else (), sections)
+    return CaseControl(sol, tuple(made) if sections else (), sections, parameters)
 
 
 class _Case:

@@ -8,6 +8,7 @@ from ...errors import FileError
 from ...units import Units
 from .deck import Deck
 from .frames import Frames
+from .numbers import parse_real
 from .table import Cards
 
 
@@ -117,16 +118,16 @@ def parameter(deck: Deck, name: str) -> str:
     """Text of the last PARAM of this name, '' where there is none."""
     cards = deck["PARAM"]
     found = np.flatnonzero(cards.words(1) == name.encode())
-    return cards.words(2)[found[-1]].decode("latin-1") if len(found) else ""
+    return cards.word(int(found[-1]), 2) if len(found) else deck.case.parameters.get(name, "")
 
 
 def real_parameter(deck: Deck, name: str, default: float) -> float:
     """Value of a real PARAM."""
-    if not parameter(deck, name):
-        return default
-    cards = deck["PARAM"]
-    found = np.flatnonzero(cards.words(1) == name.encode())
-    return float(cards.take(found[-1:]).reals(2)[0])
+    text = parameter(deck, name)
+    value = parse_real(text) if text else default
+    if np.isnan(value):
+        raise FileError(f"{deck.path}: PARAM,{name} is {text!r}, not a number")
+    return value
 
 
 def context(deck: Deck, units: Units | None) -> Context:

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-
 from ...errors import FileError
 from .cards import carries
 from .case import CaseControl, case_control
@@ -113,13 +111,3 @@ def _refuse_unknown(deck: Deck) -> None:
             f"{deck.path}: the case control selects {name} = {matrix}; direct input "
             "matrices (DMIG) are not understood: allow=('DMIG',)"
         )
-
-
-def unread(deck: Deck, known: Sequence[str]) -> dict[str, int]:
-    """Cards kept as text only: {name: how many}."""
-    return {name: len(t) for name, t in sorted(deck.cards.items()) if name not in set(known)}
-
-
-def first_line(cards: Cards) -> np.ndarray:
-    """First line (n,) of every card."""
-    return np.asarray(cards.lines[cards.line_start[:-1]])

@@ -1,12 +1,13 @@
 """From the lines of a file to its cards: formats, continuations, columns, all lines at once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import FileError
 from .numbers import bytes_matrix
+from .replicate import expanded
 from .sources import Source
 from .table import Cards
 
@@ -46,18 +47,17 @@ def tables(source: Source, file: int, files: tuple[Path, ...]) -> dict[str, Card
     for k, name in enumerate(names):
         mine = np.flatnonzero(name_of_card[card] == k)
         out[name] = _table(name, lines, order[mine], card[mine], offset[mine], card_size, file)
-    return {name: _with_files(cards, files) for name, cards in out.items()}
-
-
-def _with_files(cards: Cards, files: tuple[Path, ...]) -> Cards:
-    object.__setattr__(cards, "files", files)
-    return cards
+    return {name: replace(cards, files=files) for name, cards in out.items()}
 
 
 def _classified(source: Source) -> _Lines:
     """Blank out comments, drop empty lines, tell the formats apart."""
     first, past = source.bulk
     raw = [t.expandtabs(8) if b"\t" in t else t for t in source.lines[first:past]]
+    origin: np.ndarray = np.arange(first, past)
+    if any(b"=" in t and t[:1] != b"$" for t in raw):
+        raw, at = expanded(raw, source.path, first)
+        origin = np.array(at)
     text = np.zeros((len(raw), 80), np.uint8)
     if raw:
         text = bytes_matrix(np.array(raw, dtype="S80"))
@@ -69,13 +69,13 @@ def _classified(source: Source) -> _Lines:
     text[dollar] = np.where(_ARITHMETIC >= at[:, None], _BLANK, text[dollar])
     keep = (text != _BLANK).any(axis=1)
     for include in source.includes:
-        keep[max(include.first - first, 0) : max(include.past - first, 0)] = False
+        keep &= (origin < include.first) | (origin >= include.past)
     number = np.flatnonzero(keep)
     text = text[number]
     tokens = {
         int(i): _split(raw[number[i]]) for i in np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
     }
-    return _formats(number + first, text, tokens)
+    return _formats(origin[number], text, tokens)
 
 
 def _split(line: bytes) -> list[bytes]:
@@ -170,13 +170,13 @@ def _named(
 def _checked(word: bytes, path: Path, number: int) -> str:
     """The card's name, if it can be one."""
     name = word.decode("latin-1")
+    if name.startswith("BEGIN "):
+        raise FileError(f"{path}:{number + 1}: superelement sections are not supported")
     if " " in name:
         raise FileError(
             f"{path}:{number + 1}: {name!r} is no card name; "
             "fields stand in columns of 8 or 16, or are separated by commas"
         )
-    if name.startswith("="):
-        raise FileError(f"{path}:{number + 1}: replicated cards (=) are not supported")
     return name
 
 

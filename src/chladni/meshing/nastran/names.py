@@ -5,7 +5,10 @@ from collections.abc import Iterable
 from typing import Final
 
 _PATTERNS: Final = (
-    re.compile(r"^\$ANSA_NAME_COMMENT;(?P<id>\d+);(?P<card>P\w+);(?P<name>[^;]*)"),
+    re.compile(
+        r"^\$ANSA_NAME_COMMENT;(?P<id>\d+);"
+        r"P(SHELL|COMP|COMPG|SOLID|BAR|BARL|BEAM|BEAML|ROD|TUBE);(?P<name>[^;]*)"
+    ),
     re.compile(r"^\$HMNAME PROP\s+(?P<id>\d+)\s*\"(?P<name>[^\"]*)\""),
     re.compile(r"^\$ Femap .*?Property (?P<id>\d+) : (?P<name>.*)"),
     re.compile(r"^\$ Pset: \"(?P<name>[^\"]*)\" will be imported as: \"\w+\.(?P<id>\d+)\""),
@@ -20,6 +23,7 @@ _ABOVE: Final = (
     re.compile(r"^\$HMNAME COMP\s+\d+\s*\"(?P<name>[^\"]*)\""),
     re.compile(r"^\$\*\s+Property:\s*(?P<name>.*)"),
 )
+_COMPONENT = re.compile(r"^\$HMNAME COMP\s+\d+\s*\"[^\"]*\"\s*(?P<id>\d+)")
 _CARD = re.compile(r"^(P[A-Z]+[0-9]*)\*?[ ,]\s*,?\s*(\d+)")
 
 
@@ -34,6 +38,9 @@ def part_names(lines: Iterable[str]) -> dict[int, str]:
                 stated.setdefault(int(found["id"]), found["name"].strip())
             elif found := _first(_ABOVE, line):
                 waiting = found["name"].strip()
+                if component := _COMPONENT.match(line):
+                    above.setdefault(int(component["id"]), waiting)
+                    waiting = ""
         elif waiting and (card := _CARD.match(line)):
             above.setdefault(int(card[2]), waiting)
             waiting = ""

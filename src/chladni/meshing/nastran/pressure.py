@@ -12,15 +12,8 @@ _FACES = {
     "CPENTA": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "CTETRA": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
 }
-_CORNERS = {
-    "CQUAD4": 4,
-    "CQUADR": 4,
-    "CTRIA3": 3,
-    "CTRIAR": 3,
-    "CHEXA": 8,
-    "CPENTA": 6,
-    "CTETRA": 4,
-}
+_SHELLS = {"CQUAD4": 4, "CQUADR": 4, "CTRIA3": 3, "CTRIAR": 3}
+_CORNERS = {**_SHELLS, "CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
 
 Nodal = tuple[int, np.ndarray, np.ndarray]  # load set, rows (k,), forces (k, 3) [N]
 
@@ -32,7 +25,9 @@ def forces(ctx: Context) -> Iterator[Nodal]:
         elements = _elements(ctx)
     unit = ctx.scale.stress * ctx.scale.length**2
     for cards in ctx.deck.present("PLOAD4"):
-        for i in range(len(cards)):
+        done, found = _on_shells(ctx, cards, unit)
+        yield from found
+        for i in np.flatnonzero(~done).tolist():
             yield from _pload4(ctx, cards, i, elements, unit)
     for cards in ctx.deck.present("PLOAD2"):
         for i in range(len(cards)):
@@ -59,25 +54,58 @@ def _elements(ctx: Context) -> dict[int, tuple[str, np.ndarray]]:
     return out
 
 
-def on_face(X: np.ndarray, p: np.ndarray, direction: np.ndarray | None = None) -> np.ndarray:
-    """Consistent forces (3 or 4, 3) of corner pressures on a face X, along its normal or a way.
+def on_faces(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.ndarray:
+    """Consistent forces (m, c, 3) of corner pressures p (m, c) on faces X (m, c, 3), c = 3 or 4.
 
-    Bilinear on quadrilaterals (2 x 2 Gauss points), exact on triangles:
-    f_i = A (p_i + Σ p) / 12.
+    Along the normals, or along unit vectors ``way`` (m, 3). Bilinear on quadrilaterals
+    (2 x 2 Gauss points), exact on triangles: f_i = A (p_i + Σ p) / 12.
     """
-    if len(X) == 3:
-        area = np.cross(X[1] - X[0], X[2] - X[0]) / 2
-        way = area if direction is None else np.linalg.norm(area) * direction
-        return np.asarray((p + p.sum())[:, None] / 12 * way)
-    f = np.zeros((4, 3))
+    if X.shape[1] == 3:
+        area = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]) / 2
+        return np.asarray((p + p.sum(axis=1)[:, None])[:, :, None] / 12 * _along(area, way))
+    f = np.zeros(X.shape)
     a = 1 / np.sqrt(3)
     s, t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
     for xi, eta in ((-a, -a), (a, -a), (a, a), (-a, a)):
         N = (1 + s * xi) * (1 + t * eta) / 4
-        dA = np.cross((s * (1 + t * eta) / 4) @ X, (t * (1 + s * xi) / 4) @ X)
-        way = dA if direction is None else np.linalg.norm(dA) * direction
-        f += np.outer(N, way) * (N @ p)
+        e1, e2 = (np.einsum("c,mcj->mj", d / 4, X) for d in (s * (1 + t * eta), t * (1 + s * xi)))
+        f += N[:, None] * _along(np.cross(e1, e2), way) * (p @ N)[:, None, None]
     return f
+
+
+def _along(area: np.ndarray, way: np.ndarray | None) -> np.ndarray:
+    """Area vectors (m, 1, 3), or as much area along other ways."""
+    turned = area if way is None else np.linalg.norm(area, axis=1)[:, None] * way
+    return np.asarray(turned[:, None])
+
+
+def on_face(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.ndarray:
+    """The same of one face (c, 3)."""
+    return np.asarray(on_faces(X[None], p[None], None if way is None else way[None])[0])
+
+
+def _on_shells(ctx: Context, cards: Cards, unit: float) -> tuple[np.ndarray, list[Nodal]]:
+    """(which PLOAD4 load a single shell along its normal, their forces), all at once."""
+    done = np.zeros(len(cards), bool)
+    plain = np.all([cards.words(k) == b"" for k in (7, 8, 9, 10, 11, 12)], axis=0)
+    if not np.any(plain):
+        return done, []
+    eid, sid, p = cards.integers(2), cards.integers(1), cards.block(3, 4, np.nan) * unit
+    p = np.where(np.isnan(p), np.nan_to_num(p[:, :1]), p)
+    out: list[Nodal] = []
+    for name, count in _SHELLS.items():
+        for shells in ctx.deck.present(name):
+            rows, ids = ctx.rows(shells, shells.ids(3, count)), shells.integers(1)
+            order = np.argsort(ids)
+            at = order[np.minimum(np.searchsorted(ids, eid, sorter=order), len(ids) - 1)]
+            mine = plain & (ids[at] == eid) & ~done
+            done |= mine
+            for s in np.unique(sid[mine]):
+                which = mine & (sid == s)
+                face = rows[at[which]]
+                f = on_faces(ctx.places[face], p[which, :count])
+                out.append((int(s), face.ravel(), f.reshape(-1, 3)))
+    return done, out
 
 
 def _known(

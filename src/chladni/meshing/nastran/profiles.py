@@ -58,7 +58,8 @@ def _rod(r: float) -> Profile:
     )
 
 
-def _tube(ro: float, ri: float) -> Profile:
+def tube(ro: float, ri: float) -> Profile:
+    """Round tube of outer and inner radius."""
     I = np.pi * (ro**4 - ri**4) / 4
     return Profile(np.pi * (ro**2 - ri**2), I, I, 0.0, 2 * I, (0.5, 0.5))
 
@@ -152,11 +153,11 @@ def _hat(h: float, t: float, top: float, brim: float) -> Profile:
 
 
 def _tube2(ro: float, t: float) -> Profile:
-    return _tube(ro, ro - t)
+    return tube(ro, ro - t)
 
 
 SHAPES: Final[dict[str, tuple[Callable[..., Profile], int]]] = {
-    "ROD": (_rod, 1), "TUBE": (_tube, 2), "TUBE2": (_tube2, 2), "BAR": (_bar, 2),
+    "ROD": (_rod, 1), "TUBE": (tube, 2), "TUBE2": (_tube2, 2), "BAR": (_bar, 2),
     "BOX": (_box, 4), "BOX1": (_box1, 6), "I": (_i, 6), "I1": (_i1, 4), "H": (_h, 4),
     "CHAN": (_chan, 4), "CHAN1": (_chan1, 4), "CHAN2": (_chan2, 4), "T": (_t, 4), "T2": (_t, 4),
     "T1": (_t1, 4), "L": (_l, 4), "Z": (_z, 4), "CROSS": (_cross, 4), "HAT": (_hat, 4),

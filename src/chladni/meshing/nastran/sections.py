@@ -13,7 +13,7 @@ from .table import Cards
 
 Reader = Callable[[Context, Materials, Cards, int], Section]
 _FAMILIES: dict[str, tuple[str, ...]] = {
-    "shell": ("PSHELL", "PCOMP", "PQUAD1", "PQUAD2", "PTRIA1", "PTRIA2", "PTRPLT1"),
+    "shell": ("PSHELL", "PCOMP", "PCOMPG", "PQUAD1", "PQUAD2", "PTRIA1", "PTRIA2", "PTRPLT1"),
     "solid": ("PSOLID",),
     "bar": ("PBAR", "PBARL"),
     "beam": ("PBEAM", "PBEAML"),
@@ -113,11 +113,14 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
 
 
 def _plies(ctx: Context, materials: Materials, card: Cards) -> list[Ply]:
-    """Layers of a PCOMP, mirrored where LAM is SYM; blanks repeat the layer below."""
-    fields = card.fields(0)
+    """Layers of a PCOMP, mirrored where LAM is SYM; blanks repeat the layer below.
+
+    A PCOMPG begins each layer with its global number and has one layer a line.
+    """
+    fields, ahead = card.fields(0), int(card.name == "PCOMPG")
     plies: list[Ply] = []
     mid, t = 0, 0.0
-    for k in range(9, len(fields) + 1, 4):
+    for k in range(9 + ahead, len(fields) + 1, 8 if ahead else 4):
         if not any(fields[k - 1 : k + 3]):
             continue
         mid = int(card.integers(k, mid)[0])
@@ -155,7 +158,7 @@ def _pcomp(ctx: Context, materials: Materials, card: Cards, pid: int) -> ShellSe
 
 def _shift(ctx: Context, card: Cards) -> float:
     """Middle of a laminate above its reference plane, Z0 + T/2 [m]."""
-    if card.name != "PCOMP" or card.words(2)[0] == b"":
+    if not card.name.startswith("PCOMP") or card.words(2)[0] == b"":
         return 0.0
     t = sum(ply.thickness for ply in _plies(ctx, Materials(ctx), card))
     return float(card.reals(2)[0]) * ctx.scale.length + t / 2
@@ -205,6 +208,7 @@ def _pquad2(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
 READERS: dict[str, Reader] = {
     "PSHELL": _pshell,
     "PCOMP": _pcomp,
+    "PCOMPG": _pcomp,
     "PSOLID": _psolid,
     "PQUAD1": _pquad1,
     "PTRIA1": _pquad1,

@@ -150,6 +150,15 @@ def _target(name: str, path: Path, above: tuple[Path, ...]) -> Path:
     wanted = Path(name.replace("\\", "/"))
     beside = [folder / wanted for folder in (path.parent, above[0].parent)]
     try:
-        return next((p for p in beside if p.is_file()), beside[0])
+        found = next((p for p in beside if p.is_file()), None)
+        return found or _spelled_otherwise(beside[0]) or beside[0]
     except OSError:
         raise FileError(f"{path}: INCLUDE {name[:80]!r} is not a file name") from None
+
+
+def _spelled_otherwise(path: Path) -> Path | None:
+    """The only file of this name in other capitals; decks come from systems that ignore them."""
+    if not path.parent.is_dir():
+        return None
+    alike = [p for p in path.parent.iterdir() if p.name.lower() == path.name.lower()]
+    return alike[0] if len(alike) == 1 and alike[0].is_file() else None

@@ -143,6 +143,17 @@ def _rbar(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
         yield from _general(ctx, cards, i, lead, follow)
 
 
+def _rtrplt(ctx: Context, cards: Cards, i: int) -> Iterator[Tie]:
+    """RTRPLT: three grids on a rigid plate, EID GA GB GC CNA CNB CNC - CMA CMB CMC."""
+    rows = [ctx.row(cards, i, cards.integer(i, k)) for k in (2, 3, 4)]
+    lead, follow = (
+        [(r, c) for r, k in zip(rows, ks, strict=True) for c in digits(cards, i, cards.word(i, k))]
+        for ks in ((5, 6, 7), (9, 10, 11))
+    )
+    rest = [(r, c) for r in rows for c in _ALL if (r, c) not in lead]
+    yield from _general(ctx, cards, i, lead, follow or rest)
+
+
 def _rest(given: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(c for c in _ALL if c not in given)
 
@@ -267,6 +278,7 @@ _READERS = {
     "RBE3": _rbe3,
     "RBAR": _rbar,
     "RROD": _rrod,
+    "RTRPLT": _rtrplt,
     "RBE1": _rbe1,
     "CRIGD1": _crigd1,
     "CRIGD2": _crigd2,

@@ -12,6 +12,7 @@ from .edits import Change, plan
 from .format import card
 from .rewrite import raw_lines, rewritten
 from .sources import Include, Source
+from .table import Cards
 
 Lines = dict[int, list[str]]  # new lines in place of a line (from 1)
 
@@ -50,17 +51,25 @@ def _edits(deck: Deck, changes: Sequence[Change]) -> dict[int, Lines]:
         if (kind, i) in wanted.whole:
             continue
         cards = deck.cards[kind]
-        at, raw = raw_lines(cards, i, deck.sources[cards.file[i]].lines)
+        at, raw = _spelled_out(deck, cards, i)
         for number, new in zip(at, rewritten(kind, raw, cards.fields(i), fields), strict=True):
             if new != [raw[at.index(number)]]:
                 out.setdefault(int(cards.file[i]), {})[number] = new
     for (kind, i), values in wanted.whole.items():
         cards = deck.cards[kind]
-        at, _ = raw_lines(cards, i, deck.sources[cards.file[i]].lines)
+        at, _ = _spelled_out(deck, cards, i)
         edits = out.setdefault(int(cards.file[i]), {})
         edits.update({number: [] for number in at})
         edits[at[0]] = card(str(values[0]), values[1:]) if values else []
     return out
+
+
+def _spelled_out(deck: Deck, cards: Cards, i: int) -> tuple[list[int], list[str]]:
+    """Lines of a card (numbers, texts); one that stands there by replication has none."""
+    at, raw = raw_lines(cards, i, deck.sources[cards.file[i]].lines)
+    if "=" in [t.strip() for t in raw[0].replace("==", "=").split(",")] or raw[0][:1] == "=":
+        raise cards.refuse(i, "it is replicated (=); write it out before it is changed")
+    return at, raw
 
 
 def _footer(deck: Deck, changes: Sequence[Change]) -> list[str]:

@@ -1,0 +1,185 @@
+"""Which lines and channels of a recording can be used, and whether the structure is linear."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..errors import ShapeError
+from .correlation import wrapped
+
+_LN10 = np.log(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """What is left after looking.
+
+    Attributes
+    ----------
+    outputs : tuple of str     channels to use
+    dropped : {label: why}     channels not to use
+    lines : (n_f,) bool        lines to use
+    bands : ((low, high), ...)  [Hz], the runs of those lines
+    coherence : (n_f,) or None  median over the channels kept
+    """
+
+    outputs: tuple[str, ...]
+    dropped: dict[str, str]
+    lines: np.ndarray
+    bands: tuple[tuple[float, float], ...]
+    coherence: np.ndarray | None
+
+
+def screen(frf: FRF, least: float = 0.8, gap: float = 0.02) -> Screened:
+    """Dead, broken and incoherent channels out; lines where the median coherence is low out.
+
+    Parameters
+    ----------
+    least : median coherence a line, or a channel over the lines, must reach
+    gap : runs of poor lines shorter than this share of their frequency stay in (anti-resonances
+        are incoherent by nature)
+    """
+    dropped = _dropped(frf, least)
+    kept = tuple(o for o in frf.outputs if o not in dropped)
+    if not kept or frf.coherence is None:
+        lines = (frf.frequency > 0) & bool(kept)
+        return Screened(kept, dropped, lines, runs(frf.frequency, lines), None)
+    seen = [o not in dropped for o in frf.outputs]
+    median = np.median(frf.coherence[:, seen], axis=(1, 2))
+    lines = _closed(frf.frequency, median >= least, gap) & (frf.frequency > 0)
+    return Screened(kept, dropped, lines, runs(frf.frequency, lines), median)
+
+
+def _dropped(frf: FRF, least: float) -> dict[str, str]:
+    """Why each unusable channel is unusable."""
+    rms = np.sqrt(np.nanmean(np.abs(frf.values) ** 2, axis=(0, 2), where=np.isfinite(frf.values)))
+    alive = rms[np.isfinite(rms) & (rms > 0)]
+    typical = np.median(alive) if len(alive) else 0.0
+    why = {}
+    for k, label in enumerate(frf.outputs):
+        broken = ~np.isfinite(frf.values[:, k])
+        if broken.any():
+            why[label] = f"{int(broken.sum())} values are not numbers"
+        elif rms[k] <= 1e-4 * typical:
+            why[label] = "dead: its level is below 1/10000 of the others'"
+        elif frf.coherence is not None and np.median(frf.coherence[:, k]) < 0.5 * least:
+            why[label] = f"incoherent: median coherence {np.median(frf.coherence[:, k]):.2f}"
+    return why
+
+
+def _closed(f: np.ndarray, good: np.ndarray, gap: float) -> np.ndarray:
+    """Good lines, with short poor runs between good ones filled."""
+    filled = good.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], good, [True]])))
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        inner = 0 < a and b < len(f)
+        if inner and f[b] - f[a - 1] <= gap * f[a]:
+            filled[a:b] = True
+    return filled
+
+
+def runs(f: np.ndarray, lines: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Runs of lines as bands [Hz]; single lines make none.
+
+    >>> runs(np.arange(6.0), np.array([0, 1, 1, 0, 1, 1], bool))
+    ((1.0, 2.0), (4.0, 5.0))
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lines, [False]])))
+    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return tuple((float(f[a]), float(f[b])) for a, b in pairs if b > a)
+
+
+@dataclass(frozen=True, eq=False)
+class Homogeneity:
+    """Two levels of the same test against each other.
+
+    Attributes
+    ----------
+    ratio : float           mean |H₂ - H₁|² / (σ₁² + σ₂²): 1 for a linear structure
+    rms : float             of log₁₀(H₂ / H₁), complex: the size of the difference
+    channel : (n_out, n_in)  ratio of each channel
+    frequency : (n_f,)      Hz, the common lines
+    line : (n_f,)           ratio of each line
+    limit : float           ratio that chance does not reach
+    linear : bool
+    """
+
+    ratio: float
+    rms: float
+    channel: np.ndarray
+    frequency: np.ndarray
+    line: np.ndarray
+    limit: float
+    linear: bool
+
+
+def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
+    """Is the response proportional to the level? |H₂ - H₁|² over what the noise explains.
+
+    Worden and Tomlinson (2001), Nonlinearity in Structural Dynamics, section 2.3 (homogeneity).
+    ``linear`` unless the ratio is beyond chance (1.03, or five standard deviations of a mean of
+    exponential variates) *and* the responses differ by more than ``least`` in log₁₀.
+
+    The second recording is interpolated to the lines of the first; where a recording brings no
+    variance, its noise is what does not follow a parabola through five lines.
+    """
+    if (low.outputs, low.inputs, low.quantity) != (high.outputs, high.inputs, high.quantity):
+        raise ShapeError("the two levels differ in labels or quantity; use FRF.sel first")
+    first, last = (
+        fold(a.frequency[k], b.frequency[k])
+        for fold, a, b, k in ((max, low, high, 0), (min, low, high, -1))
+    )
+    at = (first <= low.frequency) & (low.frequency <= last) & (low.frequency > 0)
+    if at.sum() < 5:
+        raise ShapeError(
+            f"the levels share {int(at.sum())} lines: {low.frequency[0]:g}-{low.frequency[-1]:g} "
+            f"and {high.frequency[0]:g}-{high.frequency[-1]:g} Hz"
+        )
+    f = low.frequency[at]
+    H1, H2 = low.values[at], _interpolated(f, high.frequency, high.values)
+    noise = noise_of(low)[at] + _interpolated(f, high.frequency, noise_of(high)).real
+    whitened = np.abs(H2 - H1) ** 2 / np.maximum(noise, 1e-12 * np.abs(H1) ** 2 + 1e-300)
+    delta = wrapped(np.log(H2 / H1) / _LN10)
+    ratio, rms = float(whitened.mean()), float(np.sqrt((np.abs(delta) ** 2).mean()))
+    limit = 1 + max(0.03, 5 / np.sqrt(whitened.size))
+    return Homogeneity(
+        ratio=ratio,
+        rms=rms,
+        channel=whitened.mean(axis=0),
+        frequency=f,
+        line=whitened.mean(axis=(1, 2)),
+        limit=float(limit),
+        linear=bool(ratio <= limit or rms <= least),
+    )
+
+
+def _interpolated(f: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values at f, linear between the lines of grid (n_f, ...)."""
+    k = np.clip(np.searchsorted(grid, f, side="right") - 1, 0, len(grid) - 2)
+    t = ((f - grid[k]) / (grid[k + 1] - grid[k])).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1 - t) * values[k] + t * values[k + 1])
+
+
+def noise_of(frf: FRF) -> np.ndarray:
+    """Variance of every sample: the recording's own, else from its roughness (n_f, n_out, n_in)."""
+    return roughness(frf) if frf.variance is None else frf.variance
+
+
+def roughness(frf: FRF) -> np.ndarray:
+    """What does not follow a parabola through five neighbouring lines, as variance of a sample.
+
+    The residual of the middle of five against the least-squares parabola has variance 18/35 σ²
+    on an even grid; medians over 21 lines keep resonances out.
+    """
+    from scipy.ndimage import median_filter
+
+    n = len(frf.frequency)
+    if n < 5:
+        raise ShapeError(f"{n} lines are too few to see the noise in")
+    weights = np.array([-3, 12, 17, 12, -3]) / 35
+    smooth = sum(w * frf.values[k : n - 4 + k] for k, w in enumerate(weights))
+    power = np.abs(frf.values[2 : n - 2] - smooth) ** 2 * 35 / 18
+    width = min(21, n - 4)
+    inner = median_filter(power, size=(width, 1, 1), mode="reflect") / np.log(2)
+    return np.asarray(np.pad(inner, ((2, 2), (0, 0), (0, 0)), mode="edge"))

@@ -1,0 +1,138 @@
+"""Shapes, scale and complexity of identified modes.
+
+Ewins (2000), Modal Testing, sections 2.4 and 4.4; Pappa, Elliott and Schenk (1993), J. Guidance
+16(5) (modal phase collinearity).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dofs import parse
+from ..dynamics.modes import ModalModel
+from ..errors import LabelError
+from .identification import Identified
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredShapes:
+    """Shapes of identified modes at the outputs.
+
+    Attributes
+    ----------
+    outputs : tuple of n labels
+    values : (n, r) complex   Ψ, turned so that they are as real as they can be
+    participation : (n_in, r) complex   ψ at the inputs, R_r ≈ Ψ_r participation_rᵀ / 2i Im p_r
+    collinearity : (r,)       1: all channels move in phase (a normal mode); 0: none do
+    rank : (r,)               share of the residue one mode explains (1 for one input)
+    scaled : bool             1/√kg, by a drive point; else of largest entry 1
+    polarity : (r,)           sign of the modal constant at the drive point: -1 is impossible, so
+                              that sensor or force gauge is reversed
+    """
+
+    outputs: tuple[str, ...]
+    values: np.ndarray
+    participation: np.ndarray
+    collinearity: np.ndarray
+    rank: np.ndarray
+    scaled: bool
+    polarity: np.ndarray
+
+
+def shapes(identified: Identified) -> MeasuredShapes:
+    """Ψ_r of R_r = Ψ_r ψ_rᵀ / (2i Im p_r): the first singular vectors of every residue.
+
+    Mass-normalised where an input is also an output (with either sign), Ψ_drive = ψ_drive.
+    """
+    A = identified.residues * (2j * identified.poles.imag)[:, None, None]
+    U, S, Vh = np.linalg.svd(A, full_matrices=False)
+    left, right = U[:, :, 0] * np.sqrt(S[:, :1]), Vh[:, 0] * np.sqrt(S[:, :1])
+    drive = _drive(identified)
+    if drive is None:
+        peak = np.take_along_axis(left, np.abs(left).argmax(axis=1)[:, None], axis=1)
+        factor = 1 / np.where(peak == 0, 1, peak)
+        turned = _turned(left * factor)
+        values = turned / np.abs(turned).max(axis=1, keepdims=True)
+        factor, polarity = np.ones_like(factor), np.ones(len(A))
+    else:
+        i, j, sign = drive
+        at_output, at_input = sign * left[:, i], right[:, j]
+        factor = np.sqrt(at_input / np.where(at_output == 0, 1, at_output) + 0j)[:, None]
+        values = left * factor
+        flip = np.where((values * values).sum(axis=1).real < 0, 1j, 1.0)[:, None]
+        values, factor = values * flip, factor * flip
+        polarity = np.where((sign * A[:, i, j]).real < 0, -1.0, 1.0)
+    return MeasuredShapes(
+        identified.outputs,
+        values.T,
+        (right / factor).T,
+        collinearity(values.T),
+        S[:, 0] ** 2 / np.maximum((S**2).sum(axis=1), 1e-300),
+        drive is not None,
+        polarity,
+    )
+
+
+def _drive(identified: Identified) -> tuple[int, int, int] | None:
+    """(output, input, relative sign) of the first dof that is both."""
+    try:
+        outputs = [parse(label) for label in identified.outputs]
+        inputs = [parse(label) for label in identified.inputs]
+    except LabelError:
+        same = [o for o in identified.outputs if o in identified.inputs]
+        if not same:
+            return None
+        return identified.outputs.index(same[0]), identified.inputs.index(same[0]), 1
+    for j, (node, component, sign) in enumerate(inputs):
+        for i, (n, c, s) in enumerate(outputs):
+            if (n, c) == (node, component):
+                return i, j, s * sign
+    return None
+
+
+def _turned(psi: np.ndarray) -> np.ndarray:
+    """Each row turned by the phase that makes Σ ψ² real and positive (r, n)."""
+    phase = 0.5 * np.angle((psi**2).sum(axis=1))
+    return np.asarray(psi * np.exp(-1j * phase)[:, None])
+
+
+def collinearity(psi: np.ndarray) -> np.ndarray:
+    """Modal phase collinearity |ψᵀψ|² / (ψᴴψ)² by mode: 1 for a normal mode (r,).
+
+    >>> collinearity(np.array([[1j, 1.0], [-2j, 1j]]))
+    array([1., 0.])
+    """
+    power = (np.abs(psi) ** 2).sum(axis=0)
+    return np.asarray(np.abs((psi**2).sum(axis=0)) ** 2 / np.maximum(power, 1e-300) ** 2)
+
+
+def modal_model(identified: Identified) -> ModalModel:
+    """Real modes over the measured dofs, for MAC and synthesis.
+
+    Raises
+    ------
+    LabelError
+        If an output is no single component (412:n), or there is no drive point to scale by.
+    """
+    found = shapes(identified)
+    if not found.scaled:
+        raise LabelError(
+            "no input is also an output, so the shapes have no scale; use shapes() for MAC"
+        )
+    dofs = np.array([parse(label) for label in identified.outputs])
+    return ModalModel(
+        identified.frequency,
+        identified.damping,
+        dofs[:, 2:] * found.values.real,
+        dofs[:, :2],
+    )
+
+
+def lines_per_bandwidth(identified: Identified, frequency: np.ndarray) -> np.ndarray:
+    """Lines within the half-power bandwidth 2 ζ f of each mode, over two: per half bandwidth (r,).
+
+    Three or more are needed for the damping (thesis, lines 1045-1051).
+    """
+    f, half = identified.frequency, identified.damping * identified.frequency
+    inside = (frequency >= (f - half)[:, None]) & (frequency <= (f + half)[:, None])
+    return np.asarray(inside.sum(axis=1) / 2)

@@ -1,0 +1,104 @@
+"""Screening: dead and incoherent channels, usable bands, linear or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.frf import FRF
+from chladni.ema.screening import homogeneity, roughness, runs, screen
+from chladni.errors import ShapeError
+
+F = np.arange(1.0, 401.0)
+LABELS = tuple(f"{k}:+Z" for k in range(5))
+
+
+def resonance(
+    stiffness: float = 1.0, noise: float = 0.01, seed: int = 0, given: bool = True
+) -> FRF:
+    """Five channels of one mode and a floor, with noise of a known size."""
+    rng = np.random.default_rng(seed)
+    f0 = 150 * np.sqrt(stiffness)
+    H = 1 / (f0**2 - F**2 + 0.04j * f0 * F)[:, None, None] * np.linspace(1, 2, 5)[None, :, None]
+    H = H + 1e-5
+    sd = noise * np.abs(H)
+    hiss = rng.normal(size=(2, *H.shape)) / np.sqrt(2)
+    H = H + sd * (hiss[0] + 1j * hiss[1])
+    return FRF(H, F, LABELS, ("9:+Z",), variance=sd**2 if given else None)
+
+
+def test_channels_that_cannot_be_used_are_named_with_the_reason() -> None:
+    H = resonance()
+    values, gamma = H.values.copy(), np.full(H.values.shape, 0.99)
+    values[:, 1] *= 1e-6
+    values[7, 2] = np.nan
+    gamma[:, 3] = 0.2
+    seen = screen(replace(H, values=values, coherence=gamma))
+    assert seen.outputs == ("0:+Z", "4:+Z")
+    assert [why.split()[0].strip(":") for why in seen.dropped.values()] == [
+        "dead",
+        "1",
+        "incoherent",
+    ]
+
+
+def test_bands_come_from_the_coherence_and_antiresonances_stay_in() -> None:
+    gamma = np.ones((400, 5, 1))
+    gamma[:20] = 0.3  # below 21 Hz the exciter gives nothing
+    gamma[199:202] = 0.1  # a narrow dip at 200 Hz
+    gamma[299:340] = 0.3  # a wide one
+    seen = screen(replace(resonance(), coherence=gamma))
+    assert seen.bands == ((21.0, 299.0), (340.0, 400.0)) or seen.bands == (
+        (21.0, 299.0),
+        (341.0, 400.0),
+    )
+    assert seen.lines[200]
+
+
+def test_noise_is_seen_in_the_roughness() -> None:
+    """The estimate from one recording is the variance that was put in, beside the resonance."""
+    H = resonance(noise=0.02, seed=4, given=False)
+    due = (0.02 * np.abs(H.values)) ** 2
+    away = np.abs(F - 150) > 30
+    assert np.median((roughness(H) / due)[away]) == pytest.approx(1.0, rel=0.25)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_repeats_of_a_linear_structure_differ_by_noise(given: bool) -> None:
+    result = homogeneity(resonance(seed=1, given=given), resonance(seed=2, given=given))
+    assert result.linear
+    if given:
+        assert result.ratio == pytest.approx(1.0, abs=5 / np.sqrt(2000))
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_structure_that_stiffens_with_the_level_is_found(given: bool) -> None:
+    """2 % in stiffness between the levels; the lines that show it lie about the resonance."""
+    result = homogeneity(resonance(seed=1, given=given), resonance(1.02, seed=2, given=given))
+    assert not result.linear
+    assert abs(result.frequency[result.line.argmax()] - 150) < 15
+
+
+def test_significant_but_negligible_is_linear() -> None:
+    """With hardly any noise a thousandth of a per cent is significant; it still is no effect."""
+    result = homogeneity(resonance(noise=1e-6, seed=1), resonance(1.00001, noise=1e-6, seed=2))
+    assert result.ratio > 10
+    assert result.linear
+
+
+def test_levels_on_other_lines_are_interpolated() -> None:
+    H = resonance(noise=1e-4)
+    finer = replace(H, frequency=F + 0.5, values=np.zeros_like(H.values))
+    f0 = 150.0
+    values = 1 / (f0**2 - (F + 0.5) ** 2 + 0.04j * f0 * (F + 0.5))[:, None, None]
+    finer = replace(finer, values=values * np.linspace(1, 2, 5)[None, :, None] + 1e-5)
+    result = homogeneity(H, finer)
+    assert result.rms < 5e-3
+    with pytest.raises(ShapeError, match="share 0 lines"):
+        homogeneity(H, replace(H, frequency=F + 1000))
+    with pytest.raises(ShapeError, match=r"FRF\.sel"):
+        homogeneity(H, H.sel(LABELS[:2]))
+
+
+def test_runs_of_lines() -> None:
+    assert runs(F[:5], np.array([True, False, True, True, True])) == ((3.0, 5.0),)
