@@ -1,8 +1,6 @@
 """The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
 
 import json
-from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -210,41 +208,19 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     assert (out / "poles.csv").read_text().startswith("mode,frequency_hz")
 
 
-def test_an_answer_becomes_json_pictures_and_a_page(case, tmp_path):
-    """Whatever a diagnosis answers is shown: typical channels, the marked place, the sentence."""
-    from chladni.cli.correlate import opened
-    from chladni.cli.diagnose import finished
-    from chladni.cli.run import started
-
-    def answering(held, folder, progress):
-        (folder / "updated.bdf").write_text("ENDDATA")
-        test = held.frfs[0]
-        effect = {"name": "point-mass", "where": {"text": "a corner", "grids": [1]}}
-        fit = {"Q_nominal": 0.2, "Q_calibrated": 0.1, "Q_with_effect": 0.01}
-        return SimpleNamespace(
-            diagnosis={
-                "verdict": "missing physics",
-                "effects": [effect],
-                "fit": {**fit, "held_out": fit},
-                "frequencies": [{"test_hz": 30.0, "before_hz": 31.0, "after_hz": 30.1}],
-            },
-            notes=("what was done",),
-            curves={"test": test, "before": replace(test, values=1.2 * test.values)},
-            held_out=test.outputs[:2],
-            mac=None,
-            exit_code=3,
-        )
-
-    out = tmp_path / "answer"
-    with started("diagnose", case, out) as job:
-        assert finished(job, *opened(case), answering, "Diagnosis") == 3
-    names = {p.name for p in out.iterdir()}
-    assert {"where.png", "frf_fitted.png", "frf_held_out.png", "waterfall.png"} < names
-    assert {"diagnosis.json", "report.html", "updated.bdf", "frequencies.png"} < names
-    assert json.loads((out / "diagnosis.json").read_text())["notes"] == ["what was done"]
-    page = (out / "report.html").read_text()
-    assert "The model lacks point-mass, a corner" in page
-    assert "what was done" in page
+def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
+    """The model's own responses are explained by the model; the answer is whole and readable."""
+    (case / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))
+    done = call("diagnose", case, "--out", tmp_path / "answer")
+    assert done.exit_code == 0, done.output
+    d = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
+    assert d["verdict"] in ("nothing missing", "calibration only")
+    assert d["effects"] == []
+    assert all("why_not" in a for a in d["alternatives"])
+    names = {p.name for p in (tmp_path / "answer").iterdir()}
+    assert {"report.html", "updated.bdf", "diagnosis.json", "evidence.png", "setup.png"} < names
+    modes = call("modes", tmp_path / "answer" / "updated.bdf", "--units", "SI", "--count", 14)
+    assert modes.exit_code == 0, modes.output
 
 
 def test_specimen_comes_back_as_a_deck(tmp_path):

@@ -1,1 +1,1 @@
-"""Find where a finite element model and a vibration recording differ, and name the missing physics."""
+"""Find where a finite element model and a recording differ, and name the missing physics."""

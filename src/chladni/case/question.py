@@ -6,8 +6,8 @@ import numpy as np
 
 from ..errors import FileError
 from ..updating.calibration import Weighing
-from ..updating.prepare import Places as Sites
-from ..updating.prepare import Question
+from ..updating.question import Places as Sites
+from ..updating.question import Question
 from .load import Case
 from .places import Places
 

@@ -1,6 +1,7 @@
 """The changes that turn one assembly's deck into another's: what was repaired, and only that."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -141,10 +142,7 @@ def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
 
 def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CONM2 of every mass that was added, offset where it sits beside its grid."""
-    used = [int(after.shells.ids.max(initial=0)), int(after.masses.ids.max(initial=0))]
-    first = 1 + max(
-        used + [int(after.beams.ids.max(initial=0)), int(after.springs.ids.max(initial=0))]
-    )
+    first = _free_id(after)
     for k in range(len(before.masses), len(after.masses)):
         M = after.masses.matrix[k]
         m = M[0, 0]
@@ -156,9 +154,18 @@ def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
 def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CELAS2 of every spring that was added."""
     s, n = after.springs, len(before.springs)
-    used = [after.shells.ids, after.masses.ids, after.beams.ids, before.springs.ids]
-    first = 1 + max(int(a.max(initial=0)) for a in used) + len(after.masses)
+    first = _free_id(after) + len(after.masses)
     unit = units.force / units.length
     for k in range(n, len(s)):
         grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
         yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
+
+
+def _free_id(assembly: Assembly) -> int:
+    """An element id above all that are used."""
+    families: list[Any] = [
+        assembly.shells, assembly.beams, assembly.springs, assembly.dampers, assembly.bushes,
+        assembly.masses, assembly.scalar_masses, *assembly.solids,
+    ]  # fmt: skip
+    rigid = max((r.id for r in assembly.rigid), default=0)
+    return 1 + max(rigid, *(int(f.ids.max(initial=0)) for f in families))

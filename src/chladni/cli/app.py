@@ -11,17 +11,17 @@ from ..errors import AccuracyError, ChladniError
 
 COMMANDS = (  # each a module here with a function ``run``
     "diagnose",
-    "calibrate",
     "demo",
-    "study",
+    "calibrate",
+    "correlate",
+    "identify",
     "modes",
     "frf",
     "render",
     "plan",
-    "identify",
-    "correlate",
-    "report",
     "specimen",
+    "study",
+    "report",
 )
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
 

@@ -17,8 +17,10 @@ from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
+from ..updating.likelihood import Responses
 from ..updating.outcome import Models, as_dict, models, rms
-from ..updating.prepare import Prepared, Question, prepare, renewed
+from ..updating.prepare import prepare, renewed
+from ..updating.question import Prepared, Question
 from .case_model import DAMPING, markers, model_frf
 from .figures import Shown, figures
 from .frf import REACH
@@ -109,9 +111,10 @@ def shown(case: Case, prepared: Prepared, stages: Models) -> Shown:
 
 
 def _held(prepared: Prepared, case: Case) -> list[bool]:
-    use = prepared.search.data.use
-    n = len(case.outputs.labels)
-    return [not use[:, k].any() for k in range(n)] if use.ndim == 2 else [False] * n
+    data, n = prepared.search.data, len(case.outputs.labels)
+    if not isinstance(data, Responses):
+        return [False] * n
+    return [not data.use[:, k].any() for k in range(n)]
 
 
 def _response(case: Case, made: Assembly, test: FRF) -> FRF:

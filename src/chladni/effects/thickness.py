@@ -103,5 +103,6 @@ def thickness_distribution(
         unknown, f"on {name}", (name,), places=places,
         position=position, inside=(sheet.part == position).astype(float), centre=sheet.centre,
         plane=plane, origin=origin, size=size, variance=sheet.area / 12,
-        structure_points=sheet.structure.assembly.points, structure_ids=sheet.structure.assembly.ids,
+        structure_points=sheet.structure.assembly.points,
+        structure_ids=sheet.structure.assembly.ids,
     )  # fmt: skip

@@ -139,7 +139,7 @@ class Bushes:
 
 @dataclass(frozen=True, eq=False)
 class Masses:
-    """Concentrated masses: a 6 x 6 matrix at each node in the basic frame (offset included) [SI]."""
+    """Concentrated masses: 6 x 6 at each node in the basic frame, offset included [SI]."""
 
     ids: np.ndarray = field(default_factory=_no_rows)
     node: np.ndarray = field(default_factory=_no_rows)

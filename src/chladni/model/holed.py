@@ -1,5 +1,7 @@
 """A flat plate with a round hole, meshed so that a finer mesh holds every node of a coarser one."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from .assembly import Assembly
@@ -46,8 +48,7 @@ def holed_plate(
 def _ticks(stops: list[float], h: float, times: int) -> np.ndarray:
     """Coordinates through all stops, pieces of about h, each cut ``times``."""
     pieces = [
-        np.linspace(a, b, times * max(1, round((b - a) / h)) + 1)[:-1]
-        for a, b in zip(stops[:-1], stops[1:], strict=True)
+        np.linspace(a, b, times * max(1, round((b - a) / h)) + 1)[:-1] for a, b in pairwise(stops)
     ]
     return np.append(np.concatenate(pieces), stops[-1])
 

@@ -153,4 +153,4 @@ class Part:
 
     def with_section(self, **changes: object) -> Self:
         """The same part with other section values."""
-        return replace(self, section=replace(self.section, **changes))
+        return replace(self, section=replace(self.section, **changes))  # type: ignore[arg-type]

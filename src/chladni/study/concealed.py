@@ -122,7 +122,7 @@ def _layout(
 
 
 def _ordinary(article: Assembly, effect: str, rng: np.random.Generator) -> Assembly:
-    """E and rho off by 1 %; for "calibration" one of E, rho, t off by up to 10 %; exact for "nothing"."""
+    """E and rho off by 1 %; for "calibration" one of E, rho, t by up to 10 %; else exact."""
     scale = {q: float(np.exp(0.01 * rng.normal())) for q in ("E", "rho")} | {"t": 1.0}
     if effect == "nothing":
         scale = dict.fromkeys(scale, 1.0)
@@ -156,19 +156,19 @@ def _concealed(
     if effect in ("nothing", "calibration"):
         return article, {}, gains
     if effect == "sensor-fault":
-        k = int(rng.integers(len(outputs)))
-        gains[k] = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0, -1.3]))
-        return article, {"channel": f"{outputs[k]}:+Z", "value": gains[k]}, gains
+        at = int(rng.integers(len(outputs)))
+        gains[at] = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0, -1.3]))
+        return article, {"channel": f"{outputs[at]}:+Z", "value": float(gains[at])}, gains
     if effect == "orthotropic-material":
         return *_grained(article, rng), gains
     if effect == "thickness-distribution":
         return *_thinned(article, rng), gains
     if effect == "sensor-mass":
-        m = float(rng.uniform(0.0025, 0.006)) * weight
-        return _at(article, deck, outputs, points.with_masses, m), {"value": m}, gains
+        each = float(rng.uniform(0.0025, 0.006)) * weight
+        return _at(article, deck, outputs, points.with_masses, each), {"value": each}, gains
     if effect == "suspension":
-        k = float(np.exp(rng.uniform(np.log(800), np.log(6000))))
-        return _at(article, deck, hangers, _springs, k), {"value": k}, gains
+        K = float(np.exp(rng.uniform(np.log(800), np.log(6000))))
+        return _at(article, deck, hangers, _springs, K), {"value": K}, gains
     used = np.unique(deck.shells.nodes)
     spot = int(rng.choice(used))
     truth: dict[str, Any] = {"point_m": deck.points[spot].tolist()}

@@ -72,6 +72,7 @@ def summary(rows: Sequence[Row]) -> str:
         ratios = [r["ratio"] for r in mine if r["right"] and r["ratio"] is not None]
         if ratios:
             half = sum(q <= 0.5 for q in ratios)
-            text += f"; held-out Q halved {half} of {len(ratios)}, median x {np.median(ratios):.2f}"
+            text += f"; held-out Q halved {half} of {len(ratios)}"
+            text += f", median x {np.median(ratios):.2f}"
         lines.append(text)
     return "\n".join(lines)

@@ -88,7 +88,7 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
         base, starts = bases[-1], effect.starts()
         several = 1
         if isinstance(search.data, Poles) and len(effect.parameters) > 2:
-            starts, several = [*starts, *_draws(effect, 2048)], 6  # pairing makes many valleys
+            starts, several = [*starts, *_draws(effect, 1024)], 6  # pairing makes many valleys
         for scores in _scores(search, base, effect, starts):
             out += [(effect, starts[k], base.x) for k in np.argsort(scores)[:several]]
     return out
@@ -143,7 +143,7 @@ def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Local thinning: its slope at every group and radius, the two best places per baseline."""
     sheet = search.bench.sheet
     shapes = [
-        (k, g, np.array([-2.0, np.log(radius), *_flat(sheet, k, g)]))
+        (k, g, np.array([-2.0, np.log(radius), *_flat(sheet, int(k), int(g))]))
         for k in np.unique(sheet.part)
         for g in np.flatnonzero(sheet.part == k)
         for radius in RADII

@@ -13,9 +13,9 @@ from ..ema.pairing import pair
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
-from .diagnosis import THRESHOLD, Diagnosis
+from .diagnosis import Diagnosis, threshold
 from .likelihood import Poles, Responses
-from .prepare import Prepared, Question
+from .question import Prepared, Question
 from .reduced import State, evaluate
 from .search import Search, Trial, deck_state
 
@@ -145,7 +145,7 @@ def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
     if not named:
         return (
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
-            f"{THRESHOLD:.0f} are needed before anything is named"
+            f"{threshold(trial.data):.0f} are needed before anything is named"
         )
     gap = (trial.S - best.S) / 2
     return (
@@ -160,7 +160,7 @@ def frequency_table(
     stages: Sequence[tuple[str, Assembly]],
     real: np.ndarray | None = None,
 ) -> list[dict[str, float | None]]:
-    """Identified frequencies beside those of every stage, by full models: before_hz, mac_before ..."""
+    """Identified frequencies beside those of every stage, by full models: before_hz ..."""
     test, shapes = _test_modes(prepared)
     if not len(test):
         return []
@@ -249,7 +249,7 @@ def as_dict(
             **fitted.as_dict(),
             "held_out": {**held.as_dict(), "what": prepared.what},
             "gain_over_calibration": None if found is None else diagnosis.gain(found),
-            "threshold": THRESHOLD,
+            "threshold": threshold(last.data),
         },
         "calibrated": [
             {"where": e.text, **row}

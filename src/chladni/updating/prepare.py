@@ -6,25 +6,23 @@ here, before anything is fitted.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..dynamics.frf import FRF
 from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.material import OrthotropicMaterial
 from ..effects.mesh import jitter, mesh_error
 from ..effects.ordinary import PartScale, gain, ordinary, scatter
-from ..ema.identification import Identified, equalised, identify
-from ..errors import FileError
+from ..ema.identification import equalised, identify
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
-from ..fem.locate import locate, rows_at
-from ..model.assembly import Assembly
-from .calibration import Weighing, fit
+from .calibration import fit
+from .frequencies import band_of, counted, frequencies, widened
 from .likelihood import LN10, Poles, Responses
+from .question import Prepared, Question
 from .search import Search, Trial
 from .workbench import Workbench, workbench
 
@@ -32,101 +30,6 @@ ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough 
 ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
-
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Measured or driven dofs on the structure: grids, or free points on the nearest shell.
-
-    Attributes
-    ----------
-    labels : (k,) text
-    grids : (k,) int        id, 0 where the place is no grid
-    points : (k, 3)         [m]
-    directions : (k, 3)     unit vectors, basic frame
-    sd : (k,)               uncertainty of the place [m]
-    """
-
-    labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    sd: np.ndarray
-
-    def rows(self, built: Structure) -> sp.csr_array:
-        """Rows over the free dofs of the structure (k, n)."""
-        out = sp.lil_array((len(self.labels), built.T.shape[1]))
-        at = np.flatnonzero(self.grids > 0)
-        if len(at):
-            out[at] = built.along(self.grids[at], self.directions[at])
-        free = np.flatnonzero(self.grids <= 0)
-        if len(free):
-            out[free] = _on_shell(built, self.points[free], self.directions[free])
-        return sp.csr_array(out)
-
-    def around(self, built: Structure) -> sp.csr_array:
-        """Rows at each place and four more, two standard deviations away in the sheet."""
-        rows = [self.rows(built)]
-        uncertain = np.flatnonzero(self.sd > 0)
-        for k in uncertain:
-            n = self.directions[k]
-            e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
-            e1 /= np.linalg.norm(e1)
-            e2 = np.cross(n, e1)
-            step = 1.4 * self.sd[k]
-            near = self.points[k] + step * np.array([e1, -e1, e2, -e2])
-            rows.append(_on_shell(built, near, np.tile(n, (4, 1))))
-        return sp.csr_array(sp.vstack(rows))
-
-
-def _on_shell(built: Structure, points: np.ndarray, directions: np.ndarray) -> sp.csr_array:
-    assembly = built.assembly
-    return rows_at(built, locate(assembly.points, assembly.shells.nodes, points), directions)
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Everything a diagnosis is asked with (SI, Hz).
-
-    ``held_sensors`` and ``held_band`` are never fitted; None: chosen here.
-    """
-
-    assembly: Assembly
-    outputs: Places
-    inputs: Places
-    frf: FRF | None = None
-    frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
-    frequency_sd: np.ndarray | None = None  # [Hz]
-    weighing: Weighing | None = None
-    hangers: tuple[int, ...] = ()
-    band: tuple[float, float] = (0.0, np.inf)
-    exclude: tuple[tuple[float, float], ...] = ()
-    held_sensors: tuple[str, ...] | int | None = None
-    held_band: tuple[float, float] | None = None
-    gain_known: bool = True
-    parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()  # (field, parts) the user frees
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A search and what scores it.
-
-    Attributes
-    ----------
-    search : what the diagnosis works with
-    score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
-    held : samples held out, in the shape of ``score.use``
-    what : the held-out data in words
-    notes : how the recording was read, and why
-    """
-
-    search: Search
-    score: Responses | Poles
-    held: np.ndarray
-    what: str
-    notes: tuple[str, ...]
-    identified: Identified | None = None
-    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
 
 
 def prepare(question: Question) -> Prepared:
@@ -140,17 +43,14 @@ def prepare(question: Question) -> Prepared:
     return _by_responses(question)
 
 
-# -- responses ------------------------------------------------------------------------------------
-
-
 def _by_responses(question: Question) -> Prepared:
     frf = question.frf
     assert frf is not None
-    low, high = _band(question, frf)
+    low, high = band_of(question, frf)
     held_band = question.held_band or _upper_part(question, low, high)
     fit_top = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
-    found = identify(frf, _widened(frf, reach), use=_counted(frf, question.exclude))
+    found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
     built = structure(question.assembly)
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
@@ -190,7 +90,7 @@ def _by_responses(question: Question) -> Prepared:
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
         f"both sides were given {ZETA:.0%} damping to search and {ZETA_Q:.0%} to report Q "
-        "(damping equalisation), so that no modes need pairing and damping cannot pose as stiffness",
+        "(damping equalisation): no modes need pairing and damping cannot pose as stiffness",
     ]
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
@@ -198,35 +98,9 @@ def _by_responses(question: Question) -> Prepared:
     return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found)
 
 
-def _band(question: Question, frf: FRF) -> tuple[float, float]:
-    low = max(question.band[0], float(frf.frequency[frf.frequency > 0][0]))
-    high = min(question.band[1], float(frf.frequency[-1]))
-    if high <= low:
-        raise FileError(
-            f"the band {question.band[0]:g}-{question.band[1]:g} Hz holds no line of the recording "
-            f"({frf.frequency[0]:g}-{frf.frequency[-1]:g} Hz)"
-        )
-    return low, high
-
-
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
     """The uppermost fifth of the band, held out where the user names none."""
     return high - 0.2 * (high - low), high
-
-
-def _widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
-    """A little more than the band, so that modes at its ends are whole."""
-    width = 0.04 * (band[1] - band[0])
-    return max(float(frf.frequency[0]), band[0] - width), min(
-        float(frf.frequency[-1]), band[1] + width
-    )
-
-
-def _counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
-    use = np.ones(len(frf.frequency), bool)
-    for a, b in exclude:
-        use &= (frf.frequency < a) | (frf.frequency > b)
-    return use
 
 
 def _lines(
@@ -280,11 +154,8 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
     return out
 
 
-# -- poles ----------------------------------------------------------------------------------------
-
-
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
-    frequency, sd, strength, found, notes = _frequencies(question, uncertain)
+    frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
     built = structure(question.assembly)
     bench = workbench(question.assembly, top, built=built, groups=48)
@@ -295,7 +166,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
         held[-max(1, len(frequency) // 5) :] = True
     rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
     rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
-    band = question.band if question.frf is None else _band(question, question.frf)
+    band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
     ).over(bench.model)
@@ -304,75 +175,6 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     what = f"the {int(held.sum())} highest of {len(held)} frequencies"
     notes = (*notes, *_mass_note(question))
     return Prepared(search, data, held, what, notes, found, ~held)
-
-
-def _frequencies(
-    question: Question, uncertain: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, Identified | None, tuple[str, ...]]:
-    """Natural frequencies of the test, standard deviations [Hz], relative peak heights."""
-    frf = question.frf
-    if frf is None:
-        assert question.frequency is not None
-        sd = question.frequency_sd
-        f = np.asarray(question.frequency, float)
-        sd = np.full(len(f), np.nan) if sd is None else sd
-        inside = (f >= question.band[0]) & (f <= question.band[1])
-        order = np.argsort(f[inside])
-        sd = np.where(np.isnan(sd), 1e-3 * f, sd)
-        note = "no FRF exists: natural frequencies were compared"
-        return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
-    band = _band(question, frf)
-    found = identify(frf, _widened(frf, band), use=_counted(frf, question.exclude))
-    f = found.frequency
-    keep = _prominent(found, band)
-    why = []
-    if not question.gain_known:
-        why.append("the gain is unknown")
-    if uncertain:
-        why.append("the places of the sensors are uncertain")
-    note = (
-        f"{' and '.join(why).capitalize() or 'by wish'}, so natural frequencies were compared, not "
-        f"FRFs: {int(keep.sum())} modes of {found.order} identified between {band[0]:g} and "
-        f"{band[1]:g} Hz; model modes that the sensors can hardly see may stay without a partner"
-    )
-    peak = _peaks(found)[keep]
-    sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
-    return f[keep], sd, peak / peak.max(), found, (note,)
-
-
-LEAST_GAIN = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
-TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
-SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
-FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
-
-
-def _peaks(found: Identified) -> np.ndarray:
-    """Height of each resonance in the accelerance, |R| ω / ζ ... up to a constant (r,)."""
-    return np.asarray(
-        np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
-    )
-
-
-def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
-    """Poles of the band that matter: clear gain, usual damping, the strongest at its resonance."""
-    f, peak = found.frequency, _peaks(found)
-    keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
-    if not keep.any():
-        raise FileError(
-            f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz"
-        )
-    usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
-    keep &= found.damping < max(0.005, 4 * usual)
-    for i in np.flatnonzero(keep):
-        apart = np.abs(np.log(f / f[i]))
-        over = ((apart < TWIN) & (peak > peak[i])) | (
-            (apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i])
-        )
-        keep[i] = not np.any(over & keep) and peak[i] > FAINTEST * peak[keep].max()
-    return keep
-
-
-# -- both -----------------------------------------------------------------------------------------
 
 
 def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:

@@ -9,7 +9,7 @@ from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.somewhere import Somewhere
 from .calibration import Fit, Weighing, fit
-from .likelihood import Data, Poles
+from .likelihood import Data, Poles, Responses
 from .reduced import Reduced, State, evaluate
 from .workbench import Workbench
 
@@ -47,7 +47,7 @@ class Search:
     """
 
     bench: Workbench
-    data: Data
+    data: Responses | Poles
     weighing: Weighing | None
     base: tuple[Effect, ...]
     nuisance: tuple[Effect, ...]

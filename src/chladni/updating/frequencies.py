@@ -1,0 +1,104 @@
+"""Natural frequencies of a test: which identified poles are modes, and how far they are known."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.identification import Identified, identify
+from ..errors import FileError
+from .question import Question
+
+
+def frequencies(
+    question: Question, uncertain: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Identified | None, tuple[str, ...]]:
+    """Natural frequencies of the test, standard deviations [Hz], relative peak heights."""
+    frf = question.frf
+    if frf is None:
+        assert question.frequency is not None
+        sd = question.frequency_sd
+        f = np.asarray(question.frequency, float)
+        sd = np.full(len(f), np.nan) if sd is None else sd
+        inside = (f >= question.band[0]) & (f <= question.band[1])
+        order = np.argsort(f[inside])
+        sd = np.where(np.isnan(sd), 1e-3 * f, sd)
+        note = "no FRF exists: natural frequencies were compared"
+        return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
+    band = band_of(question, frf)
+    found = identify(frf, widened(frf, band), use=counted(frf, question.exclude))
+    f = found.frequency
+    keep = _prominent(found, band)
+    why = []
+    if not question.gain_known:
+        why.append("the gain is unknown")
+    if uncertain:
+        why.append("the places of the sensors are uncertain")
+    note = (
+        f"{' and '.join(why).capitalize() or 'by wish'}, so natural frequencies were compared, not "
+        f"FRFs: {int(keep.sum())} modes of {found.order} identified between {band[0]:g} and "
+        f"{band[1]:g} Hz; model modes that the sensors can hardly see may stay without a partner"
+    )
+    peak = _peaks(found)[keep]
+    sd = np.maximum(found.frequency_sd[keep], 1e-4 * f[keep])
+    return f[keep], sd, peak / peak.max(), found, (note,)
+
+
+LEAST_GAIN = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
+TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
+SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
+FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
+
+
+def _peaks(found: Identified) -> np.ndarray:
+    """Height of each resonance in the accelerance, |R| ω / ζ ... up to a constant (r,)."""
+    return np.asarray(
+        np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
+    )
+
+
+def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
+    """Poles of the band that matter: clear gain, usual damping, the strongest at its resonance."""
+    f, peak = found.frequency, _peaks(found)
+    keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
+    if not keep.any():
+        raise FileError(
+            f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz"
+        )
+    usual = float(np.median(found.damping[keep & (peak > 0.1 * peak[keep].max())]))
+    keep &= found.damping < max(0.005, 4 * usual)
+    for i in np.flatnonzero(keep):
+        apart = np.abs(np.log(f / f[i]))
+        over = ((apart < TWIN) & (peak > peak[i])) | (
+            (apart < SHADOW[0]) & (peak > SHADOW[1] * peak[i])
+        )
+        keep[i] = not np.any(over & keep) and peak[i] > FAINTEST * peak[keep].max()
+    return keep
+
+
+def band_of(question: Question, frf: FRF) -> tuple[float, float]:
+    """The band to fit, within the recording [Hz]."""
+    low = max(question.band[0], float(frf.frequency[frf.frequency > 0][0]))
+    high = min(question.band[1], float(frf.frequency[-1]))
+    if high <= low:
+        raise FileError(
+            f"the band {question.band[0]:g}-{question.band[1]:g} Hz holds no line of the recording "
+            f"({frf.frequency[0]:g}-{frf.frequency[-1]:g} Hz)"
+        )
+    return low, high
+
+
+def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
+    """A little more than the band, so that modes at its ends are whole."""
+    width = 0.04 * (band[1] - band[0])
+    return max(float(frf.frequency[0]), band[0] - width), min(
+        float(frf.frequency[-1]), band[1] + width
+    )
+
+
+def counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Lines of the recording that are in no gap (n_f,) bool."""
+    use = np.ones(len(frf.frequency), bool)
+    for a, b in exclude:
+        use &= (frf.frequency < a) | (frf.frequency > b)
+    return use
