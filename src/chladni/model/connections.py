@@ -229,18 +229,29 @@ def _facing(
     return start, axis, height
 
 
+def _centred(
+    start: np.ndarray, axis: np.ndarray, distance: np.ndarray, height: float | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The axes cut to a height in the middle of the distance; None leaves all of it."""
+    h = distance if height is None else np.full(len(start), height)
+    return start + axis * ((distance - h) / 2)[:, None], axis, h
+
+
 def spot_welds(
     assembly: Assembly,
     places: np.ndarray,
     sheets: tuple[Sheet, Sheet] | None = None,
     *,
     side: float = 0.005,
+    height: float | None = None,
     material: Isotropic = MASSLESS_STEEL,
     patch: float = 0.0,
     reach: float = REACH,
     name: str = "spot welds",
 ) -> Joined:
     """A hexahedron of the nugget's size at each place (k, 3), across the sheets' distance.
+
+    With `height` the solid has that height in the middle of the distance: spots of mastic.
 
     Without `sheets` each place joins the two parts nearest to it. `patch` holds the sheets over a
     disc of that radius instead of over the nearest shell, which makes the weld's stiffness
@@ -255,7 +266,7 @@ def spot_welds(
         a, b = (Surface.of(assembly, s) for s in these)
         for surface in (a, b):
             surface.within(surface.feet(places[mine]), places[mine], reach)
-        corners = _nuggets(*_facing(assembly, places[mine], a, b), side)
+        corners = _nuggets(*_centred(*_facing(assembly, places[mine], a, b), height), side)
         assembly, joints = hexahedra(
             assembly,
             corners,
@@ -304,9 +315,7 @@ def adhesive_bead(
     line = followed(np.asarray(line, dtype=float), pitch)
     for surface in (a, b):
         surface.within(surface.feet(line), line, reach)
-    start, axis, distance = _facing(assembly, line, a, b)
-    h = distance if height is None else np.full(len(line), height)
-    start = start + axis * ((distance - h) / 2)[:, None]
+    start, axis, h = _centred(*_facing(assembly, line, a, b), height)
     along = _tangent(line)
     across = np.cross(axis, along)
     across *= width / 2 / np.linalg.norm(across, axis=1, keepdims=True)

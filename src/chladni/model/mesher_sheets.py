@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import ModelError
+from .mesher import strip
 from .mesher_pairing import edges_of, split_folded
 
 Depth = Callable[[np.ndarray], np.ndarray]  # planform (n, 2) -> depth (n,) [m]
@@ -93,6 +94,12 @@ class Patches:
         points = surface(plan)
         quads, source = split_folded(points, quads)
         return Sheet(name, plan, points, quads, np.concatenate(self.zones)[source])
+
+
+def fold(out: Patches, edge: np.ndarray, back: np.ndarray, gap: float, *, closed: bool) -> None:
+    """Base of a hem's U below the outer sheet's edge (n, 2) and the flange folded back inboard."""
+    out.add(strip([edge, edge], closed=closed), np.repeat([2 * gap, 0.0], len(edge)), BASE)
+    out.add(strip([back, edge], closed=closed), 2 * gap, FOLD)
 
 
 def _joined(points: np.ndarray, tolerance: float) -> np.ndarray:

@@ -20,7 +20,7 @@ from .mesher_curves import (
     rounded,
     stadium,
 )
-from .mesher_sheets import BASE, FOLD, Patches, Sheet, mirrored
+from .mesher_sheets import Patches, Sheet, fold, mirrored
 from .tailgate_shape import Skin
 
 INNER, OUTER_UPPER, OUTER_LOWER = "inner", "outer upper", "outer lower"
@@ -154,10 +154,7 @@ def _inner_features(skin: Skin) -> list[np.ndarray]:
 def _folded(out: Patches, skin: Skin, arc: np.ndarray) -> None:
     """Base of the hem's U and the flange folded back under the sheet, along an open arc."""
     d = skin.design
-    under = np.full(2 * len(arc), 2 * d.gap)
-    out.add(strip([arc, arc], closed=False), np.repeat([2 * d.gap, 0.0], len(arc)), BASE)
-    back = skin.outline.offset(arc, d.hem_width)
-    out.add(strip([back, arc], closed=False), under, FOLD)
+    fold(out, arc, skin.outline.offset(arc, d.hem_width), d.gap, closed=False)
 
 
 def outer_upper_panel(skin: Skin, edge: Borders) -> Sheet:

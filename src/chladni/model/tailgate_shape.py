@@ -9,16 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import readonly
 from .mesher_curves import Loop, resampled, rounded
+from .mesher_surface import CrownedSurface, ramp
 from .tailgate_design import TailgateDesign
 
 _SPACING = 0.5e-3  # of outline and window when they are measured from
-
-
-def ramp(x: np.ndarray) -> np.ndarray:
-    """min(max(x, 0), 1)."""
-    return np.clip(x, 0.0, 1.0)
 
 
 def _bowed(y: np.ndarray, half: float) -> np.ndarray:
@@ -49,14 +44,14 @@ class Skin:
     ----------
     design : TailgateDesign
     outline, window, plateau : Loop
-    line : (4, n)   s, x, z and slope [rad] of the centre line
+    base : CrownedSurface
     """
 
     design: TailgateDesign
     outline: Loop
     window: Loop
     plateau: Loop
-    line: np.ndarray
+    base: CrownedSurface
 
     @classmethod
     def of(cls, design: TailgateDesign) -> Self:
@@ -66,31 +61,20 @@ class Skin:
             Loop.through(_outline(design), _SPACING),
             Loop.through(_window(design), _SPACING),
             Loop.through(rounded(design.plateau), _SPACING),
-            readonly(_centre_line(design)),
+            _base(design),
         )
 
     def at_size(self, size: float) -> Self:
         """The same skin to be meshed at another size."""
         return replace(self, design=replace(self.design, size=size))
 
-    def _crown(self, s: np.ndarray) -> np.ndarray:
-        bottom, top = (0.5 / r for r in self.design.radius)
-        return bottom + (top - bottom) * ramp(s / self.design.height)
+    def at(self, plan: np.ndarray) -> np.ndarray:
+        """Places (n, 3) of the planform points (y, s, depth)."""
+        return self.base.at(plan)
 
     def normal(self, plan: np.ndarray) -> np.ndarray:
         """Outward unit normals (n, 3) at (y, s)."""
-        y, s = plan[:, 0], plan[:, 1]
-        phi = np.interp(s, self.line[0], self.line[3])
-        n = np.column_stack([np.cos(phi), 2 * self._crown(s) * y, np.sin(phi)])
-        return n / np.linalg.norm(n, axis=1, keepdims=True)
-
-    def at(self, plan: np.ndarray) -> np.ndarray:
-        """Places (n, 3) of the planform points (y, s, depth)."""
-        y, s, depth = plan.T
-        x, z, phi = (np.interp(s, self.line[0], row) for row in self.line[1:])
-        drop = self._crown(s) * y**2
-        base = np.column_stack([x - drop * np.cos(phi), y, z - drop * np.sin(phi)])
-        return base - depth[:, None] * self.normal(plan)
+        return self.base.normal(plan)
 
     def outer_upper(self, plan: np.ndarray) -> np.ndarray:
         """Depth of the outer upper panel (n,): window rebate, joggle under the lower skin."""
@@ -171,15 +155,12 @@ class Skin:
         return on * (1 - w) + w * np.maximum(d.bracket_depth, on)
 
 
-def _centre_line(d: TailgateDesign) -> np.ndarray:
-    """s, x = -∫ sin φ, z = ∫ cos φ and φ along the centre line (4, n)."""
+def _base(d: TailgateDesign) -> CrownedSurface:
+    """The skin before any pressing: a steep lower part bent into a flat upper one."""
     s = np.linspace(-0.060, d.height + 0.080, 4001)
     k = ramp((s - d.bend[0] + d.bend[1]) / (2 * d.bend[1]))
     k = k**2 * (3 - 2 * k)
     low = d.slope[0] + (d.slope[1] - d.slope[0]) * np.clip(s / d.bend[0], -0.2, 1)
     up = np.clip((s - d.bend[0]) / (d.height - d.bend[0]), 0, 1.2)
     phi = np.deg2rad(low * (1 - k) + (d.slope[2] + (d.slope[3] - d.slope[2]) * up) * k)
-    step = s[1] - s[0]
-    x, z = -np.cumsum(np.sin(phi)) * step, np.cumsum(np.cos(phi)) * step
-    zero = np.argmin(np.abs(s))
-    return np.stack([s, x - x[zero], z - z[zero], phi])
+    return CrownedSurface.of(s, phi, d.radius, d.height)
