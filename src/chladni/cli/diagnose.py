@@ -18,7 +18,7 @@ from ..progress import Progress, within
 from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
 from ..updating.likelihood import Responses
-from ..updating.outcome import Models, as_dict, models, rms
+from ..updating.outcome import Models, as_dict, judged, models, rms
 from ..updating.prepare import prepare, renewed
 from ..updating.question import Prepared, Question
 from .case_model import DAMPING, markers, model_frf
@@ -52,7 +52,7 @@ def answer(job: Run, case: Case, search: bool = True) -> dict[str, Any]:
     found = diagnose(prepared.search, within(job.progress, 0.1, 0.8), search)
     if found.found is not None:
         first = renewed(asked, prepared, found.found)
-        found = replace(found, trials=(first, *found.trials[1:]))
+        found = judged(prepared, replace(found, trials=(first, *found.trials[1:])))
     stages = models(asked, found)
     job.progress("writing the deck", 0.82)
     updated = write_deck(

@@ -65,7 +65,7 @@ def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
     from ..study.concealed import SPECIMENS, made, write
     from ..study.score import scored
     from ..updating.diagnosis import diagnose
-    from ..updating.outcome import effect_entry, scores
+    from ..updating.outcome import effect_entry, judged, scores
     from ..updating.prepare import prepare
 
     name, effect, seed, place = job
@@ -74,7 +74,7 @@ def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
     write(made(SPECIMENS[name], effect, seed), folder, seal)
     try:
         prepared = prepare(question(opened(folder)))
-        found = diagnose(prepared.search)
+        found = judged(prepared, diagnose(prepared.search))
     except ChladniError as error:
         answer: dict[str, Any] = {"verdict": f"error: {error}", "effects": [], "held_out": None}
     else:

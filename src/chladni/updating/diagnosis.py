@@ -16,7 +16,7 @@ from ..effects.effect import Effect
 from ..effects.somewhere import Somewhere
 from .candidates import candidates, point_effect
 from .likelihood import Data, Poles, Responses
-from .search import ROUGH, Search, Trial, fitted
+from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 
 THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
 THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
@@ -32,7 +32,8 @@ class Diagnosis:
 
     Attributes
     ----------
-    nominal, null : fits without, and with ordinary parameters free
+    nominal, null : fits without, and with ordinary parameters free, scatter allowed in both
+    plain : ordinary parameters alone, as any calibration would; what Q is compared with
     trials : best trial of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
@@ -40,6 +41,7 @@ class Diagnosis:
 
     nominal: Trial
     null: Trial
+    plain: Trial
     trials: tuple[Trial, ...]
     verdict: str
     notes: tuple[str, ...] = ()
@@ -62,8 +64,9 @@ def diagnose(
     progress("calibration without new physics", 0.05)
     nominal = _base_trial(search, search.nuisance, _nominal_starts(search))
     null = _base_trial(search, search.base, _null_starts(search))
+    plain = _plain(search, null)
     if not effects:
-        return Diagnosis(nominal, null, (), verdict(nominal, null, ()))
+        return Diagnosis(nominal, null, plain, (), verdict(nominal, null, ()))
     progress("scan of the catalogue", 0.2)
     tried = candidates(search, null)
     trials = []
@@ -76,7 +79,7 @@ def diagnose(
     trials = _by_family([*trials, *(t for lead in trials[:RUNNING] for t in _closer(search, lead))])
     null = _restarted(search, null, trials)
     progress("verdict", 0.95)
-    return Diagnosis(nominal, null, tuple(trials), verdict(nominal, null, trials))
+    return Diagnosis(nominal, null, plain, tuple(trials), verdict(nominal, null, trials))
 
 
 def threshold(data: Data) -> float:
@@ -97,6 +100,16 @@ def _base_trial(search: Search, effects: Sequence[Effect], starts: list[np.ndarr
     model = search.bench.model
     fits = [fitted(model, effects, search.data, search.weighing, x) for x in starts]
     return Trial(Effect(), min(fits, key=lambda f: f.S), model)
+
+
+def _plain(search: Search, null: Trial) -> Trial:
+    """Ordinary parameters without scatter or jitter, from the same starts and from the null."""
+    kept = [e.name not in NEVER_WRITTEN for e in search.base]
+    chosen = [e for e, k in zip(search.base, kept, strict=True) if k]
+    inside = np.concatenate(
+        [np.full(len(e.parameters), k) for e, k in zip(search.base, kept, strict=True)]
+    ).astype(bool)
+    return _base_trial(search, chosen, [x[inside] for x in (*_null_starts(search), null.fit.x)])
 
 
 def _nominal_starts(search: Search) -> list[np.ndarray]:

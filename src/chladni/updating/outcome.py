@@ -1,7 +1,7 @@
 """A diagnosis in numbers: Q on fitted and held-out data, frequencies, alternatives."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..ema.pairing import pair
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, threshold
+from .diagnosis import Diagnosis, threshold, verdict
 from .likelihood import Poles, Responses
 from .question import Prepared, Question
 from .reduced import State, evaluate
@@ -35,7 +35,7 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     """Every stage written into the assembly."""
     found = diagnosis.found
     nothing = diagnosis.verdict == "nothing missing"
-    calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.null)
+    calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.plain)
     keep = found is not None and found.effect.kind != "test"
     final = applied(question.assembly, found) if keep and found is not None else calibrated
     return Models(question.assembly, calibrated, final)
@@ -72,10 +72,43 @@ def scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[Scores, Scores]:
     winner = diagnosis.found or diagnosis.null
     stages = _states(prepared.search, diagnosis, winner)
     out, real = [], real_poles(prepared, winner)
-    for use in (prepared.score.use, prepared.held):
+    for use in (prepared.score.use, held_out(prepared, winner)):
         values = [_data(prepared, trial).Q(state, use, real) for trial, state in stages]
         out.append(Scores(*values))
     return out[0], out[1]
+
+
+def held_out(prepared: Prepared, winner: Trial) -> np.ndarray:
+    """Samples the fit never saw; of a fault of one channel, that channel's alone."""
+    held = prepared.held
+    if not winner.effect.channels or held.ndim < 2:
+        return held
+    mine = np.isin(prepared.search.labels, winner.effect.channels)
+    own = held & mine
+    return own if own.any() else held
+
+
+VETO = 0.8  # held-out Q, over that of plain calibration, above which nothing is named
+
+
+def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """The verdict once the held-out data have been heard.
+
+    An effect that fits but does not help on data the fit never saw is not named.
+    """
+    if diagnosis.found is None:
+        return diagnosis
+    held = scores(prepared, diagnosis)[1]
+    if not held.effect > VETO * held.calibrated:
+        return diagnosis
+    lead = diagnosis.trials[0]
+    note = (
+        f"{lead.effect.name} gained {diagnosis.gain(lead):.0f} in -2 ln evidence but left the "
+        f"held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, so it is not "
+        "named"
+    )
+    plainly = verdict(diagnosis.nominal, diagnosis.null, ())
+    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note))
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
@@ -96,12 +129,15 @@ def _data(prepared: Prepared, trial: Trial) -> Responses | Poles:
 
 def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
     """Nominal, calibrated, with the effect; and the last with all it was fitted with."""
-    null = diagnosis.null
-    mean = search.mean()
-    nominal = evaluate(null.model, search.base, mean, False)
-    calibrated = evaluate(null.model, null.fit.effects, deck_state(null), False)
-    final = evaluate(winner.model, winner.fit.effects, deck_state(winner), False)
-    return [(null, nominal), (null, calibrated), (winner, final), (winner, winner.fit.state)]
+    null, plain = diagnosis.null, diagnosis.plain
+    nominal = evaluate(null.model, search.base, search.mean(), False)
+    final = plain.fit.state
+    if diagnosis.found is not None:
+        final = evaluate(winner.model, winner.fit.effects, deck_state(winner), False)
+    elif diagnosis.verdict == "nothing missing":
+        final = nominal
+    last = winner if diagnosis.found is not None else null
+    return [(null, nominal), (plain, plain.fit.state), (last, final), (last, last.fit.state)]
 
 
 def effect_entry(trial: Trial) -> dict[str, Any]:
@@ -231,6 +267,31 @@ def rms(rows: Sequence[dict[str, float | None]], key: str, first: int = FIRST) -
     return float(100 * np.sqrt(np.mean(d**2)))
 
 
+def structured(prepared: Prepared, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Is what calibration leaves structure or noise: its rms over the recording's own spread."""
+    plain = diagnosis.plain
+    if isinstance(prepared.score, Poles):
+        real = real_poles(prepared, diagnosis.found or diagnosis.null)
+        assert real is not None
+        left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * np.log(10)
+        known = 100 * float(np.median(prepared.score.sd[real]))
+        text = f"{left:.2g} % rms of the frequencies, which are known to {known:.1g} %"
+    else:
+        data = prepared.score.over(plain.model)
+        left = float(np.sqrt(data.Q(plain.fit.state, prepared.score.use)))
+        chi = 1.0 if prepared.identified is None else prepared.identified.chi
+        known = 0.01 * chi / np.log(10)
+        text = f"{left:.2g} decades rms, the recording is known to about {known:.1g}"
+    is_so = bool(left > 5 * known and diagnosis.found is not None)
+    end = "that is structured, not noise" if is_so else "nothing more can be read from that"
+    return {
+        "is": is_so,
+        "left": left,
+        "known": known,
+        "sentence": f"ordinary parameters alone leave {text}: {end}",
+    }
+
+
 def as_dict(
     question: Question, prepared: Prepared, diagnosis: Diagnosis, stages: Models
 ) -> dict[str, Any]:
@@ -241,13 +302,16 @@ def as_dict(
     every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
     rows = frequency_table(question, prepared, every, real_poles(prepared, last))
     weighing = question.weighing
+    what = prepared.what
+    if last.effect.channels:
+        what = f"channel {', '.join(last.effect.channels)} on the lines held out of {what}"
     return {
         "verdict": diagnosis.verdict,
         "effects": [] if found is None else [effect_entry(found)],
         "alternatives": alternatives(diagnosis),
         "fit": {
             **fitted.as_dict(),
-            "held_out": {**held.as_dict(), "what": prepared.what},
+            "held_out": {**held.as_dict(), "what": what},
             "gain_over_calibration": None if found is None else diagnosis.gain(found),
             "threshold": threshold(last.data),
         },
@@ -262,5 +326,6 @@ def as_dict(
             "model_kg": mass_properties(stages.final)[0],
         },
         "frequencies": rows,
-        "notes": [*prepared.notes, *diagnosis.notes],
+        "structured": structured(prepared, diagnosis),
+        "notes": [*prepared.notes, *diagnosis.notes, structured(prepared, diagnosis)["sentence"]],
     }
