@@ -187,6 +187,11 @@ def _plates(skin: HoodSkin) -> list[Sheet]:
     return sheets
 
 
+def pressings(skin: HoodSkin) -> dict[str, Sheet]:
+    """All sheets by name."""
+    return {s.name: s for s in (_outer(skin), _inner(skin), *_plates(skin))}
+
+
 def hood(design: HoodDesign | None = None) -> Assembly:
     """The assembly of this design."""
     return hood_specimen(design).assembly
@@ -196,7 +201,7 @@ def hood_specimen(design: HoodDesign | None = None) -> Specimen:
     """The assembly with its sheets and a report of its joints."""
     d = design or HoodDesign()
     skin = hood_skin(d)
-    sheets = {s.name: s for s in (_outer(skin), _inner(skin), *_plates(skin))}
+    sheets = pressings(skin)
     gauges = {OUTER: d.t_outer, INNER: d.t_inner, HINGES: d.t_plate, STRIKER: d.t_plate}
     parts = tuple(
         Part(k, name, ShellSection(t, STEEL, STEEL))
