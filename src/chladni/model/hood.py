@@ -172,7 +172,7 @@ def _inner(skin: HoodSkin) -> Sheet:
 
 
 def _plates(skin: HoodSkin) -> list[Sheet]:
-    d, h = skin.design, skin.design.size
+    d, h = skin.design, min(skin.design.size, 0.015)
     y, s, a, b = d.hinge
     sheets = []
     for name, y0, s0, u, v in (
@@ -187,6 +187,11 @@ def _plates(skin: HoodSkin) -> list[Sheet]:
     return sheets
 
 
+def pressings(skin: HoodSkin) -> dict[str, Sheet]:
+    """All sheets by name."""
+    return {s.name: s for s in (_outer(skin), _inner(skin), *_plates(skin))}
+
+
 def hood(design: HoodDesign | None = None) -> Assembly:
     """The assembly of this design."""
     return hood_specimen(design).assembly
@@ -196,7 +201,7 @@ def hood_specimen(design: HoodDesign | None = None) -> Specimen:
     """The assembly with its sheets and a report of its joints."""
     d = design or HoodDesign()
     skin = hood_skin(d)
-    sheets = {s.name: s for s in (_outer(skin), _inner(skin), *_plates(skin))}
+    sheets = pressings(skin)
     gauges = {OUTER: d.t_outer, INNER: d.t_inner, HINGES: d.t_plate, STRIKER: d.t_plate}
     parts = tuple(
         Part(k, name, ShellSection(t, STEEL, STEEL))
@@ -255,10 +260,12 @@ def mastic_places(skin: HoodSkin) -> np.ndarray:
     s = np.arange(d.mastic_pitch / 2, d.length, d.mastic_pitch)
     plan = np.stack(np.meshgrid(y, s, indexing="ij"), axis=-1).reshape(-1, 2)
     plan = plan[skin.outline.inside(plan)]
-    margin = d.mastic_spot[0] / 2
+    margin = d.mastic_spot[0]
     ok = (skin.outline.distance(plan) > sum(d.flange) + margin) & (skin.on_rib(plan, margin) == 0)
     for y0, s0, a, b in d.openings:
-        ok &= (np.abs(plan[:, 0] - y0) > a + margin) | (np.abs(plan[:, 1] - s0) > b + margin)
+        ok &= (np.abs(plan[:, 0] - y0) > a + margin / 2) | (
+            np.abs(plan[:, 1] - s0) > b + margin / 2
+        )
     return plan[ok]
 
 
@@ -276,7 +283,7 @@ def _mastic(skin: HoodSkin, made: Specimen) -> Joined:
         height=d.mastic_spot[1],
         material=Isotropic(d.mastic, 0.45, 1200.0, id=6),
         name="mastic",
-        reach=0.008,
+        reach=0.012,
     )
 
 

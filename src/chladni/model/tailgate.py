@@ -11,10 +11,11 @@ import numpy as np
 from .assembly import Assembly, Shells
 from .connections import Joined, Joint
 from .connections_bolts import accelerometers
+from .mesher_forming import corner_thickness
 from .mesher_sheets import Sheet
 from .properties import Part, ShellSection
 from .tailgate_design import STEEL, TailgateDesign
-from .tailgate_formed import corner_thickness, forming, nominal
+from .tailgate_formed import forming, nominal
 from .tailgate_joints import Frame, hem_strings, middle_string, screwed, tied_holes, welded
 from .tailgate_parts import pressings, without_side
 from .tailgate_shape import Skin

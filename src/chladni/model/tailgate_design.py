@@ -141,8 +141,8 @@ class TailgateDesign:
     accelerometers: int = 0  # how many, 5 g each
 
     def __post_init__(self) -> None:
-        if not 0.005 <= self.size <= 0.032:
-            raise ModelError(f"mesh size {self.size * 1e3:g} mm is not within 5 to 32 mm")
+        if not 0.0048 <= self.size <= 0.032:  # the inner panel's is 0.8 of the model's
+            raise ModelError(f"mesh size {self.size * 1e3:g} mm is not within 6 to 32 mm")
         for name, allowed in (("hem", HEMS), ("hem_stretch", STRETCHES)):
             if (value := getattr(self, name)) not in allowed:
                 raise ModelError(f"{name} is {value!r}; it may be {', '.join(allowed)}")
