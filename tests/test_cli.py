@@ -228,7 +228,7 @@ def test_specimen_comes_back_as_a_deck(tmp_path):
     out = tmp_path / "out"
     sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
     assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
-    done = call("modes", out / "deck.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
+    done = call("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
     assert done.exit_code == 0, done.output
     mass = json.loads((out / "modes.json").read_text())["mass_kg"]
     assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)

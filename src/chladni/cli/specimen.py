@@ -3,32 +3,36 @@
 import ast
 import inspect
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
+from ..meshing.curvature import Candidates
+from ..meshing.thickness import Mapped
 from ..model.assembly import Assembly
+from ..model.hood import HoodDesign, hood
+from ..model.hood_formed import hood_forming_mesh
+from ..model.mesher_formed import FormedMesh
 from ..model.plates import box, folded_panel, plate
-from ..model.tailgate import sensor_grids, tailgate
+from ..model.tailgate import tailgate
 from ..model.tailgate_design import TailgateDesign
+from ..model.tailgate_formed import forming_mesh
+from ..model.tailgate_shape import Skin
 from ..output import write_text
 from ..report.blocks import Facts, Picture
 from ..report.words import number
 from ..units import units as unit_system
-from .model import normals_at, on_faces
+from .model import on_faces
 from .run import Out, Run, started
-
-_CANDIDATES = 60
 
 
 def run(
-    name: Annotated[str, typer.Argument(help="tailgate, panel, box or plate.")],
+    name: Annotated[str, typer.Argument(help="tailgate, hood, panel, box or plate.")],
     size: Annotated[float | None, typer.Option(help="Element size [mm].", min=0.1)] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE in SI (repeatable).")
@@ -36,8 +40,10 @@ def run(
     units: Annotated[str, typer.Option(help="Unit system of the deck.")] = "mm-t-s",
     out: Out = None,
 ) -> None:
-    """A generated structure: a deck, its thickness element by element, candidates for sensors."""
+    """A generated structure: its deck, formed thickness (LS-DYNA), candidates for sensors."""
+    from ..meshing.dyna import write_keyword
     from ..meshing.nastran import write_assembly
+    from ..meshing.thickness import map_thickness
 
     system = unit_system(units)
     build = _builder(name)
@@ -45,40 +51,55 @@ def run(
         job.progress("meshing", 0.0)
         values = dict(_setting(text) for text in settings or [])
         made = build(size, values)
-        job.progress("writing", 0.5)
-        write_assembly(made, job.keep("deck.bdf", f"the deck, {units}"), system)
-        formed = _formed(name, size, values) if name == "tailgate" else made
-        write_text(job.keep("thickness.csv", "shell thickness after forming"), _thickness(formed))
-        grids = np.array(sensor_grids(made, min(_CANDIDATES, len(made.points))))
-        write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(grids))
-        _page(job, made, formed, grids)
+        job.progress("writing", 0.3)
+        write_assembly(made, job.keep(f"{name}.bdf", f"the deck, {units}"), system)
+        mapped = None
+        if name in _FORMED:
+            job.progress("forming", 0.4)
+            formed = _FORMED[name](values)
+            write_keyword(job.keep("formed_thickness.k", "thickness after forming"), formed, system)
+            mapped = map_thickness(made, formed)
+        job.progress("candidates for sensors", 0.7)
+        _page(job, made, mapped)
 
 
-def _page(job: Run, made: Assembly, formed: Assembly, grids: np.ndarray) -> None:
+def _page(job: Run, made: Assembly, mapped: Mapped | None) -> None:
+    from ..meshing.curvature import candidates
     from ..view import scene
     from ..view.surface import surface
 
-    mass, pressed = mass_properties(made)[0], mass_properties(formed)[0]
-    job.json(
-        "specimen.json", {"mass_kg": mass, "mass_formed_kg": pressed, "shells": len(made.shells)}
-    )
-    seen, at, n = surface(made), made.rows(grids), normals_at(made, grids)
+    places = candidates(made)
+    write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
+    after = mapped.assembly if mapped else made
+    mass, pressed = mass_properties(made)[0], mass_properties(after)[0]
+    facts: dict[str, Any] = {
+        "mass_kg": mass,
+        "mass_formed_kg": pressed,
+        "shells": len(made.shells),
+        "candidates": len(places.ids),
+        "mapping": [asdict(p) for p in mapped.parts] if mapped else [],
+    }
+    job.json("specimen.json", facts)
+    seen = surface(made)
     markers = [
-        scene.Marker(tuple(made.points[r].tolist()), tuple(d.tolist()), str(g))
-        for r, d, g in zip(at, n, grids, strict=True)
+        scene.Marker(tuple(x), tuple(n), str(g))
+        for x, n, g in zip(
+            places.points.tolist(), places.normal.tolist(), places.ids.tolist(), strict=True
+        )
     ]
-    t = on_faces(seen, formed.thickness())
+    t = on_faces(seen, after.thickness())
     pictures = [
         scene.sensors(job.keep("candidates.png", "candidates for sensors"), seen, markers),
         scene.thickness_map(job.keep("thickness.png", "shell thickness after forming"), seen, t),
     ]
-    facts = [
+    shown = [
         ("Shells", str(len(made.shells))),
         ("Grids", str(len(made.points))),
         ("Mass of the deck", f"{number(mass, 5)} kg"),
         ("Mass after forming", f"{number(pressed, 5)} kg"),
+        ("Candidates for sensors", str(len(places.ids))),
     ]
-    job.section("The structure", [Facts(facts), *[Picture(p) for p in pictures]])
+    job.section("The structure", [Facts(shown), *[Picture(p) for p in pictures]])
     job.lead = f"{job.source.name}: {len(made.shells)} shells, {number(mass, 4)} kg."
     job.say(job.lead)
 
@@ -95,7 +116,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _builder(name: str) -> Callable[[float | None, dict[str, Any]], Assembly]:
-    known = {"tailgate": _tailgate, "panel": _panel, "box": _box, "plate": _plate}
+    known = {"tailgate": _tailgate, "hood": _hood, "panel": _panel, "box": _box, "plate": _plate}
     if name not in known:
         raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
     return known[name]
@@ -105,10 +126,14 @@ def _tailgate(size: float | None, values: dict[str, Any]) -> Assembly:
     return tailgate(_made(TailgateDesign, _sized("size", size, values)))
 
 
-def _formed(name: str, size: float | None, values: dict[str, Any]) -> Assembly:
-    """The same design with the thickness that pressing leaves."""
-    design = _made(TailgateDesign, _sized("size", size, values))
-    return tailgate(replace(design, formed=True))
+def _hood(size: float | None, values: dict[str, Any]) -> Assembly:
+    return hood(_made(HoodDesign, _sized("size", size, values)))
+
+
+_FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
+    "tailgate": lambda values: forming_mesh(Skin.of(_made(TailgateDesign, values))),
+    "hood": lambda values: hood_forming_mesh(_made(HoodDesign, values)),
+}
 
 
 def _panel(size: float | None, values: dict[str, Any]) -> Assembly:
@@ -160,13 +185,9 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
         raise ModelError(f"a setting has the wrong kind of value: {error}") from error
 
 
-def _thickness(formed: Assembly) -> str:
+def _candidates(places: Candidates) -> str:
     rows = (
-        f"{element},{','.join(f'{1e3 * x:.6g}' for x in t)}"
-        for element, t in zip(formed.shells.ids, formed.shells.thickness, strict=True)
+        f"{g}:n,{g},{x:.6f},{y:.6f},{z:.6f},output"
+        for g, (x, y, z) in zip(places.ids.tolist(), places.normal.tolist(), strict=True)
     )
-    return "\n".join(["element,t1_mm,t2_mm,t3_mm,t4_mm", *rows, ""])
-
-
-def _candidates(grids: np.ndarray) -> str:
-    return "\n".join(["label,grid,direction,role", *(f"{g}:n,{g},n,output" for g in grids), ""])
+    return "\n".join(["label,grid,nx,ny,nz,role", *rows, ""])

@@ -118,7 +118,7 @@ def candidates(
     radius: float = 0.006,
     height: float = 0.120,
     edge: float = 0.012,
-    spacing: float = 0.040,
+    spacing: float = 0.055,
     parts: tuple[str, ...] = (),
 ) -> Candidates:
     """Grids where an accelerometer could be glued: flat, away from edges, free on one side.
