@@ -1,13 +1,15 @@
 """Nested dissection of a symmetric sparsity pattern, by place where places are known.
 
 George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are gathered into nodes first (six dofs, one
-vertex), vertices are split at medians of their coordinates, and the smaller shore of each cut is
-the separator. Where nobody knows the places, distances in the graph from a few far vertices stand
-for coordinates; their planes are the level sets of George and Liu (1978, SIAM J. Numer. Anal. 15).
+vertex), vertices are split at medians of their coordinates, and the fewest vertices that touch all
+edges of the cut are the separator. Distances in the graph from a few far vertices serve as further
+coordinates, or as the only ones where nobody knows the places; their planes are level sets (George
+and Liu 1978, SIAM J. Numer. Anal. 15).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +19,7 @@ from ..errors import ShapeError
 
 _LEAF = 24  # vertices eliminated as one dense block
 _HUB = 10  # times the mean degree: such a vertex belongs to the last separator
-_LANDMARKS = 12
+_LANDMARKS = 12  # half as many where places are known
 _TRIES = 12  # coordinates tried for a cut, the widest first
 _CUTS = (0.5, 0.42, 0.58)
 
@@ -39,12 +41,25 @@ class Fronts:
     boundary: tuple[np.ndarray, ...]
     children: tuple[tuple[int, ...], ...]
 
+    def ordered(self) -> Self:
+        """The same fronts for a matrix whose rows are in this order already."""
+        return replace(self, order=np.arange(len(self.order)))
+
     @property
     def nnz(self) -> int:
         """Entries of the lower triangular factor."""
         a = np.diff(self.start)
         b = np.array([len(rows) for rows in self.boundary])
         return int(np.sum(a * (a + 1) // 2 + a * b))
+
+
+def pattern(*matrices: sp.csr_array) -> sp.csr_array:
+    """Where any of the matrices has an entry, as small numbers."""
+    marks = [
+        sp.csr_array((np.ones(A.nnz, np.int8), A.indices, A.indptr), shape=A.shape)
+        for A in map(sp.csr_array, matrices)
+    ]
+    return sum(marks[1:], start=marks[0])
 
 
 def analyse(
@@ -63,7 +78,8 @@ def analyse(
             raise ShapeError(f"{len(given)} {name} given, one for each of {n} rows is needed")
     vertex = np.arange(n) if nodes is None else np.unique(nodes, return_inverse=True)[1]
     G = quotient(A, vertex)
-    places = distances(G) if points is None else _mean(np.asarray(points, float), vertex)
+    hops = distances(G, _LANDMARKS if points is None else _LANDMARKS // 2)
+    places = hops if points is None else np.hstack([_principal(points, vertex, hops.max()), hops])
     pivots, children = _dissected(G, places)
     return _symbolic(G, vertex, pivots, children)
 
@@ -72,27 +88,33 @@ def quotient(A: sp.csr_array, vertex: np.ndarray) -> sp.csr_array:
     """Graph of the nodes: an edge where any of their rows are coupled, and the diagonal."""
     A = sp.csr_array(A)
     N = int(vertex.max()) + 1
+    vertex = vertex.astype(np.int32)
     row = np.repeat(vertex, np.diff(A.indptr))
-    ones = np.ones(A.nnz + N, np.int8)
-    own = np.arange(N)
+    own = np.arange(N, dtype=np.int32)
     ij = np.r_[row, own], np.r_[vertex[A.indices], own]
-    G = sp.coo_array((ones, ij), shape=(N, N)).tocsr()
-    G.data[:] = 1
-    return G
+    G = sp.coo_array((np.ones(A.nnz + N, bool), ij), shape=(N, N)).tocsr()
+    return sp.csr_array((np.ones(G.nnz, np.int8), G.indices, G.indptr), shape=(N, N))
 
 
-def _mean(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    total = np.zeros((int(vertex.max()) + 1, points.shape[1]))
-    np.add.at(total, vertex, points)
-    return total / np.bincount(vertex)[:, None]
+def _principal(points: np.ndarray, vertex: np.ndarray, extent: float) -> np.ndarray:
+    """Places of the nodes along their principal axes, scaled to an extent (N, 3).
+
+    A mesh lies along its body rather than along the axes of the deck.
+    """
+    x = np.zeros((int(vertex.max()) + 1, np.shape(points)[1]))
+    np.add.at(x, vertex, np.asarray(points, float))
+    x /= np.bincount(vertex)[:, None]
+    x -= x.mean(axis=0)
+    x = x @ np.linalg.eigh(x.T @ x)[1]
+    return x * (extent / max(np.ptp(x, axis=0).max(), np.finfo(float).tiny))
 
 
-def distances(G: sp.csr_array) -> np.ndarray:
-    """Hops from a few far vertices (N, _LANDMARKS): level sets of them are narrow cuts."""
+def distances(G: sp.csr_array, count: int) -> np.ndarray:
+    """Hops from a few far vertices (N, count): level sets of them are narrow cuts."""
     hops = _hops(G, 0)
     nearest = hops
     columns: list[np.ndarray] = []
-    for _ in range(_LANDMARKS):
+    for _ in range(count):
         hops = _hops(G, int(np.argmax(nearest)))
         nearest = hops if not columns else np.minimum(nearest, hops)
         columns.append(hops)

@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
-from .dissection import Fronts, analyse
+from .dissection import Fronts, analyse, pattern
 from .factor import Backend, Factor, factorise, inertia
 from .lanczos import Ritz, block_lanczos
 from .modes import ModalModel
@@ -18,7 +18,6 @@ from .system import System
 _DENSE = 300  # dofs; below, LAPACK is as fast
 _GUESS = 1e-8  # of the median K_ii/M_ii: where a shift lies well for 10³ to 10⁶ dofs
 _FAR, _NEAR = 1.0, 1e-7  # σ/λ_k between which a shift serves
-_SPARE = 2  # modes beyond those asked for, to find a gap for the count
 _SHARP = 1e-4  # error of a Ritz value good enough to tell a gap
 _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
@@ -67,10 +66,13 @@ def normal_modes(
     if n <= _DENSE or (count is not None and 3 * count > n):
         lam, phi = _dense(K, M, system.dofs, count, limit)
     else:
-        order = analyse(abs(K) + abs(M), points, system.dofs[:, 0])
-        problem = _Problem(K, M, system.dofs, backend, order)
+        fronts = analyse(pattern(K, M), points, system.dofs[:, 0])
+        order = fronts.order  # all is done in the order of elimination
+        K_o, M_o = (A[order][:, order] for A in (K, M))
+        problem = _Problem(K_o, M_o, system.dofs[order], backend, fronts.ordered())
         due = problem.below(limit) if count is None and band is not None else None
         lam, phi = _sparse(problem, count or 20 if due is None else due, limit, shift, proof, due)
+        phi = phi[np.argsort(order)]
     keep = (lam <= limit) & (np.arange(len(lam)) < (len(lam) if count is None else count))
     lam, phi = lam[keep], np.asfortranarray(phi[:, keep])
     if (gap := _gap(phi, M)) > _ORTHONORMAL:
@@ -87,13 +89,13 @@ class _Problem:
     M: sp.csr_array
     dofs: np.ndarray
     backend: Backend
-    order: Fronts
+    fronts: Fronts
 
     def factor(self, sigma: float) -> Factor:
         """Positive definite factorisation of K - σM; who is at fault is named."""
         A = sp.csr_array(self.K - sigma * self.M)
         try:
-            return factorise(A, backend=self.backend, fronts=self.order)
+            return factorise(A, backend=self.backend, fronts=self.fronts)
         except NotDefinite as error:
             at = label(*self.dofs[error.row])
             raise ModelError(
@@ -105,7 +107,7 @@ class _Problem:
         """How many eigenvalues are below s: the negative ones of K - s M (Sylvester)."""
         for nudge in (0.0, 1e-7, -1e-7):
             try:
-                return inertia(self.K - s * (1 + nudge) * self.M, fronts=self.order)[0]
+                return inertia(self.K - s * (1 + nudge) * self.M, fronts=self.fronts)[0]
             except AccuracyError:
                 continue
         raise AccuracyError(f"no Sturm count at {np.sqrt(abs(s)) / (2 * np.pi):.6g} Hz")
@@ -193,7 +195,7 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
         sigma = -_GUESS * _median_ratio(problem.K, problem.M, problem.dofs)
     for _ in range(2):
         factor = problem.factor(sigma)
-        ritz = block_lanczos(factor.solve, problem.M, k + _SPARE)
+        ritz = block_lanczos(factor.solve, problem.M, k)
         known = ritz.theta[ritz.error < 1e-2]
         top = sigma + 1 / known[-1] if len(known) else 0.0
         if shift is not None or _NEAR * top < -sigma < _FAR * top:

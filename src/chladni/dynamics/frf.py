@@ -10,7 +10,7 @@ from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError
-from .dissection import analyse
+from .dissection import analyse, pattern
 from .factor import factorise
 from .modes import ModalModel
 from .system import System
@@ -247,7 +247,7 @@ def direct_frf(
     frequency = np.asarray(frequency, dtype=float)
     load = unit_columns(len(system.dofs), rows_in)
     K = system.K * (1 + 1j * structural)
-    order = analyse(abs(K) + abs(system.M) + abs(system.V), points, system.dofs[:, 0])
+    order = analyse(pattern(K, system.M, system.V), points, system.dofs[:, 0])
     H = np.empty((len(frequency), len(rows_out), len(rows_in)), dtype=complex)
     for k, omega in enumerate(2 * np.pi * frequency):
         Z = K - omega**2 * system.M + 1j * omega * system.V

@@ -46,7 +46,7 @@ def block_lanczos(
     *,
     block: int = 12,
     locked: np.ndarray | None = None,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-8,
     largest_basis: int | None = None,
     seed: int = 0,
 ) -> Ritz:
@@ -64,17 +64,25 @@ def block_lanczos(
     run = _Run(M, locked, min(n, largest_basis or max(6 * k, 200)) + block)
     rng = np.random.default_rng(seed)
     run.start(solve(M @ rng.standard_normal((n, block))))
+    look = 2 * k  # size of the basis at which Ritz values are looked at next
     while True:
         run.step(solve)
         full = run.size + block > run.capacity or run.size >= n
-        if run.size >= k and (full or run.due(k)):
+        if full or run.size >= look:
             ritz = run.ritz()
-            if full or np.all(ritz.error[:k] < tolerance):
+            worst = ritz.error[:k].max() if len(ritz.error) >= k else np.inf
+            if full or worst < tolerance:
                 return ritz
+            look = run.size + block * _blocks_ahead(worst / tolerance)
         if run.exhausted:
             run.start(solve(M @ rng.standard_normal((n, block))))
             if run.exhausted:
                 return run.ritz()
+
+
+def _blocks_ahead(excess: float) -> int:
+    """How many blocks until the next look: a block is rarely worth more than two digits."""
+    return max(1, int(np.log10(min(excess, 1e8)) / 2))
 
 
 class _Run:
@@ -84,7 +92,7 @@ class _Run:
         self.M, self.locked, self.capacity = M, locked, capacity
         self.Q = np.empty((M.shape[0], capacity), order="F")
         self.H = np.zeros((capacity, capacity))
-        self.size, self.norm, self._checked = 0, 0.0, 0
+        self.size, self.norm = 0, 0.0
         self.last = self.before = slice(0, 0)  # columns of the last two blocks
         self.MQ = np.empty((M.shape[0], 0))  # M times the last block
         self.coupling = np.zeros((0, 0))  # R of the last step: W = Q_next R
@@ -93,14 +101,6 @@ class _Run:
     def exhausted(self) -> bool:
         """No new direction left: what is in the basis is invariant."""
         return self.last.stop - self.last.start == 0
-
-    def due(self, k: int) -> bool:
-        """Ritz values are looked at every few blocks only."""
-        wait = max(16, k // 6)
-        if self.size - self._checked < wait:
-            return False
-        self._checked = self.size
-        return True
 
     def start(self, X: np.ndarray) -> None:
         """A new block with no coupling to the ones before."""
@@ -142,7 +142,7 @@ class _Run:
         keep = w > (_DROP * norm) ** 2
         scale = np.sqrt(w[keep])
         T, R = V[:, keep] / scale, (V[:, keep] * scale).T
-        Q, MQ = np.asfortranarray(W @ T), MW @ T
+        Q, MQ = blas.dgemm(1.0, W, T), MW @ T  # Q in Fortran order
         thin = np.any(scale < _THIN * norm)
         uneven = np.any(scale < _UNEVEN * scale.max(initial=0.0))
         for _ in range(3 if thin or uneven else 0):

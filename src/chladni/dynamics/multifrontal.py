@@ -107,6 +107,7 @@ class Multifrontal:
         self.definite = definite
         self.fronts = analyse(A, points, nodes) if fronts is None else fronts
         self.negative = 0
+        self._in_order = bool(np.all(np.diff(self.fronts.order) == 1))
         self._parts = self._eliminate(A)
 
     @property
@@ -121,14 +122,14 @@ class Multifrontal:
     def _eliminate(self, A: sp.csr_array) -> list[_Part]:
         fronts = self.fronts
         updates: dict[int, np.ndarray] = {}
-        lower = sp.csc_array(sp.tril(A[fronts.order][:, fronts.order], format="csc"))
+        A = A if self._in_order else A[fronts.order][:, fronts.order]
         where = np.empty(A.shape[0], np.int64)
         parts: list[_Part] = []
         for i, children in enumerate(fronts.children):
             begin, end, rows = fronts.start[i], fronts.start[i + 1], fronts.boundary[i]
             where[begin:end] = np.arange(end - begin)
             where[rows] = np.arange(end - begin, end - begin + len(rows))
-            F = _gathered(lower, begin, end, where, len(rows))
+            F = _gathered(A, begin, end, where, len(rows))
             for c in (c for c in children if c in updates):
                 _extend_add(F, where[fronts.boundary[c]], updates.pop(c))
             parts.append(self._front(F, i))
@@ -152,7 +153,8 @@ class Multifrontal:
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B for one (n,) or several (n, k) right sides."""
         fronts, B = self.fronts, np.asarray(B)
-        X = B.reshape(len(B), -1)[fronts.order]
+        X = B.reshape(len(B), -1)
+        X = np.array(X, order="C") if self._in_order else X[fronts.order]
         for i, part in enumerate(self._parts):
             own = slice(fronts.start[i], fronts.start[i + 1])
             X[own], down = part.forward(X[own])
@@ -160,19 +162,21 @@ class Multifrontal:
         for i in range(len(self._parts) - 1, -1, -1):
             own = slice(fronts.start[i], fronts.start[i + 1])
             X[own] = self._parts[i].backward(X[own], X[fronts.boundary[i]])
-        out = np.empty_like(X)
-        out[fronts.order] = X
-        return out.reshape(B.shape)
+        if not self._in_order:
+            X, solved = np.empty_like(X), X
+            X[fronts.order] = solved
+        return X.reshape(B.shape)
 
 
-def _gathered(lower: sp.csc_array, begin: int, end: int, where: np.ndarray, b: int) -> _Blocks:
-    """Blocks F11, F21 of the matrix itself and an empty F22, in Fortran order."""
-    a, dtype = end - begin, lower.dtype
-    F11, F21, F22 = (np.zeros(s, dtype, order="F") for s in ((a, a), (b, a), (b, b)))
-    first, last = lower.indptr[begin], lower.indptr[end]
-    i = where[lower.indices[first:last]]
-    j = np.repeat(np.arange(a), np.diff(lower.indptr[begin : end + 1]))
-    values, own = lower.data[first:last], i < a
+def _gathered(A: sp.csr_array, begin: int, end: int, where: np.ndarray, b: int) -> _Blocks:
+    """Blocks F11, F21 of the matrix itself (by rows, it is symmetric) and an empty F22."""
+    a = end - begin
+    F11, F21, F22 = (np.zeros(s, A.dtype, order="F") for s in ((a, a), (b, a), (b, b)))
+    part = slice(A.indptr[begin], A.indptr[end])
+    open_ = A.indices[part] >= begin  # the others belong to fronts eliminated before
+    i = where[A.indices[part][open_]]
+    j = np.repeat(np.arange(a), np.diff(A.indptr[begin : end + 1]))[open_]
+    values, own = A.data[part][open_], i < a
     F11[i[own], j[own]] = values[own]
     F21[i[~own] - a, j[~own]] = values[~own]
     return F11, F21, F22
