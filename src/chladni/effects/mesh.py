@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.optimize import linear_sum_assignment
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
@@ -50,7 +51,8 @@ class Jitter(Effect):
 def mesh_error(built: Structure, top: float) -> MeshError | None:
     """The mesh error of a structure up to 1.4 times the frequency ``top``; None if too large.
 
-    With Ψ the refined modes at the old points, B = polar(ΦᵀMΨ) and ΔK = B Λ_ref Bᵀ - Λ.
+    With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
+    ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
     """
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
         return None
@@ -59,10 +61,13 @@ def mesh_error(built: Structure, top: float) -> MeshError | None:
     fine = _flexible(normal_modes(finer.system, band=1.6 * top), top)
     rows = _rows_of(finer, built)
     M_phi = built.system.M @ coarse.shapes
-    U, _, Vt = np.linalg.svd(M_phi.T @ (rows @ fine.shapes), full_matrices=False)
+    overlap = M_phi.T @ (rows @ fine.shapes)
+    own, partner = linear_sum_assignment(-(overlap**2))
+    M_phi = M_phi[:, own]
+    U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
     B = U @ Vt
-    omega2 = (2 * np.pi * fine.frequency) ** 2
-    delta = (B * omega2) @ B.T - np.diag((2 * np.pi * coarse.frequency) ** 2)
+    omega2 = (2 * np.pi * fine.frequency[partner]) ** 2
+    delta = (B * omega2) @ B.T - np.diag((2 * np.pi * coarse.frequency[own]) ** 2)
     change, V = np.linalg.eigh((delta + delta.T) / 2)
     unknown = Parameter("mesh", "-", LIMIT - 0.17, 0.3, kind="linear", step=0.5)
     return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
