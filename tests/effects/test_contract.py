@@ -1,0 +1,257 @@
+"""What every effect promises: exact slopes, harmless when it vanishes, the same physics in full."""
+
+import json
+import pickle
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects import catalogue, material, mesh, points, sensors, sheet, somewhere
+from chladni.effects.effect import Effect
+from chladni.effects.ordinary import gain, ordinary, scatter
+from chladni.effects.thickness import thickness_distribution
+from chladni.fem.assemble import structure
+from chladni.model.assembly import Assembly
+from chladni.model.plates import plate
+from chladni.model.refine import refined
+from chladni.updating.reduced import Reduced, evaluate
+from chladni.updating.workbench import workbench
+
+TOP = 300.0  # Hz; six flexible modes of the plate lie below
+FLEXIBLE = slice(6, 12)
+CHANNELS = 4
+NAMES = (
+    "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
+    "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """An effect, an x at which it acts, an x at which it does nothing, and a model to act on."""
+
+    effect: Effect
+    x: np.ndarray
+    idle: np.ndarray
+    model: Reduced
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return workbench(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
+
+
+@pytest.fixture(scope="module")
+def cases(bench):
+    cloth = bench.sheet
+    corners = (1, 7, 57, 63)
+    setup = catalogue.Setup(corners, (7, 63), float(cloth.weight.sum()), TOP)
+    k = bench.grids.position(25)
+    local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
+    ortho = catalogue.grains(cloth)[0]
+    over = mesh.mesh_error(bench.structure, TOP)
+    own = mesh.jitter(bench.structure, TOP, over)
+    waves = scatter(cloth, "t", 0.03)
+    n = len(waves.parameters)
+    means = np.array([p.mean for p in ortho.parameters])
+    found = {
+        "E": (ordinary(cloth, "E", [0]), [0.07], [0]),
+        "rho": (ordinary(cloth, "rho", [0]), [-0.05], [0]),
+        "t": (ordinary(cloth, "t", [0]), [0.04], [0]),
+        "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
+        "gain": (gain(CHANNELS, 0.5), [0.3], [0]),
+        "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
+        "point-mass": (
+            catalogue.point_mass(cloth, setup, bench.grids, k, 9), [0.2, 0.1, -0.1], [-20, 0, 0],
+        ),
+        "extra-support": (
+            catalogue.extra_support(cloth, setup, bench.grids, k, 9), [-1, 0, 0], [-20, 0, 0],
+        ),
+        "sensor-mass": (catalogue.sensor_mass(cloth, setup)[0], [-0.5], [-20]),
+        "suspension": (catalogue.suspension(cloth, setup, bench.grids)[1], [-0.7], [-20]),
+        "thickness-distribution": (
+            thickness_distribution(cloth, 0, local, 9), local, [-40, *local[1:]],
+        ),
+        "sensor-fault": (sensors.sensor_fault("7+Z", 1, CHANNELS, 1, 0.4), [0.4], [0]),
+        "mesh-error": (over, [1.0], [0]),
+        "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
+    }  # fmt: skip
+    return {
+        name: Case(e, np.array(x, float), np.array(idle, float), model_for(bench, e))
+        for name, (e, x, idle) in found.items()
+    }
+
+
+def model_for(bench, effect: Effect) -> Reduced:
+    """A model whose basis carries the effect's rows, with the components it needs."""
+    if isinstance(effect, material.OrthotropicMaterial):
+        return bench.model.with_components()
+    if isinstance(effect, somewhere.Somewhere):
+        return bench.with_attachments(effect.carried())
+    if isinstance(effect, points.AtPoints):
+        return bench.with_attachments(effect.rows)
+    return bench.model
+
+
+@pytest.fixture(params=NAMES)
+def case(request, cases) -> Case:
+    return cases[request.param]
+
+
+def families(kind: type[Effect] = Effect) -> set[type[Effect]]:
+    """All subclasses in chladni.effects that carry a name of their own."""
+    below = {c for sub in kind.__subclasses__() for c in {sub, *families(sub)}}
+    return {c for c in below if c.__module__.startswith("chladni.effects") and "name" in vars(c)}
+
+
+def test_every_family_is_held_to_the_contract(cases):
+    assert families() == {type(case.effect) for case in cases.values()}
+
+
+def difference(f, x, k, h=1e-3):
+    """∂f/∂x_k to fourth order."""
+    e = h * np.eye(len(x))[k]
+    return (8 * (f(x + e) - f(x - e)) - (f(x + 2 * e) - f(x - 2 * e))) / (12 * h)
+
+
+def close(got, expected, scale):
+    assert_allclose(got, expected, rtol=1e-5, atol=1e-5 * scale)
+
+
+def test_slopes_of_eigenvalues_and_weight_are_exact(case):
+    def lam(x):
+        return evaluate(case.model, [case.effect], x, gradient=False).lam[FLEXIBLE]
+
+    def weight(x):
+        return evaluate(case.model, [case.effect], x, gradient=False).weight
+
+    state = evaluate(case.model, [case.effect], case.x)
+    diagonal = np.einsum("prr->pr", state.dK - state.lam * state.dM)[:, FLEXIBLE]
+    for k in range(len(case.x)):
+        by_difference = difference(lam, case.x, k)
+        close(diagonal[k], by_difference, np.abs(by_difference).max() + 1e-3 * state.lam[6])
+        by_difference = difference(weight, case.x, k)
+        close(state.dweight[k], by_difference, abs(by_difference) + 1e-6 * state.weight)
+
+
+def test_slopes_of_channels_are_exact(case):
+    change = case.effect.outputs(case.x)
+    if change is None:
+        assert evaluate(case.model, [case.effect], case.x).offset is None
+        return
+    for k in range(len(case.x)):
+        slope = difference(lambda x: case.effect.outputs(x).value, case.x, k)
+        assert_allclose(change.gradient[:, k], slope, atol=1e-9)
+
+
+def test_harmless_where_it_vanishes(case):
+    without = evaluate(case.model, [], np.zeros(0))
+    idle = evaluate(case.model, [case.effect], case.idle)
+    assert_allclose(idle.lam[FLEXIBLE], without.lam[FLEXIBLE], rtol=1e-6)
+    assert_allclose(idle.weight, without.weight, rtol=1e-6)
+    if idle.offset is not None:
+        assert_allclose(idle.offset, 0, atol=1e-12)
+
+
+def test_acts_where_it_does_not_vanish(case):
+    idle = evaluate(case.model, [case.effect], case.idle)
+    acting = evaluate(case.model, [case.effect], case.x)
+    moved = np.abs(acting.lam[FLEXIBLE] / idle.lam[FLEXIBLE] - 1).max() > 1e-3
+    assert moved != (acting.offset is not None and bool(np.abs(acting.offset).max() > 0.01))
+
+
+def hertz(lam):
+    return np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+
+
+def full(assembly: Assembly) -> np.ndarray:
+    return normal_modes(structure(assembly).system, band=2 * TOP).frequency[FLEXIBLE]
+
+
+WRITTEN = [n for n in NAMES if n not in {"scatter", "gain", "mesh-error", "jitter", "sensor-fault"}]
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_reduced_agrees_with_the_full_structure(name, cases, bench):
+    case = cases[name]
+    got = hertz(evaluate(case.model, [case.effect], case.x, False).lam[FLEXIBLE])
+    expected = full(case.effect.apply(bench.structure.assembly, case.x))
+    within = 0.005 if name == "orthotropic-material" else 0.003
+    assert_allclose(got, expected, rtol=within)
+
+
+def test_support_between_grids_keeps_its_sum_and_its_place(cases):
+    support = cases["extra-support"].effect
+    flat = {int(g): p for g, p in zip(support.patch.grids, support.patch.flat, strict=True)}
+    for at in ([0.3, 0.2], [-0.2, 0.35], [0.25, -0.25]):
+        share = support.shares(support.patch.size * np.array(at))
+        assert_allclose(sum(v for _, v in share), 1)
+        centre = sum(v * flat[g] for g, v in share)
+        assert_allclose(centre, support.patch.size * np.array(at), atol=1e-12)
+
+
+def test_scatter_agrees_with_the_same_thickness_in_every_shell(cases, bench):
+    case, shells = cases["scatter"], bench.structure.assembly.shells
+    factor = np.exp(case.effect.functions @ case.x)[bench.sheet.group]
+    thick = replace(shells, thickness=shells.thickness * factor[:, None])
+    got = hertz(evaluate(case.model, [case.effect], case.x, False).lam[FLEXIBLE])
+    assert_allclose(got, full(replace(bench.structure.assembly, shells=thick)), rtol=0.003)
+
+
+def test_whole_mesh_error_leads_to_the_refined_frequencies(cases, bench):
+    case = cases["mesh-error"]
+    got = hertz(evaluate(case.model, [case.effect], np.ones(1), False).lam[FLEXIBLE])
+    assert_allclose(got, full(refined(bench.structure.assembly)), rtol=0.003)
+
+
+def test_jitter_moves_every_mode_by_itself(cases):
+    case = cases["jitter"]
+    state = evaluate(case.model, [case.effect], case.x, False)
+    n = len(case.x)
+    assert_allclose(np.sort(case.effect.lam * (1 + case.x)), state.lam[6 : 6 + n], rtol=1e-8)
+
+
+def test_weight_is_what_the_written_structure_weighs(cases, bench):
+    for name in ("rho", "t", "point-mass", "extra-support", "orthotropic-material"):
+        case = cases[name]
+        system = structure(case.effect.apply(bench.structure.assembly, case.x)).system
+        d = structure(bench.structure.assembly).along(
+            bench.structure.assembly.ids, np.tile([0, 0, 1.0], (63, 1))
+        )
+        rigid = d.T @ np.ones(63)
+        weight = evaluate(case.model, [case.effect], case.x, False).weight
+        assert_allclose(weight, rigid @ (system.M @ rigid), rtol=1e-9, err_msg=name)
+
+
+def test_pickles(case):
+    """Processes hand effects to one another."""
+    again = pickle.loads(pickle.dumps(case.effect))
+    one = evaluate(case.model, [case.effect], case.x)
+    two = evaluate(case.model, [again], case.x)
+    assert_allclose(two.lam[FLEXIBLE], one.lam[FLEXIBLE], rtol=1e-12)
+    assert again.where() == case.effect.where()
+
+
+def test_can_be_written_as_json(case):
+    sd = np.full(len(case.x), 0.1)
+    rows = case.effect.reported(case.x, sd)
+    json.dumps([rows, case.effect.settled(case.x), case.effect.where()], allow_nan=False)
+    assert all(row["low"] <= row["value"] <= row["high"] for row in rows)
+
+
+def test_reversed_channel_is_reported_with_its_sign(cases):
+    fault = sensors.sensor_fault("7+Z", 1, CHANNELS, -1, 0.0)
+    row = fault.reported(np.array([np.log(2.0)]), np.array([0.1]))[0]
+    assert_allclose(row["value"], -0.5)
+    assert row["low"] <= row["value"] <= row["high"]
+    assert_allclose(fault.outputs(np.zeros(1)).value[1], 1j * np.pi / np.log(10))
+
+
+def test_sheet_groups_hold_all_of_the_sheet(bench):
+    cloth = sheet.sheet(bench.structure, 16)
+    assert len(cloth) == 16
+    assert_allclose(cloth.area.sum(), 0.12)
+    assert_allclose(cloth.weight.sum(), 7850 * 0.12 * 1.5e-3)
