@@ -1,0 +1,87 @@
+"""Real spruce plates: the deck is isotropic, the wood is not; the truth is opened afterwards."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from chladni.cli.app import application
+from chladni.meshing.nastran import write_assembly
+from chladni.model.plates import plate
+from chladni.model.properties import Isotropic
+from chladni.units import units
+
+RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spruce_plates"
+WITHIN = {"E1": 0.15, "G12": 0.15, "E2": 0.20}  # the reference's own uncertainty is 2 to 4 %
+
+pytestmark = pytest.mark.skipif(
+    not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}"
+)
+
+
+def case(name, folder):
+    """What a user writes: measured size and mass, E 5 GPa, unknown gain, places within 25 mm."""
+    known = json.loads((RECORDINGS / f"plate_{name}.json").read_text())
+    a, b, t, m = (known[k] for k in ("length_m", "width_m", "thickness_m", "mass_kg"))
+    wood = Isotropic(5e9, 0.3, m / (a * b * t))
+    write_assembly(plate(a, b, 48, 18, t, wood), folder / "plate.bdf", units("SI"))
+    (folder / "plate.uff").write_bytes((RECORDINGS / f"plate_{name}.uff").read_bytes())
+    (ex, ey), (rx, ry) = known["excitation_near_m"], known["response_near_m"]
+    (folder / "sensors.csv").write_text(
+        "label,x,y,z,direction,role,position_sd\n"
+        f"1:+Z,{ex},{ey},0,+Z,input,0.025\n2:+Z,{rx},{ry},0,+Z,output,0.025\n"
+    )
+    (folder / "case.toml").write_text(
+        f"""[model]
+deck = "plate.bdf"
+units = "SI"
+[test]
+recordings = ["plate.uff"]
+quantity = "accelerance"
+gain = "unknown"
+sensors = "sensors.csv"
+mass = {m}
+mass_sd = 0.001
+[band]
+fit = [20.0, 400.0]
+"""
+    )
+    return folder
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["5L", pytest.param("5R", marks=pytest.mark.slow), pytest.param("2L", marks=pytest.mark.slow)],
+)
+def test_the_grain_of_a_spruce_plate(name, tmp_path):
+    out = tmp_path / "answer"
+    source = case(name, tmp_path)
+    done = CliRunner().invoke(application(), ["diagnose", str(source), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    d = json.loads((out / "diagnosis.json").read_text())
+
+    assert d["verdict"] == "missing physics"
+    assert d["effects"][0]["name"] == "orthotropic-material"
+    assert d["structured"]["is"]
+    assert d["frequency_rms_percent"]["calibrated"] >= 10
+    assert d["frequency_rms_percent"]["after"] <= 3
+    best = d["effects"][0]["log_evidence"]
+    others = {a["name"]: a["log_evidence"] for a in d["alternatives"]}
+    due = {"point-mass", "extra-support", "thickness-distribution", "calibration only"}
+    assert due <= set(others)
+    assert all(value < best - 5 for value in others.values())
+    held = d["fit"]["held_out"]
+    assert held["Q_with_effect"] < held["Q_calibrated"] / 2
+
+    modes = ["modes", str(out / "updated.bdf"), "--units", "SI", "--count", "20"]
+    assert CliRunner().invoke(application(), [*modes, "--out", str(out)]).exit_code == 0
+    f = json.loads((out / "modes.json").read_text())["frequency_hz"]
+    for row in d["frequencies"]:
+        if row["after_hz"] is not None:
+            assert min(abs(row["after_hz"] / x - 1) for x in f if x > 1) < 1e-4
+
+    truth = json.loads((RECORDINGS / f"truth_{name}.json").read_text())
+    found = {p["name"]: p["value"] for p in d["effects"][0]["parameters"]}
+    for modulus, most in WITHIN.items():
+        assert abs(found[modulus] / truth[f"{modulus}_Pa"] - 1) < most, modulus
