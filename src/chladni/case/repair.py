@@ -1,6 +1,7 @@
 """The changes that turn one assembly's deck into another's: what was repaired, and only that."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,10 @@ from ..errors import ModelError
 from ..meshing.nastran import Add, Deck, Replace, SetColumns, SetField
 from ..meshing.nastran.edits import Change
 from ..model.assembly import Assembly, Shells
-from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
+from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, ShellSection
 from ..units import UNITS, Units
+
+_MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
@@ -31,33 +34,55 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     return out
 
 
-def _sheets(assembly: Assembly) -> dict[int, Material]:
-    """Shell materials in use, by id."""
-    out: dict[int, Material] = {}
-    for part in assembly.parts:
-        if isinstance(part.section, ShellSection):
-            for name in ("membrane", "bending", "shear", "coupling"):
-                if (material := getattr(part.section, name)) is not None:
-                    out[material.id] = material
-    return out
+def _uses(assembly: Assembly) -> Iterator[tuple[int, str, Material]]:
+    """(position of the part, field of the section, material) of all that name a material."""
+    for k, part in enumerate(assembly.parts):
+        for name in _MID if isinstance(part.section, ShellSection) else ("material",):
+            if (material := getattr(part.section, name)) is not None:
+                yield k, name, material
 
 
 def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
-    old, new = _sheets(before), _sheets(after)
+    """Cards of materials changed; where only some users of one changed, a card of their own."""
+    known = {(k, name): m for k, name, m in _uses(before)}
+    users: dict[int, dict[Material, list[tuple[int, str]]]] = {}
+    for k, name, material in _uses(after):
+        if (old := known.get((k, name))) is None:
+            raise ModelError(f"part {after.parts[k].name} has a {name} material the deck has not")
+        kinds = users.setdefault(old.id, {})
+        kinds.setdefault(old if _equal(old, material) else material, []).append((k, name))
+    free = 1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind))
     out: list[Change] = []
-    turned = False
-    for id, material in new.items():
-        was = old.get(id)
-        if was is None:
-            raise ModelError(f"material {id} is not in the deck; it has {sorted(old)}")
-        if isinstance(material, Orthotropic) and isinstance(was, Isotropic):
-            out.append(Replace("MAT1", id, _mat8(material, units)))
-            turned = True
-        else:
-            out += _numbers(id, was, material, units)
-    if turned:
-        out += _axes(deck, before, after)
-    return out
+    for id, kinds in users.items():
+        for now, at in kinds.items():
+            old = known[at[0]]
+            if now is old:
+                continue
+            if len(kinds) == 1:
+                out += _edited(deck, id, old, now, units)
+                continue
+            out.append(Add([_card(replace(now, id=free), units)], "of the parts that changed"))
+            out += [SetField("PSHELL", after.parts[k].id, _MID[name], free) for k, name in at]
+            free += 1
+    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(after))
+    return out + (_axes(deck, before, after) if grain else [])
+
+
+def _equal(a: Material, b: Material) -> bool:
+    """The same numbers; an anisotropic one is compared by what it is."""
+    if isinstance(a, Anisotropic) or isinstance(b, Anisotropic):
+        return a is b
+    return a == b
+
+
+def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> list[Change]:
+    """One card's values, or another card in its place."""
+    if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
+        return [Replace("MAT1", id, _card(now, units))]
+    if type(was) is not type(now) or isinstance(now, Anisotropic):
+        kinds = f"{type(was).__name__} to {type(now).__name__}"
+        raise ModelError(f"{deck.path}: material {id} cannot be changed from {kinds}")
+    return list(_numbers(id, was, now, units))
 
 
 def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Change]:
@@ -65,23 +90,28 @@ def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Ch
     names = {"rho": ("RHO", units.density)}
     if isinstance(now, Isotropic):
         kind = "MAT1"
-        names |= {"E": ("E", units.stress), "G": ("G", units.stress)}
-    elif isinstance(now, Orthotropic):
+        names |= {"E": ("E", units.stress), "G": ("G", units.stress), "nu": ("NU", 1.0)}
+    else:
         kind = "MAT8"
         names |= {k: (k.upper(), units.stress) for k in ("E1", "E2", "G12", "G1z", "G2z")}
-    else:
-        return
+        names["nu12"] = ("NU12", 1.0)
     for name, (field, unit) in names.items():
         a, b = getattr(was, name), getattr(now, name)
         if a is not None and b is not None and not np.isclose(a, b, rtol=1e-9, atol=0):
             yield SetField(kind, id, field, b / unit)
 
 
-def _mat8(m: Orthotropic, units: Units) -> list[float | int | str | None]:
-    s = units.stress
+def _card(m: Material, units: Units) -> list[float | int | str | None]:
+    """MAT1 or MAT8."""
+    s, rho = units.stress, m.rho / units.density or None
+    if isinstance(m, Isotropic):
+        G = None if m.G is None else m.G / s
+        return ["MAT1", m.id, m.E / s, G, m.nu, rho, None, None, m.damping or None]
+    if not isinstance(m, Orthotropic):
+        raise ModelError(f"an Anisotropic material {m.id} of some of its parts cannot be changed")
     moduli: list[float | int | str | None] = [m.E1 / s, m.E2 / s, m.nu12, m.G12 / s]
-    shear = [m.G1z / s or None, m.G2z / s or None]
-    return ["MAT8", m.id, *moduli, *shear, m.rho / units.density]
+    moduli += [m.G1z / s or None, m.G2z / s or None]
+    return ["MAT8", m.id, *moduli, rho, *[None] * 8, m.damping or None]
 
 
 def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
@@ -94,8 +124,9 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     z = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = z - x * (x @ z)
     z = z / np.linalg.norm(z)
-    ids = [int(i) for kind in ("CORD2R", "CORD1R") if kind in deck.cards for i in _ids(deck, kind)]
-    cid = 1 + max(ids, default=900)
+    cid = 1 + max(
+        (i for kind in deck.cards if kind[:4] == "CORD" for i in _cids(deck, kind)), default=900
+    )
     out: list[Change] = [Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "grain of the sheet")]
     for kind, chosen in _by_kind(after.shells, moved):
         if len(chosen):
@@ -106,6 +137,12 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
 def _ids(deck: Deck, kind: str) -> list[int]:
     words = deck[kind].words(1).tolist()
     return [int(w) for w in words if w.isdigit()]
+
+
+def _cids(deck: Deck, kind: str) -> list[int]:
+    """Ids of coordinate systems; a CORD1 card holds two."""
+    second = deck[kind].words(5).tolist() if kind[4] == "1" else []
+    return [*_ids(deck, kind), *(int(w) for w in second if w.isdigit())]
 
 
 def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:
@@ -147,6 +184,10 @@ def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
         M = after.masses.matrix[k]
         m = M[0, 0]
         arm = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m
+        x, y, z = arm
+        T = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+        if not np.allclose(M, m * T.T @ T, rtol=1e-9, atol=1e-9 * m):
+            raise ModelError("a mass with inertia of its own was added; CONM2 here has none")
         card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.mass]
         yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
 
