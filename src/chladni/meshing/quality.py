@@ -10,7 +10,7 @@ from ..model.assembly import Assembly, Average, RigidBody
 from ..model.mesher_pairing import corner_quality, edges_of
 from ..model.mesher_sheets import components
 
-LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 10.0, 0.1
+LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 20.0, 0.15
 
 
 @dataclass(frozen=True, eq=False)

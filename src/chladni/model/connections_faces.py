@@ -52,6 +52,7 @@ class Surface:
     points : (n, 3)     all points of the assembly [m]
     nodes : (m, 4)      rows of points
     rows : (m,)         rows of ``assembly.shells``
+    tree, owner :       places along the shells' longer middle lines, and whose they are
     """
 
     name: str
@@ -59,11 +60,13 @@ class Surface:
     nodes: np.ndarray
     rows: np.ndarray
     tree: cKDTree = field(repr=False)
+    owner: np.ndarray = field(repr=False)
 
     @classmethod
     def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
         """A surface of its own, not of an assembly."""
-        return cls(name, points, nodes, np.arange(len(nodes)), cKDTree(points[nodes].mean(axis=1)))
+        tree, owner = _spread(points[nodes])
+        return cls(name, points, nodes, np.arange(len(nodes)), tree, owner)
 
     @classmethod
     def of(cls, assembly: Assembly, sheet: Sheet) -> Self:
@@ -78,7 +81,8 @@ class Surface:
         if not len(rows):
             raise LabelError(f"{name or 'the selection'} has no shells to join to")
         nodes = assembly.shells.nodes[rows]
-        return cls(name, assembly.points, nodes, rows, cKDTree(assembly.points[nodes].mean(axis=1)))
+        tree, owner = _spread(assembly.points[nodes])
+        return cls(name, assembly.points, nodes, rows, tree, owner)
 
     def feet(
         self, places: np.ndarray, normal: np.ndarray | None = None, cosine: float = 0.7
@@ -89,8 +93,8 @@ class Surface:
         do not count; where none is left the distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
-        k, count = len(places), min(NEAR, len(self.nodes))
-        near = self.tree.query(places, count)[1].reshape(k, count)
+        k, count = len(places), min(NEAR, len(self.owner))
+        near = self.owner[self.tree.query(places, count)[1].reshape(k, count)]
         triangles = self.nodes[near][..., _HALVES].reshape(k, 2 * count, 3)
         x = self.points[triangles]
         weight = barycentric_foot(places[:, None], x)
@@ -150,6 +154,24 @@ class Surface:
             nodes = self._with_ring(nodes)
             return nodes, np.full(len(nodes), 1 / len(nodes))
         return nodes[keep], weight[keep]
+
+
+def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray]:
+    """Places along the longer middle line of each cell (m, 4, 3), closer than the usual size.
+
+    A long cell's centre may be far from a point that the cell itself is near.
+    """
+    side = (x + np.roll(x, -1, axis=1)) / 2
+    ends = [(side[:, 0], side[:, 2]), (side[:, 1], side[:, 3])]
+    length = np.stack([np.linalg.norm(b - a, axis=1) for a, b in ends])
+    longer = length.argmax(axis=0)[:, None]
+    a, b = (np.where(longer == 0, p, q) for p, q in zip(*ends, strict=True))
+    usual = max(float(np.median(length)), 1e-9)
+    count = np.maximum(1, np.ceil(length.max(axis=0) / (1.5 * usual))).astype(int)
+    owner = np.repeat(np.arange(len(x)), count)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((step + 0.5) / count[owner])[:, None]
+    return cKDTree(a[owner] + t * (b - a)[owner]), owner
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 from ..arrays import readonly
 
+FAR = 0.12  # beyond this a loop does not say how far it is [m]
+
 
 def counterclockwise(loop: np.ndarray) -> np.ndarray:
     """The closed line (n, 2) turning left, area Σ x_i y_j - x_j y_i > 0."""
@@ -115,8 +117,11 @@ class Loop:
         return cls(readonly(points), cKDTree(points))
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Distance of the points (n, 2) from the line (n,), exact on its segments."""
-        return np.asarray(np.linalg.norm(points - self.nearest(points), axis=-1))
+        """Distance of the points (n, 2) from the line (n,), exact on its segments, up to 0.12 m."""
+        at = self.tree.query(points, distance_upper_bound=FAR)[1]
+        out, near = np.full(len(points), FAR), at < len(self.points)
+        out[near] = np.linalg.norm(points[near] - self._feet(points[near], at[near]), axis=-1)
+        return out
 
     def normal(self, points: np.ndarray) -> np.ndarray:
         """Unit normal into the loop at the nearest place of the line (n, 2)."""
@@ -130,8 +135,10 @@ class Loop:
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """Nearest places of the line (n, 2)."""
-        at, n = self.tree.query(points)[1], len(self.points)
-        here = self.points[at]
+        return self._feet(points, self.tree.query(points)[1])
+
+    def _feet(self, points: np.ndarray, at: np.ndarray) -> np.ndarray:
+        here, n = self.points[at], len(self.points)
         feet = np.stack([_foot(points, here, self.points[(at + k) % n]) for k in (-1, 1)])
         side = np.linalg.norm(feet - points, axis=-1).argmin(axis=0)
         return np.asarray(feet[side, np.arange(len(here))])
@@ -145,7 +152,10 @@ class Loop:
 
     def inside(self, points: np.ndarray) -> np.ndarray:
         """True where a point (n, 2) is within the loop."""
-        return inside(self.points[::4], points)
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        out = ((points >= low) & (points <= high)).all(axis=1)
+        out[out] = inside(self.points[::4], points[out])
+        return out
 
 
 def _foot(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
