@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..case import Case, load_case
-from ..case.question import question
 from ..case.repair import changes
 from ..dynamics.eigen import normal_modes
 from ..dynamics.frf import FRF
@@ -22,10 +21,13 @@ from ..updating.outcome import Models, as_dict, judged, models, rms
 from ..updating.prepare import prepare, renewed
 from ..updating.question import Prepared, Question
 from .case_model import DAMPING, markers, model_frf
-from .figures import Shown, figures
 from .frf import REACH
 from .model import Model, is_case
+from .question import question
 from .run import Out, Run, command_line, started
+
+if TYPE_CHECKING:
+    from .figures import Shown
 
 
 def run(
@@ -76,6 +78,8 @@ def page(
     d: dict[str, Any], progress: Progress,
 ) -> None:  # fmt: skip
     """Pictures and report.html."""
+    from .figures import figures
+
     progress("pictures", 0.0)
     drawn = figures(job.folder, d, shown(case, prepared, stages))
     write_page(
@@ -85,8 +89,10 @@ def page(
     job.say(said(d))
 
 
-def shown(case: Case, prepared: Prepared, stages: Models) -> Shown:
+def shown(case: Case, prepared: Prepared, stages: Models) -> "Shown":
     """What the pictures need: the mesh, the sensors, test and model responses."""
+    from .figures import Shown
+
     model = Model(case.path, case.assembly)
     curves: dict[str, FRF] = {}
     if case.frfs:

@@ -61,12 +61,12 @@ def _mapped(jobs: list[tuple[str, str, int, Path]], workers: int) -> Any:
 
 def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
     """Make a case, diagnose its folder, then open the seal and score."""
-    from ..case.question import question
     from ..study.concealed import SPECIMENS, made, write
     from ..study.score import scored
     from ..updating.diagnosis import diagnose
     from ..updating.outcome import effect_entry, judged, scores
     from ..updating.prepare import prepare
+    from .question import question
 
     name, effect, seed, place = job
     folder = place / "cases" / f"{name}-{EFFECT_CODE.get(effect, effect)}-{seed}"

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..case import Case, Places
 from ..errors import FileError
 from ..updating.calibration import Weighing
 from ..updating.question import Places as Sites
 from ..updating.question import Question
-from .load import Case
-from .places import Places
 
 
 def question(case: Case) -> Question:
