@@ -235,7 +235,8 @@ def untwinned(data: Data, fit: Fit, slope: Slope, rule: Rule) -> tuple[Fit, Slop
         alone, its_slope = polish(data, left, rule.largest, 6, rule.noise)
         rise = alone.chi2 - fit.chi2
         about = np.abs(np.abs(data.s) - abs(fit.p[weaker[0]])) < 3 * abs(fit.p[weaker[0]].real)
-        left_over = np.sqrt((np.abs(fit.e[about]) ** 2).sum() / (np.abs(alone.e[about]) ** 2).sum())
+        rest = max(float((np.abs(alone.e[about]) ** 2).sum()), 1e-300)
+        left_over = np.sqrt((np.abs(fit.e[about]) ** 2).sum() / rest)
         if rise < rule.twin * rule.after(data, alone).price or left_over > 0.6:
             fit, slope = alone, its_slope
         else:
