@@ -1,0 +1,76 @@
+"""The bench's recording is the exact response, and its noise is the noise it says."""
+
+import numpy as np
+import pytest
+
+from chladni.bench.article import Front, measured
+from chladni.dynamics.frf import transfer
+from chladni.dynamics.modes import ModalModel
+
+F = np.linspace(5.0, 200.0, 4000)
+MODES = ModalModel(
+    np.array([30.0, 71.0, 140.0]), np.full(3, 0.01), np.zeros((0, 3)), np.zeros((0, 2), int)
+)
+OUT = np.array([[1.0, -0.5, 0.8], [0.2, 0.9, -1.1]])
+IN = np.array([[0.7, 0.4, 0.3]])
+
+
+def recorded(front, seed=0):
+    rng = np.random.default_rng(seed)
+    return measured(MODES, OUT, IN, F, front, rng, ("1:+Z", "2:+Z"), ("1:+Z",))
+
+
+def exact():
+    """Accelerance by the sum over modes, written out."""
+    w, wr = 2 * np.pi * F, 2 * np.pi * MODES.frequency
+    H = np.zeros((len(F), 2, 1), complex)
+    for r in range(3):
+        h = -(w**2) / (wr[r] ** 2 - w**2 + 2j * 0.01 * wr[r] * w)
+        H += h[:, None, None] * np.outer(OUT[:, r], IN[:, r])
+    return H
+
+
+def test_without_noise_it_is_the_response():
+    found = recorded(Front(0.0, 0.0))
+    s = 2j * np.pi * F
+    due = transfer(MODES, OUT, IN, s) * s[:, None, None] ** 2
+    np.testing.assert_allclose(found.values, due, rtol=1e-12)
+    np.testing.assert_allclose(found.values, exact(), rtol=1e-9)
+    assert found.quantity == "accelerance"
+    np.testing.assert_array_equal(found.variance, 0.0)
+
+
+@pytest.mark.parametrize("front", [Front(0.02, 0.0), Front(0.0, 0.01), Front(0.01, 0.003)])
+def test_noise_is_what_it_says(front):
+    """E|e|² is the variance given: over 8000 numbers their mean ratio is 1 within 5 sigma."""
+    found = recorded(front)
+    ratio = np.abs(found.values - exact()) ** 2 / found.variance
+    assert ratio.mean() == pytest.approx(1.0, abs=5 / np.sqrt(ratio.size))
+
+
+def test_noise_levels():
+    """``noise`` of each line's magnitude, ``floor`` of the channel's rms."""
+    H = exact()
+    np.testing.assert_allclose(
+        np.sqrt(recorded(Front(0.02, 0.0)).variance), 0.02 * np.abs(H), rtol=1e-9
+    )
+    rms = np.sqrt((np.abs(H) ** 2).mean(axis=0, keepdims=True))
+    np.testing.assert_allclose(
+        np.sqrt(recorded(Front(0.0, 0.01)).variance),
+        np.broadcast_to(0.01 * rms, H.shape),
+        rtol=1e-9,
+    )
+
+
+def test_noise_has_no_preferred_phase():
+    """Real and imaginary part of the noise share its variance and are uncorrelated."""
+    found = recorded(Front(0.01, 0.003))
+    e = ((found.values - exact()) / np.sqrt(found.variance)).ravel()
+    bound = 5 / np.sqrt(e.size)
+    assert abs(np.mean(e**2)) < 1.5 * bound
+    assert abs(np.mean(e)) < bound
+
+
+def test_seeds_differ():
+    a, b = recorded(Front(), 0), recorded(Front(), 1)
+    assert np.all(a.values != b.values)
