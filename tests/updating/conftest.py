@@ -1,0 +1,31 @@
+"""A plate made ready, with a recording of a slightly different one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.effects.ordinary import ordinary
+from chladni.model.plates import plate
+from chladni.updating.likelihood import Responses
+from chladni.updating.reduced import evaluate
+from chladni.updating.workbench import workbench
+
+TOP = 200.0
+
+
+@pytest.fixture(scope="session")
+def bench():
+    return workbench(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
+
+
+@pytest.fixture(scope="session")
+def responses(bench):
+    """Two shakers and four sensors on a plate 4 % stiffer than the model, level up to 200 Hz."""
+    outputs, inputs = bench.grids.rows[[0, 6, 20, 45]], bench.grids.rows[[0, 33]]
+    s = 2 * np.pi * np.linspace(25, TOP, 40) * (0.03 + 1j)
+    use = np.ones((40, 4), bool)
+    use[5:9, 1] = False
+    empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).over(bench.model)
+    stiffer = evaluate(bench.model, [ordinary(bench.sheet, "E", [0])], np.array([0.04]))
+    return replace(empty, values=empty.model(stiffer))
