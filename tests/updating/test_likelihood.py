@@ -1,0 +1,108 @@
+"""Residuals vanish at the truth, and their slopes are the differences of themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.catalogue import Setup, extra_support, point_mass
+from chladni.effects.ordinary import gain, ordinary
+from chladni.effects.sensors import sensor_fault
+from chladni.updating.likelihood import Poles
+from chladni.updating.reduced import evaluate
+
+
+@pytest.fixture(scope="module")
+def effects(bench):
+    setup = Setup((1, 63), (7,), 1.41, 200.0)
+    spot = bench.grids.position(26)
+    return [
+        ordinary(bench.sheet, "E", [0]), ordinary(bench.sheet, "t", [0]),
+        point_mass(bench.sheet, setup, bench.grids, spot, 1),
+        extra_support(bench.sheet, setup, bench.grids, spot + 12, 1),
+        gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
+    ]  # fmt: skip
+
+
+X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.15, -0.3])
+
+
+@pytest.fixture(scope="module")
+def poles(bench):
+    state = evaluate(bench.model, [ordinary(bench.sheet, "E", [0])], np.array([0.004]), False)
+    f = np.sqrt(state.lam[6:11]) / (2 * np.pi)
+    every = np.ones(5, bool)
+    return Poles(f, np.full(5, 1e-3), every, np.ones(5), (20.0, 1.01 * f[-1]))
+
+
+def check_slopes(data, model, effects, x):
+    _, J = data.residual(evaluate(model, effects, x), True)
+    h = 1e-4  # next to an antiresonance ln H turns within 1e-3
+
+    def r(x):
+        return data.residual(evaluate(model, effects, x, False), False)[0]
+
+    for k, e in enumerate(h * np.eye(len(x))):
+        slope = (8 * (r(x + e) - r(x - e)) - (r(x + 2 * e) - r(x - 2 * e))) / (12 * h)
+        assert_allclose(J[:, k], slope, atol=1e-5 * np.abs(J[:, k]).max() + 1e-9)
+
+
+def near(data, model, effects, x):
+    """A recording near enough that no phase wraps within a difference."""
+    return replace(data, values=data.model(evaluate(model, effects, 0.98 * x, False)))
+
+
+def test_slopes_of_responses(bench, responses, effects):
+    check_slopes(near(responses, bench.model, effects, X), bench.model, effects, X)
+
+
+@pytest.mark.parametrize("quantity", ["receptance", "mobility"])
+def test_slopes_of_other_quantities(bench, responses, quantity, effects):
+    data = near(replace(responses, quantity=quantity), bench.model, effects[:2], X[:2])
+    check_slopes(data, bench.model, effects[:2], X[:2])
+
+
+def test_slopes_of_poles(bench, poles):
+    pair = [ordinary(bench.sheet, q, [0]) for q in ("E", "rho")]
+    check_slopes(poles, bench.model, pair, np.array([0.002, -0.001]))
+
+
+def test_nothing_is_left_at_the_truth(bench, responses, poles):
+    stiffer = [ordinary(bench.sheet, "E", [0])]
+    r, _ = responses.residual(evaluate(bench.model, stiffer, np.array([0.04])), True)
+    assert_allclose(r, 0, atol=1e-8)
+    assert len(r) == 2 * 2 * responses.use.sum()
+    r, _ = poles.residual(evaluate(bench.model, stiffer, np.array([0.004])), True)
+    assert_allclose(r, 0, atol=1e-7)
+
+
+def test_a_gain_is_its_logarithm_on_every_line(bench, responses):
+    stiffer, level = ordinary(bench.sheet, "E", [0]), gain(4, 0.5)
+    state = evaluate(bench.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
+    assert_allclose(responses.deviation(state), np.log10(2.0), atol=1e-9)
+
+
+def test_a_reversed_channel_is_half_a_turn_on_that_channel(bench, responses):
+    wrong = sensor_fault("x", 2, 4, -1, 0.0)
+    state = evaluate(bench.model, [ordinary(bench.sheet, "E", [0]), wrong], np.array([0.04, 0.0]))
+    turn = np.abs(responses.deviation(state).imag) * np.log(10)
+    assert_allclose(turn[:, 2], np.pi, atol=1e-8)
+    assert_allclose(turn[:, [0, 1, 3]], 0, atol=1e-8)
+
+
+def test_stiffness_scales_every_frequency_by_its_root(bench, poles):
+    """ln f = ln E / 2, seen through the pairing."""
+    stiffer = [ordinary(bench.sheet, "E", [0])]
+    state = evaluate(bench.model, stiffer, np.array([0.004 + 0.01]))
+    delta, test, model = poles.deviation(state)
+    assert test.tolist() == [0, 1, 2, 3, 4]
+    assert model.tolist() == [6, 7, 8, 9, 10]
+    assert_allclose(delta, 0.005, rtol=1e-6)
+    assert_allclose(poles.Q(state, poles.use), (0.005 / np.log(10)) ** 2, rtol=1e-6)
+
+
+def test_noise_widens_the_spread_in_squares(responses):
+    noise = np.full(responses.values.shape, 0.02)
+    wider = replace(responses, noise=noise).spread()
+    assert_allclose(wider**2, responses.spread() ** 2 + 0.02**2)
