@@ -1,0 +1,93 @@
+"""One evaluation of the reduced model with its gradient against one full solve, as ratios.
+
+    python benchmarks/reduced.py                # the demonstration's panel and one of 33 000 dofs
+
+Ten parameters: E and rho of each of two parts, a mass, a spring, and a thinning (size, width and
+place). A full solve is assembly and modes up to the same frequency; finite differences need eleven
+of them for the same gradient. Shortest processor time of several runs, one thread.
+"""
+
+import os
+
+os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+import time
+
+import numpy as np
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.effect import count
+from chladni.effects.ordinary import ordinary
+from chladni.effects.points import MassEffect, Suspension, strength
+from chladni.effects.thickness import thickness_distribution
+from chladni.fem.assemble import structure
+from chladni.model.plates import folded_panel
+from chladni.updating.reduced import evaluate
+from chladni.updating.workbench import REACH, workbench
+
+TOP = 380.0  # Hz
+SIZES = {"demonstration": 0.02, "fine": 0.0065}
+
+
+def best(method, repeats):
+    """Shortest processor time of several runs [s]."""
+    times = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        method()
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def effects(bench):
+    """Ten parameters, none of which leaves the model as it is."""
+    places = bench.candidates
+    one, other = (places.rows[k : k + 1] for k in (3, 7))
+    grids = tuple(int(places.grids[k]) for k in (3, 7))
+    mass = strength("m", "kg", 0.05, 1.0, (0.0,))
+    spring = strength("k", "N/m", 5e3, 1.0, (0.0,))
+    thin = thickness_distribution(bench.sheet, 0, np.array([-1.6, np.log(0.15), 0.1, 0.0]), 1)
+    return [
+        *(ordinary(bench.sheet, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
+        MassEffect((mass,), "", grids=grids[:1], rows=one),
+        Suspension((spring,), "", grids=grids[1:], rows=other, directions=np.eye(3)[2:]),
+        thin,
+    ]
+
+
+def row(name, edge):
+    """One line of the table."""
+    assembly = folded_panel(0.6, 0.3, 0.04, 0.01, edge, 1e-3)
+    built = structure(assembly)
+    begin = time.process_time()
+    bench = workbench(assembly, TOP, built=built)
+    ready = time.process_time() - begin
+    chosen = effects(bench)
+    x = np.full(count(chosen), 0.05)
+    plain = best(lambda: evaluate(bench.model, chosen, x, gradient=False), 10)
+    full_gradient = best(lambda: evaluate(bench.model, chosen, x), 10)
+
+    def solve():
+        normal_modes(structure(assembly).system, band=TOP)
+
+    full = best(solve, 2)
+    n, r = bench.model.basis.shape
+    ratios = f"{full / full_gradient:.0f} | {(1 + count(chosen)) * full / full_gradient:.0f}"
+    times = f"{1e3 * plain:.1f} | {1e3 * full_gradient:.1f} | {full:.2f} | {ready:.1f}"
+    return f"| {name} | {n} | {r} | {count(chosen)} | {times} | {ratios} |"
+
+
+def main():
+    """Print the table."""
+    print(f"Modes up to {TOP:g} Hz; the basis holds those up to {REACH * TOP:g} Hz.\n")
+    print(
+        "| panel | dofs | basis | parameters | value [ms] | with gradient [ms] | full solve [s] "
+        "| made ready once [s] | full / gradient | 11 full / gradient |"
+    )
+    print("|" + "---|" * 10)
+    for name, edge in SIZES.items():
+        print(row(name, edge))
+
+
+if __name__ == "__main__":
+    main()
