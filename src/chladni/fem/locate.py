@@ -60,18 +60,30 @@ def locate(points: np.ndarray, quads: np.ndarray, where: np.ndarray) -> Located:
 def _nearest_in_triangle(
     X: np.ndarray, where: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Barycentric weights clipped to the triangle, distance, unit normal."""
+    """Barycentric weights of the nearest point of each triangle, its distance, unit normal."""
     a, e1, e2 = X[:, 0], X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]
     n = np.cross(e1, e2)
     area2 = np.maximum((n**2).sum(axis=1), 1e-300)
     r = where - a
     u = np.einsum("ki,ki->k", np.cross(r, e2), n) / area2
     v = np.einsum("ki,ki->k", np.cross(e1, r), n) / area2
-    w = np.clip(np.stack([1 - u - v, u, v], axis=1), 0.0, None)
-    w = w / w.sum(axis=1, keepdims=True)
+    w = np.stack([1 - u - v, u, v], axis=1)
+    w = np.where(np.all(w >= 0, axis=1, keepdims=True), w, _nearest_on_sides(X, where))
     d = np.linalg.norm(np.einsum("kc,kci->ki", w, X) - where, axis=1)
     d = np.where(area2 > 1e-290, d, np.inf)
     return w, d, n / np.sqrt(area2)[:, None]
+
+
+def _nearest_on_sides(X: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Barycentric weights of the nearest point of each triangle's sides (k, 3)."""
+    side = np.roll(X, -1, axis=1) - X
+    along = np.einsum("kci,kci->kc", where[:, None] - X, side)
+    s = np.clip(along / np.maximum((side**2).sum(axis=2), 1e-300), 0, 1)
+    d2 = ((X + s[:, :, None] * side - where[:, None]) ** 2).sum(axis=2)
+    best, k = d2.argmin(axis=1), np.arange(len(X))
+    w = np.zeros((len(X), 3))
+    w[k, best], w[k, (best + 1) % 3] = 1 - s[k, best], s[k, best]
+    return w
 
 
 def rows_at(structure: Structure, located: Located, directions: np.ndarray) -> sp.csr_array:
