@@ -1,0 +1,121 @@
+"""A mesh twice as fine is the same structure."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.fem.assemble import structure
+from chladni.model.plates import box, grid, plate, sheet
+from chladni.model.refine import refined
+
+
+def area(assembly):
+    X = assembly.points[assembly.shells.nodes]
+    return np.linalg.norm(np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]), axis=1) / 2
+
+
+def triangles():
+    points, quads = grid(np.linspace(0, 0.4, 5), np.linspace(0, 0.3, 4))
+    return sheet(points, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), 1e-3)
+
+
+def cylinder(n, R=0.2):
+    """A quarter of a cylinder about x, n shells round it."""
+    points, quads = grid(np.linspace(0, 0.3, 4), np.linspace(0, np.pi / 2, n + 1))
+    x, angle = points[:, 0], points[:, 1]
+    return sheet(np.stack([x, R * np.cos(angle), R * np.sin(angle)], axis=1), quads, 1e-3)
+
+
+@pytest.mark.parametrize("make", [lambda: plate(0.4, 0.3, 4, 3, 1e-3), triangles, box])
+def test_flat_faces_keep_their_area_in_four_equal_pieces(make):
+    coarse = make()
+    fine = refined(coarse)
+    assert len(fine.shells) == 4 * len(coarse.shells)
+    assert_allclose(area(fine).sum(), area(coarse).sum(), rtol=1e-12)
+    assert_allclose(np.sort(area(fine)), np.sort(np.repeat(area(coarse) / 4, 4)), rtol=1e-9)
+    assert fine.shells.triangle.sum() == 4 * coarse.shells.triangle.sum()
+
+
+def test_points_are_those_of_the_plate_of_twice_as_many_elements():
+    fine, expected = refined(plate(0.4, 0.3, 4, 3, 1e-3)), plate(0.4, 0.3, 8, 6, 1e-3)
+    assert len(fine.points) == 9 * 7
+
+    def ordered(points):
+        return points[np.lexsort(np.round(points, 9).T)]
+
+    assert_allclose(ordered(fine.points), ordered(expected.points), atol=1e-12)
+
+
+def test_old_points_keep_rows_and_ids_and_new_ids_are_new():
+    coarse = plate(0.4, 0.3, 4, 3, 1e-3)
+    coarse = replace(coarse, ids=10 * coarse.ids)
+    fine = refined(coarse)
+    n = len(coarse.ids)
+    assert np.array_equal(fine.ids[:n], coarse.ids)
+    assert np.array_equal(fine.points[:n], coarse.points)
+    assert np.all(np.diff(fine.ids) > 0)
+
+
+def test_normals_and_parts_stay():
+    coarse = box()
+    fine = refined(coarse)
+    for k in range(3):
+        assert_allclose(
+            area(fine)[fine.shells.part == k].sum(), area(coarse)[coarse.shells.part == k].sum()
+        )
+
+    def upward(a):
+        X = a.points[a.shells.nodes]
+        return np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]) / 2
+
+    # the divergence theorem: Σ x·n A = 3 V, negative were any shell turned over
+    for a in (coarse, fine):
+        middle = a.points[a.shells.nodes].mean(axis=1)
+        assert_allclose(np.einsum("ij,ij->", middle, upward(a)), 3 * 0.3 * 0.2 * 0.1, rtol=1e-9)
+
+
+@pytest.mark.parametrize("make", [lambda: plate(0.4, 0.3, 4, 3, 1e-3), triangles])
+def test_thickness_linear_over_the_plate_stays_that_function(make):
+    coarse = make()
+
+    def law(assembly):
+        x, y, _ = assembly.points[assembly.shells.nodes].transpose(2, 0, 1)
+        return 1e-3 * (1 + 2 * x - y)
+
+    shells = replace(coarse.shells, thickness=law(coarse))
+    fine = refined(replace(coarse, shells=shells))
+    assert_allclose(fine.shells.thickness, law(fine), rtol=1e-12)
+
+
+def test_new_points_lie_on_the_cylinder_to_fourth_order():
+    """Off the chord by h²/8R before, by O(h⁴) after."""
+    off = []
+    for n in (6, 12):
+        fine = refined(cylinder(n))
+        radius = np.hypot(fine.points[:, 1], fine.points[:, 2])
+        inner = (fine.points[:, 1] > 0.05) & (fine.points[:, 2] > 0.05)
+        off.append(np.abs(radius - 0.2)[inner].max())
+    sagitta = 0.2 * (1 - np.cos(np.pi / 24))
+    assert off[0] < 0.1 * sagitta
+    assert off[0] / off[1] > 10
+
+
+def test_folds_stay_sharp():
+    fine = refined(box())
+    outside = np.maximum(fine.points - [0.3, 0.2, 0.1], -fine.points).max()
+    assert outside < 1e-12
+
+
+def test_frequencies_converge_at_second_order():
+    meshes = [plate(0.4, 0.3, 6, 4, 1.5e-3)]
+    for _ in range(3):
+        meshes.append(refined(meshes[-1]))
+    f = [normal_modes(structure(m).system, band=150.0).frequency[6:10] for m in meshes]
+    steps = [np.abs(b / a - 1) for a, b in pairwise(f)]
+    assert np.all(steps[1] < steps[0] / 2.5)
+    assert np.all(steps[2] < steps[1] / 2.5)
+    assert steps[2].max() < 0.005
