@@ -14,7 +14,8 @@ from chladni.planning import Wishes, find_places
 from chladni.planning.plan import mounts_at, shapes, target_modes
 from chladni.updating.calibration import Weighing
 from chladni.updating.likelihood import Responses
-from chladni.updating.prepare import Places, Prepared, Question, prepare
+from chladni.updating.prepare import prepare
+from chladni.updating.question import Places, Prepared, Question
 from chladni.updating.reduced import State, evaluate
 
 from .calibration import Question as Calibration
