@@ -209,6 +209,20 @@ def test_springs_to_ground(deck):
     assert gone == []
 
 
+@pytest.mark.parametrize("quantity", ["E", "rho"])
+def test_plane_stiffness(tmp_path, quantity):
+    """A MAT2's six moduli or its density."""
+    Q = plate(0.3, 0.2, 4, 3, 1e-3).parts[0].section.membrane.plane_stress()
+    Q[0, 2] = Q[2, 0] = 0.03 * Q[0, 0]
+    made = plate(0.3, 0.2, 4, 3, 1e-3, Anisotropic(Q, rho=7850.0))
+    made = made.with_parts((made.parts[0].with_section(rigid_shear=True),))
+    deck, before, units = opened(made, tmp_path)
+    effect = ordinary(sheet(structure(before), 4), quantity, (0,))
+    after = effect.apply(before, np.array([0.1]))
+    found, _, _ = repaired(deck, before, after, units)
+    same(found, after, before)
+
+
 def test_what_no_card_says_is_refused(deck):
     made, before, units = deck
     heavy = with_masses(before, (int(before.ids[0]),), 0.1)

@@ -50,7 +50,8 @@ def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
         if (old := known.get((k, name))) is None:
             raise ModelError(f"part {after.parts[k].name} has a {name} material the deck has not")
         kinds = users.setdefault(old.id, {})
-        kinds.setdefault(old if _equal(old, material) else material, []).append((k, name))
+        now = next((m for m in (old, *kinds) if _equal(m, material)), material)
+        kinds.setdefault(now, []).append((k, name))
     free = 1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind))
     out: list[Change] = []
     for id, kinds in users.items():
@@ -69,9 +70,10 @@ def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
 
 
 def _equal(a: Material, b: Material) -> bool:
-    """The same numbers; an anisotropic one is compared by what it is."""
-    if isinstance(a, Anisotropic) or isinstance(b, Anisotropic):
-        return a is b
+    """The same numbers."""
+    if isinstance(a, Anisotropic) and isinstance(b, Anisotropic):
+        same = np.array_equal(a.Q, b.Q) and np.array_equal(a.G, b.G)
+        return same and (a.rho, a.damping, a.id) == (b.rho, b.damping, b.id)
     return a == b
 
 
@@ -79,6 +81,8 @@ def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> 
     """One card's values, or another card in its place."""
     if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
         return [Replace("MAT1", id, _card(now, units))]
+    if isinstance(now, Anisotropic) and id in _ids(deck, "MAT2"):
+        return list(_stiffness(id, was, now, units))
     if type(was) is not type(now) or isinstance(now, Anisotropic):
         kinds = f"{type(was).__name__} to {type(now).__name__}"
         raise ModelError(f"{deck.path}: material {id} cannot be changed from {kinds}")
@@ -99,6 +103,15 @@ def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Ch
         a, b = getattr(was, name), getattr(now, name)
         if a is not None and b is not None and not np.isclose(a, b, rtol=1e-9, atol=0):
             yield SetField(kind, id, field, b / unit)
+
+
+def _stiffness(id: int, was: Material, now: Anisotropic, units: Units) -> Iterator[Change]:
+    """G11 to G33 and RHO of a MAT2."""
+    for i, j in zip(*np.triu_indices(3), strict=True):
+        if not np.isclose(was.plane_stress()[i, j], now.Q[i, j], rtol=1e-9, atol=0):
+            yield SetField("MAT2", id, f"G{i + 1}{j + 1}", float(now.Q[i, j] / units.stress))
+    if not np.isclose(was.rho, now.rho, rtol=1e-9, atol=0):
+        yield SetField("MAT2", id, "RHO", now.rho / units.density)
 
 
 def _card(m: Material, units: Units) -> list[float | int | str | None]:
@@ -135,6 +148,8 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
 
 
 def _ids(deck: Deck, kind: str) -> list[int]:
+    if kind not in deck.cards:
+        return []
     words = deck[kind].words(1).tolist()
     return [int(w) for w in words if w.isdigit()]
 
