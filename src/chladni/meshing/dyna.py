@@ -87,8 +87,7 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
     """The fields of some lines as numbers (n, fields); blank is zero."""
     lines = [block.lines[r] for r in rows]
     if any("," in line for line in lines):
-        cells = [[c.strip() for c in line.split(",")][: len(widths)] for line in lines]
-        words = np.array([row + [""] * (len(widths) - len(row)) for row in cells], dtype="U32")
+        words = np.array([_split(line, widths) for line in lines], dtype="U32")
     else:
         edges = np.r_[0, np.cumsum(widths)]
         wide = np.array([line.ljust(edges[-1])[: edges[-1]] for line in lines], dtype="U")
@@ -103,6 +102,15 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
     except ValueError:
         row, word = _first_bad(words, kind)
         raise block.fault(int(rows[row]), f"{word!r} is no number") from None
+
+
+def _split(line: str, widths: Sequence[int]) -> list[str]:
+    """Fields of one line, free where it has commas, else fixed."""
+    if "," in line:
+        cells = [c.strip() for c in line.split(",")][: len(widths)]
+        return cells + [""] * (len(widths) - len(cells))
+    edges = np.r_[0, np.cumsum(widths)].tolist()
+    return [line[a:b].strip() for a, b in pairwise(edges)]
 
 
 def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
@@ -234,7 +242,7 @@ def _keyword_lines(mesh: FormedMesh, unit: Units) -> Iterator[str]:
     for id_, name in sorted(mesh.names.items()):
         yield f"*PART\n{name}\n{id_:10d}{id_:10d}{0:10d}"
     yield "*NODE"
-    digits = max(0, round(np.log10(unit.length / 1e-7)))
+    digits = max(0, int(np.ceil(np.log10(unit.length / 1e-7) - 1e-9)))
     for id_, (x, y, z) in zip(mesh.ids.tolist(), (mesh.points / unit.length).tolist(), strict=True):
         yield f"{id_:8d}{x:16.{digits}f}{y:16.{digits}f}{z:16.{digits}f}"
     yield "*ELEMENT_SHELL_THICKNESS"

@@ -19,6 +19,7 @@ from .thickness import samples, shell_area
 
 TRIM = 0.8  # share of the points that counts: the rest may have no partner
 _ROUGH, _FINE = 400, 2500  # points in the search and in the last improvement
+_NEAR = 5  # shells tried a point; a neighbour's face does as well here
 _GATE = 0.5  # least |cos| between the normals of partners
 _REFLECTION = np.diag([1.0, -1.0, 1.0])
 
@@ -85,8 +86,11 @@ def align(
     proper = _best(rough, mirrored=False)
     mirror = _best(rough, mirrored=True)
     source, normal = _sampled(formed, _FINE)
-    found = [_icp(target, source, normal, *rough[k][:2], 40) for k in (proper, mirror)]
-    use_mirror = found[1][2] < 0.3 * found[0][2]
+    found = [_icp(target, source, normal, *rough[proper][:2], 40)]
+    use_mirror = False
+    if rough[mirror][2] < rough[proper][2]:
+        found.append(_icp(target, source, normal, *rough[mirror][:2], 40))
+        use_mirror = found[1][2] < 0.3 * found[0][2]
     if use_mirror and not allow_mirror:
         raise ModelError(
             f"the formed mesh fits as a mirror image ({1e3 * found[1][2]:.2f} mm) but not as it is "
@@ -163,10 +167,10 @@ def _icp(
     steps: int,
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Trimmed point-to-plane ICP: min Σ (n·(ω x p + d - (q - p)))² over the nearest 80 %."""
-    residual = np.inf
+    residual = before = np.inf
     for _ in range(steps):
         p = source @ R.T + d
-        feet = target.feet(p, normal @ R.T, _GATE)
+        feet = target.feet(p, normal @ R.T, _GATE, near=_NEAR)
         ok = np.isfinite(feet.distance)
         far = np.where(ok, feet.distance, np.linalg.norm(np.ptp(source, axis=0)))
         keep = np.argsort(far, kind="stable")[: int(TRIM * len(p))]
@@ -179,8 +183,9 @@ def _icp(
         step = np.linalg.lstsq(A, np.einsum("ki,ki->k", n, gap), rcond=1e-10)[0]
         turn = _rotation(step[:3])
         R, d = turn @ R, turn @ d + step[3:]
-        if np.abs(step).max() < 1e-9:
+        if np.abs(step).max() < 1e-8 or abs(before - residual) < 1e-4 * residual:
             break
+        before = residual
     return R, d, residual
 
 

@@ -85,7 +85,11 @@ class Surface:
         return cls(name, assembly.points, nodes, rows, tree, owner)
 
     def feet(
-        self, places: np.ndarray, normal: np.ndarray | None = None, cosine: float = 0.7
+        self,
+        places: np.ndarray,
+        normal: np.ndarray | None = None,
+        cosine: float = 0.7,
+        near: int = NEAR,
     ) -> Feet:
         """The nearest point of the surface to each place (k, 3).
 
@@ -93,9 +97,9 @@ class Surface:
         do not count; where none is left the distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
-        k, count = len(places), min(NEAR, len(self.owner))
-        near = self.owner[self.tree.query(places, count)[1].reshape(k, count)]
-        triangles = self.nodes[near][..., _HALVES].reshape(k, 2 * count, 3)
+        k, count = len(places), min(near, len(self.owner))
+        tried = self.owner[self.tree.query(places, count)[1].reshape(k, count)]
+        triangles = self.nodes[tried][..., _HALVES].reshape(k, 2 * count, 3)
         x = self.points[triangles]
         weight = barycentric_foot(places[:, None], x)
         foot = np.einsum("kta,ktai->kti", weight, x)
@@ -106,7 +110,7 @@ class Surface:
             distance = np.where(away, np.inf, distance)
         row, best = np.arange(k), distance.round(12).argmin(axis=1)
         return Feet(
-            near[row, best // 2],
+            tried[row, best // 2],
             foot[row, best],
             triangles[row, best],
             weight[row, best],
