@@ -115,6 +115,23 @@ def test_a_wall_does_not_take_the_floor():
         map_thickness(assembly, source)
 
 
+def test_beside_a_wall_the_floor_counts():
+    """A formed floor 1 mm below and a rib through the sheet itself: all of it is floor."""
+    plan, quads = grid(np.linspace(0, 0.1, 11), np.linspace(0, 0.1, 11))
+    floor = np.column_stack([plan, np.full(len(plan), -0.001)])
+    rib = np.column_stack([plan[:, 0], np.full(len(plan), 0.0473), plan[:, 1] - 0.05])
+    cells = np.vstack([quads, quads + len(plan)])
+    t = np.repeat([0.6e-3, 1.2e-3], len(quads))[:, None] * np.ones(4)
+    ids = np.arange(1, 2 * len(plan) + 1)
+    source = FormedMesh(ids, np.vstack([floor, rib]), cells, np.ones(len(cells), int), t)
+    flat = floor + np.array([0, 0, 0.001])
+    part = Part(1, "floor", ShellSection(0.7e-3, STEEL, STEEL))
+    sheet = Sheet("floor", flat, flat, quads, np.full(len(quads), MAIN))
+    assembly, _ = of_sheets({"floor": sheet}, (part,))
+    result = map_thickness(assembly, source, pairs={"floor": 1})
+    np.testing.assert_allclose(result.assembly.shells.thickness, 0.6e-3)
+
+
 def test_what_has_no_partner_keeps_its_gauge():
     """Half the sheet is missing from the file: coverage says so, the gauge stays."""
     source = formed(0.0)

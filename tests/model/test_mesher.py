@@ -37,7 +37,10 @@ def polygon_area(loop):
 
 def region(size):
     outer = resampled(
-        rounded([(-0.4, 0, 0.09), (0.4, 0, 0.09), (0.5, 0.5, 0.2), (-0.5, 0.5, 0.2)]), size
+        rounded(
+            [(-0.4, 0, 0.09), (0.4, 0, 0.09), (0.5, 0.5, 0.1), (0, 0.4, 0.2), (-0.5, 0.5, 0.1)]
+        ),
+        size,
     )
     hole = resampled(rectangle(-0.1, 0.2, 0.1, 0.35, 0.03), size)
     line = resampled(stadium((-0.2, 0.12), (0.2, 0.12), 0.02), size)

@@ -58,7 +58,7 @@ def test_parts_are_table_1(coarse):
     assert (screw.E, screw.nu, screw.rho) == (210e9, 0.3, 7850.0)
 
 
-@pytest.mark.parametrize("size", [0.030, 0.025, 0.020, 0.016])
+@pytest.mark.parametrize("size", [0.030, 0.020])
 def test_mass_at_any_size(size):
     """10.5 to 11.1 kg (thesis 10.82 to 10.87), pieces joined, no fold, normals alike."""
     made = tailgate_specimen(TailgateDesign(size=size))
@@ -72,6 +72,7 @@ def test_mass_at_any_size(size):
     assert size < 0.030 or 2000 < grids < 4000
 
 
+@pytest.mark.slow
 def test_forming_takes_mass_away():
     """5 to 7 % (thesis 5.92)."""
     after = mass_properties(tailgate(replace(COARSE, formed=True)))[0]
@@ -175,6 +176,18 @@ def test_same_design_same_bits():
 def test_a_wrong_design_is_refused(change, named):
     with pytest.raises(ModelError, match=named):
         tailgate(replace(COARSE, **change))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [0.032, 0.027, 0.0223, 0.0173, 0.0127, 0.009])
+def test_odd_sizes(size):
+    """Nothing folds, hangs loose or is tied across thin air, whatever the size."""
+    for made in (
+        tailgate_specimen(TailgateDesign(size=size, hem="real")),
+        hood_specimen(HoodDesign(size=size, hem="real")),
+    ):
+        assert check_mesh(made.assembly).fit
+        assert max(j.distance for j in made.joints) < 0.005
 
 
 def test_hood():
