@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
 from difflib import get_close_matches
@@ -15,11 +16,11 @@ from ..fem.energy import mass_properties
 from ..meshing.curvature import Candidates
 from ..meshing.thickness import Mapped
 from ..model.assembly import Assembly
-from ..model.hood import HoodDesign, hood
+from ..model.hood import HoodDesign, hood_specimen
 from ..model.hood_formed import hood_forming_mesh
 from ..model.mesher_formed import FormedMesh
 from ..model.plates import box, folded_panel, plate
-from ..model.tailgate import tailgate
+from ..model.tailgate import Specimen, tailgate_specimen
 from ..model.tailgate_design import TailgateDesign
 from ..model.tailgate_formed import forming_mesh
 from ..model.tailgate_shape import Skin
@@ -50,7 +51,8 @@ def run(
     with started("specimen", Path(name), out) as job:
         job.progress("meshing", 0.0)
         values = dict(_setting(text) for text in settings or [])
-        made = build(size, values)
+        specimen = build(size, values)
+        made = specimen.assembly
         job.progress("writing", 0.3)
         write_assembly(made, job.keep(f"{name}.bdf", f"the deck, {units}"), system)
         mapped = None
@@ -60,15 +62,18 @@ def run(
             write_keyword(job.keep("formed_thickness.k", "thickness after forming"), formed, system)
             mapped = map_thickness(made, formed)
         job.progress("candidates for sensors", 0.7)
-        _page(job, made, mapped)
+        _page(job, specimen, mapped)
 
 
-def _page(job: Run, made: Assembly, mapped: Mapped | None) -> None:
+def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
     from ..meshing.curvature import candidates
+    from ..meshing.quality import check_mesh
     from ..view import scene
     from ..view.surface import surface
 
-    places = candidates(made)
+    made = specimen.assembly
+    places, check = candidates(made), check_mesh(made)
+    joints = Counter(j.kind for j in specimen.joints)
     write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
     after = mapped.assembly if mapped else made
     mass, pressed = mass_properties(made)[0], mass_properties(after)[0]
@@ -77,6 +82,8 @@ def _page(job: Run, made: Assembly, mapped: Mapped | None) -> None:
         "mass_formed_kg": pressed,
         "shells": len(made.shells),
         "candidates": len(places.ids),
+        "joints": joints,
+        "mesh": {"bad": check.bad, "loose": check.loose, "parts": [asdict(p) for p in check.parts]},
         "mapping": [asdict(p) for p in mapped.parts] if mapped else [],
     }
     job.json("specimen.json", facts)
@@ -95,6 +102,8 @@ def _page(job: Run, made: Assembly, mapped: Mapped | None) -> None:
     shown = [
         ("Shells", str(len(made.shells))),
         ("Grids", str(len(made.points))),
+        ("Shells of poor shape", str(len(check.bad))),
+        *((f"Joints: {kind}", str(count)) for kind, count in joints.items()),
         ("Mass of the deck", f"{number(mass, 5)} kg"),
         ("Mass after forming", f"{number(pressed, 5)} kg"),
         ("Candidates for sensors", str(len(places.ids))),
@@ -115,19 +124,19 @@ def _setting(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
 
 
-def _builder(name: str) -> Callable[[float | None, dict[str, Any]], Assembly]:
+def _builder(name: str) -> Callable[[float | None, dict[str, Any]], Specimen]:
     known = {"tailgate": _tailgate, "hood": _hood, "panel": _panel, "box": _box, "plate": _plate}
     if name not in known:
         raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
     return known[name]
 
 
-def _tailgate(size: float | None, values: dict[str, Any]) -> Assembly:
-    return tailgate(_made(TailgateDesign, _sized("size", size, values)))
+def _tailgate(size: float | None, values: dict[str, Any]) -> Specimen:
+    return tailgate_specimen(_made(TailgateDesign, _sized("size", size, values)))
 
 
-def _hood(size: float | None, values: dict[str, Any]) -> Assembly:
-    return hood(_made(HoodDesign, _sized("size", size, values)))
+def _hood(size: float | None, values: dict[str, Any]) -> Specimen:
+    return hood_specimen(_made(HoodDesign, _sized("size", size, values)))
 
 
 _FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
@@ -136,15 +145,19 @@ _FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
 }
 
 
-def _panel(size: float | None, values: dict[str, Any]) -> Assembly:
-    return _made(folded_panel, _sized("h", size, values))
+def _bare(assembly: Assembly) -> Specimen:
+    return Specimen(assembly, {}, {}, ())
 
 
-def _box(size: float | None, values: dict[str, Any]) -> Assembly:
-    return _made(box, _sized("h", size, values))
+def _panel(size: float | None, values: dict[str, Any]) -> Specimen:
+    return _bare(_made(folded_panel, _sized("h", size, values)))
 
 
-def _plate(size: float | None, values: dict[str, Any]) -> Assembly:
+def _box(size: float | None, values: dict[str, Any]) -> Specimen:
+    return _bare(_made(box, _sized("h", size, values)))
+
+
+def _plate(size: float | None, values: dict[str, Any]) -> Specimen:
     """500 x 400 x 1.2 mm unless told."""
     given = {"length": 0.5, "width": 0.4, "t": 1.2e-3, **values}
     h = 0.025 if size is None else 1e-3 * size
@@ -152,7 +165,7 @@ def _plate(size: float | None, values: dict[str, Any]) -> Assembly:
         n: max(1, round(_number(given, side) / h))
         for n, side in (("nx", "length"), ("ny", "width"))
     }
-    return _made(plate, {**counts, **given})
+    return _bare(_made(plate, {**counts, **given}))
 
 
 def _number(values: dict[str, Any], key: str) -> float:
