@@ -245,6 +245,7 @@ def test_plan_sees_every_mode(deck, tmp_path):
     assert (out / "sensors.csv").read_text().count("output") == 8
 
 
+WITH_FILE = [c for c in COMMANDS if c not in ("demo", "study")]  # these two take no file
 BAD = {
     "missing": None,
     "empty": b"",
@@ -261,7 +262,7 @@ BAD = {
 @pytest.mark.parametrize(
     ("command", "fault"),
     [("modes", fault) for fault in BAD]
-    + [(c, fault) for c in COMMANDS if c != "modes" for fault in ("missing", "binary", "no grids")],
+    + [(c, f) for c in WITH_FILE if c != "modes" for f in ("missing", "binary", "no grids")],
 )
 def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     path, content = tmp_path / "bad.bdf", BAD[fault]
@@ -276,7 +277,7 @@ def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     assert not list(tmp_path.glob("runs/*")), "half a run was left"
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c not in ("report", "specimen")])
+@pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in ("report", "specimen")])
 def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
