@@ -34,7 +34,7 @@ LIBRARIES = {
     "view": {"pyvista", "matplotlib", "PIL"},
     "study": {"dask"},
     "report": {"jinja2"},
-    "cli": {"typer", "rich"},
+    "cli": {"typer", "rich", "threadpoolctl"},
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
 SOURCES = sorted(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from threadpoolctl import threadpool_limits
 
 from ..case import Case, load_case
 from ..case.repair import changes
@@ -47,7 +48,12 @@ def opened(source: Path) -> Case:
 
 
 def answer(job: Run, case: Case, search: bool = True) -> dict[str, Any]:
-    """Diagnose (or only calibrate) a case into the folder of the run."""
+    """Diagnose (or only calibrate) a case into the folder of the run, on one BLAS thread."""
+    with threadpool_limits(1):
+        return _answered(job, case, search)
+
+
+def _answered(job: Run, case: Case, search: bool) -> dict[str, Any]:
     job.progress("identifying the recording", 0.02)
     asked = question(case)
     prepared = prepare(asked)

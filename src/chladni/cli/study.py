@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from threadpoolctl import threadpool_limits
 
 from ..errors import ChladniError, LabelError
 from ..output import write_json, write_text
@@ -60,7 +61,12 @@ def _mapped(jobs: list[tuple[str, str, int, Path]], workers: int) -> Any:
 
 
 def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
-    """Make a case, diagnose its folder, then open the seal and score."""
+    """Make a case, diagnose its folder on one BLAS thread, then open the seal and score."""
+    with threadpool_limits(1):
+        return _one(*job)
+
+
+def _one(name: str, effect: str, seed: int, place: Path) -> dict[str, Any]:
     from ..study.concealed import SPECIMENS, made, write
     from ..study.score import scored
     from ..updating.diagnosis import diagnose
@@ -68,7 +74,6 @@ def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
     from ..updating.prepare import prepare
     from .question import question
 
-    name, effect, seed, place = job
     folder = place / "cases" / f"{name}-{EFFECT_CODE.get(effect, effect)}-{seed}"
     seal = place / "sealed" / f"{folder.name}.json"
     write(made(SPECIMENS[name], effect, seed), folder, seal)
