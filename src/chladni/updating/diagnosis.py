@@ -154,7 +154,7 @@ def _closer(search: Search, lead: Trial) -> list[Trial]:
             search, "M" if effect.matrix == "M" else "K", grids, grids.position(effect.nearest(x))
         )
         start = np.array([x[0], 0.0, 0.0])
-        trial = search.trial(new, start, _fresh(search, lead))
+        trial = search.trial(new, start, _taken(search, lead, ("ordinary",)))
         out.append(trial)
         if trial.S > lead.S - 1:
             break
@@ -162,12 +162,12 @@ def _closer(search: Search, lead: Trial) -> list[Trial]:
     return out
 
 
-def _fresh(search: Search, lead: Trial) -> np.ndarray:
-    """Base parameters with the leader's ordinary ones and no scatter."""
+def _taken(search: Search, lead: Trial, kinds: tuple[str, ...]) -> np.ndarray:
+    """Base parameters at their prior mean, those of these kinds as the leader has them."""
     x, at = search.mean(), 0
     kept = search.without(lead.effect)
     for e in search.base:
-        if e in kept and e.kind == "ordinary":
+        if e in kept and e.kind in kinds:
             x[at : at + len(e.parameters)] = lead.fit.of(e)
         at += len(e.parameters)
     return x
@@ -175,16 +175,6 @@ def _fresh(search: Search, lead: Trial) -> np.ndarray:
 
 def _restarted(search: Search, null: Trial, trials: list[Trial]) -> Trial:
     """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
-    starts = []
-    for lead in trials[:2]:
-        kept = search.without(lead.effect)
-        x = search.mean()
-        at = 0
-        for e in search.base:
-            n = len(e.parameters)
-            if e in kept:
-                x[at : at + n] = lead.fit.of(e)
-            at += n
-        starts.append(x)
+    starts = [_taken(search, lead, ("ordinary", "nuisance")) for lead in trials[:2]]
     again = _base_trial(search, search.base, starts) if starts else null
     return again if again.S < null.S else null

@@ -66,9 +66,6 @@ def _by_responses(question: Question) -> Prepared:
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
-    f = lines[1]
-    outside = (f >= held_band[0]) & (f <= held_band[1])
-    held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
     nuisance = _nuisance(bench, built, top)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
@@ -82,6 +79,9 @@ def _by_responses(question: Question) -> Prepared:
             d.only(_training(f, low, fit_top, swapped)) for d, f in zip(data, lines, strict=True)
         ]
         search = replace(search, data=data[0])
+    f = lines[1]
+    outside = (f >= held_band[0]) & (f <= held_band[1])
+    held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
     what = (
         f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"

@@ -144,8 +144,8 @@ def _scale_prior(scale: float, median: float = 0.006) -> float:
     return float((np.log(scale / median) / SCALE_SD) ** 2)
 
 
-def deck_state(trial: Trial, gradient: bool = False) -> np.ndarray:
-    """X of a trial with every nuisance at its prior mean: what can be written into a deck."""
+def deck_state(trial: Trial) -> np.ndarray:
+    """Parameters of a trial without scatter and jitter, which no deck can hold."""
     x = trial.fit.x.copy()
     at = 0
     for e in trial.fit.effects:
