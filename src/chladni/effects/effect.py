@@ -1,11 +1,12 @@
 """What may differ between model and article, and how it enters the reduced model.
 
-An effect acts in three ways, and in no other:
+An effect acts in four ways, and in no other:
 
 - it multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells.  Multiplying calibrated operators, never subtracting nominal
   ones, keeps every stiffness positive whatever the other parameters do;
 - it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass);
+- it adds *operators* c(p) A, A what a part other than a sheet has in K or M already, c > -1;
 - it changes *channels* of the test: gain, sign.
 
 Parameters are unbounded numbers x with a Gaussian prior; :meth:`Parameter.value` gives the
@@ -78,6 +79,16 @@ class PointTerm:
 
 
 @dataclass(frozen=True, eq=False)
+class MatrixTerm:
+    """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,)."""
+
+    matrix: Literal["K", "M"]
+    operator: sp.csr_array
+    coefficient: float
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class ChannelChange:
     """log10 of the factor on every output, complex: level and phase (n_out,), (n_out, n_p)."""
 
@@ -119,6 +130,10 @@ class Effect:
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """Point springs and masses it adds."""
+        return ()
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """Operators of the structure it adds."""
         return ()
 
     def outputs(self, x: np.ndarray) -> ChannelChange | None:

@@ -1,11 +1,11 @@
 """The reduced model in which every hypothesis is tried.
 
-K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb over groups g of shells, M likewise; E, t, ρ
-are the sums of the log fields of all effects at x.  One evaluation is a small dense eigenproblem;
-derivatives are exact, because K and M are known functions of the fields.
+K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells, M likewise;
+E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small dense
+eigenproblem; derivatives are exact, because K and M are known functions of the fields.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -47,12 +47,16 @@ class Reduced:
 
     def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
         """Rows of the structure in the basis (k, r); projected once where they are to be kept."""
-        if not keep:
-            return np.asarray(rows @ self.basis)
-        known = self._seen.get(id(rows))
-        if known is None or known[0] is not rows:
-            known = rows, np.asarray(rows @ self.basis)
-            self._seen[id(rows)] = known
+        return self._once(rows, lambda: rows @ self.basis) if keep else rows @ self.basis
+
+    def operator(self, A: sp.csr_array) -> np.ndarray:
+        """Φᵀ A Φ of an operator of the structure (r, r); projected once."""
+        return self._once(A, lambda: _symmetric(self.basis.T @ (A @ self.basis)))
+
+    def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
+        known = self._seen.get(id(key))
+        if known is None or known[0] is not key:
+            known = self._seen[id(key)] = key, np.asarray(made())
         return known[1]
 
     def extended(self, vectors: np.ndarray) -> Self:
@@ -75,8 +79,7 @@ class Reduced:
             out[r:, :r] = out[:r, r:].T
             return out
 
-        split = "" not in self.linear
-        pieces = self._pieces() if split else {"": (self.sheet.linear, self.sheet.cubic)}
+        pieces = self.pieces()
         linear = {k: grown(self.linear[k], A) for k, (A, _) in pieces.items()}
         cubic = {k: grown(self.cubic[k], B) for k, (_, B) in pieces.items()}
         mass = grown(self.mass, self.sheet.mass)
@@ -87,12 +90,15 @@ class Reduced:
             _seen={},
         )  # fmt: skip
 
-    def _pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Element matrices that grow with t and with t³, by the names of ``linear``."""
+        if "" in self.linear:
+            return {"": (self.sheet.linear, self.sheet.cubic)}
         return component_matrices(self.sheet.structure.assembly)
 
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
-        pieces = self._pieces()
+        pieces = component_matrices(self.sheet.structure.assembly)
         linear = {k: self.sheet.project(A, self.basis) for k, (A, _) in pieces.items()}
         cubic = {k: self.sheet.project(B, self.basis) for k, (_, B) in pieces.items()}
         return replace(self, linear=linear, cubic=cubic)
@@ -154,12 +160,12 @@ def evaluate(
         If the stiffness lost its positive (semi-)definiteness: an effect is wrong.
     """
     n_p = count(effects)
-    logs, slopes = _fields(model, effects, x)
+    logs, slopes = log_fields(model, effects, x)
     K, M, dK, dM = _shells(model, logs, slopes, gradient)
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
-    for effect, at in _slices(effects):
+    for effect, at in slices(effects):
         for term in effect.terms(x[at]):
             b = model.rows(term.rows, keep=not term.moving)
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
@@ -169,6 +175,12 @@ def evaluate(
                 for p, rows in term.moving.items():
                     half = (b.T * term.coefficient) @ model.rows(rows, keep=False)
                     slope[at.start + p] += half + half.T
+        for part in effect.matrices(x[at]):
+            A = model.operator(part.operator)
+            target, slope = (K, dK) if part.matrix == "K" else (M, dM)
+            target += part.coefficient * A
+            if gradient:
+                slope[at] += part.gradient[:, None, None] * A
         extra, d_extra = effect.weight(x[at])
         weight, dweight[at] = weight + extra, dweight[at] + d_extra
         if (change := effect.outputs(x[at])) is not None:
@@ -192,20 +204,31 @@ def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return lam, phi
 
 
-def _slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
+def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
+    """Every effect and where its parameters stand in x."""
     ends = np.cumsum([len(e.parameters) for e in effects])
     return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
 
 
-def _fields(
+def log_fields(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Sum of the log fields (g,) and their gradients (g, n_p), by name."""
+    """Sum of the log fields (g,) and their gradients (g, n_p), by name.
+
+    Raises
+    ------
+    ModelError
+        If a component of the plane stiffness is to change in a model that is not split by them.
+    """
     n, n_p = len(model.sheet), count(effects)
     logs = {name: np.zeros(n) for name in ("t", "E", "rho", *COMPONENTS)}
     slopes = {name: np.zeros((n, n_p)) for name in logs}
-    for effect, at in _slices(effects):
+    for effect, at in slices(effects):
         for change in effect.fields(x[at]):
+            if change.field in COMPONENTS and "" in model.linear:
+                raise ModelError(
+                    f"{effect.name} changes {change.field}; the model needs with_components()"
+                )
             logs[change.field] = logs[change.field] + change.value
             slopes[change.field][:, at] += change.gradient
     return logs, slopes

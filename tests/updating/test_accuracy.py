@@ -1,0 +1,130 @@
+"""The error estimate tells when a basis no longer serves, and the renewed basis does."""
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+from numpy.testing import assert_allclose
+
+from chladni.effects import catalogue
+from chladni.effects.ordinary import ordinary
+from chladni.effects.thickness import thickness_distribution
+from chladni.fem.assemble import structure
+from chladni.model.plates import folded_panel
+from chladni.updating.accuracy import accuracy, products
+from chladni.updating.reduced import evaluate
+from chladni.updating.workbench import workbench
+
+TOP = 300.0
+NAMES = ("thickness", "thinner", "stiffer", "thinning", "mass", "masses", "spring")
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return workbench(folded_panel(h=0.06), TOP, groups=24)
+
+
+@pytest.fixture(scope="module")
+def changes(bench):
+    """Effect and x of each kind of change."""
+    cloth = bench.sheet
+    sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
+    setup = catalogue.Setup(sensors, (), float(cloth.weight.sum()), TOP)
+    k = bench.grids.position(int(bench.candidates.grids[5]))
+    start = np.array([0.5, np.log(0.15), 0.1, 0.0])
+    return {
+        "thickness": (ordinary(cloth, "t", [0]), np.array([0.2])),
+        "thinner": (ordinary(cloth, "t", [1]), np.array([-0.2])),
+        "stiffer": (ordinary(cloth, "E", [0]), np.array([0.5])),
+        "thinning": (thickness_distribution(cloth, 0, start, 1), start),
+        "mass": (catalogue.point_mass(cloth, setup, bench.grids, k, 1), np.array([1.0, 0.2, 0.1])),
+        "masses": (catalogue.sensor_mass(cloth, setup)[0], np.array([0.5])),
+        "spring": (
+            catalogue.extra_support(cloth, setup, bench.grids, k, 1), np.array([2.0, 0.1, 0.2]),
+        ),
+    }  # fmt: skip
+
+
+def true_error(bench, effect, x):
+    """Relative frequency error of the reduced model against its own operators in full."""
+    model = bench.model
+    K, M = products(model, [effect], x, np.eye(len(model.basis)))
+    lam = evaluate(model, [effect], x, False).lam
+    at = (np.sqrt(np.maximum(lam, 0)) > 0.04 * np.pi * TOP) & (lam <= (2 * np.pi * TOP) ** 2)
+    sigma = 100.0  # rad²/s²: M has no drilling inertia, K no stiffness against rigid motion
+    theta = sl.eigh((M + M.T) / 2, (K + K.T) / 2 + sigma * M, eigvals_only=True)[::-1]
+    return np.sqrt(lam[at] / (1 / theta[: len(lam)][at] - sigma)) - 1
+
+
+@pytest.mark.parametrize("name", ["thickness", "stiffer", "mass"])
+def test_nothing_is_missing_at_the_basis_own_parameters(bench, changes, name):
+    effect, x = changes[name]
+    idle = np.array([-30.0, 0, 0]) if name == "mass" else 0 * x
+    found = accuracy(bench, bench.model, [effect], idle, TOP)
+    assert len(found.error) > 5
+    assert found.worst < 1e-9
+    assert found.serves()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_estimate_lies_between_four_fifths_of_the_error_and_the_error(bench, changes, name):
+    """4 κ / (1 + κ)² of Kantorovich is 0.8 at κ = 2.6, more than any of these changes makes."""
+    effect, x = changes[name]
+    due = true_error(bench, effect, x)
+    got = accuracy(bench, bench.model, [effect], x, TOP).error
+    assert due.max() > 1e-5
+    assert_allclose(len(got), len(due))
+    assert np.all(got <= due + 1e-9)
+    assert got.max() > 0.8 * due.max()
+    assert np.all(got > 0.8 * due - 0.05 * due.max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_renewed_basis_leaves_a_fraction_of_the_error(bench, changes, name):
+    effect, x = changes[name]
+    before = accuracy(bench, bench.model, [effect], x, TOP)
+    model = before.renewed(bench.model)
+    after = accuracy(bench, model, [effect], x, TOP)
+    n = len(before.error)
+    assert after.worst < 0.2 * before.worst
+    assert_allclose(after.frequency[:n], before.frequency / (1 + before.error), rtol=1e-6)
+
+
+def test_error_falls_with_the_square_of_the_change(bench, changes):
+    """Galerkin's eigenvalues err in second order of what the basis lacks."""
+    effect, x = changes["thickness"]
+    h = np.array([0.1, 0.05, 0.025])
+    error = [accuracy(bench, bench.model, [effect], x * s / 0.2, TOP).worst for s in h]
+    order = np.log2(np.array(error[:-1]) / error[1:])
+    assert_allclose(order, 2, atol=0.15)
+
+
+def test_attachments_of_the_place_make_a_mass_accurate(bench, changes):
+    """What Search.trial adds to the basis is what the estimate asks for."""
+    for name in ("mass", "spring"):
+        effect, x = changes[name]
+        with_them = bench.with_attachments(effect.carried())
+        bare = accuracy(bench, bench.model, [effect], x, TOP)
+        carried = accuracy(bench, with_them, [effect], x, TOP)
+        assert carried.worst < 0.1 * bare.worst
+        assert carried.serves()
+
+
+@pytest.mark.parametrize("name", ["stiffer", "masses"])
+def test_products_are_those_of_the_changed_structure(bench, changes, name):
+    effect, x = changes[name]
+    q = np.random.default_rng(1).normal(size=(len(bench.model.basis), 3))
+    system = structure(effect.apply(bench.structure.assembly, x)).system
+    for got, due in zip(
+        products(bench.model, [effect], x, q), (system.K @ q, system.M @ q), strict=True
+    ):
+        assert_allclose(got, due, atol=1e-9 * np.abs(due).max())
+
+
+def test_components_give_the_same_products(bench, changes):
+    effect, x = changes["thickness"]
+    split = bench.model.with_components()
+    q = np.random.default_rng(2).normal(size=(len(bench.model.basis), 3))
+    for got, due in zip(
+        products(split, [effect], x, q), products(bench.model, [effect], x, q), strict=True
+    ):
+        assert_allclose(got, due, atol=1e-9 * np.abs(due).max())
