@@ -435,3 +435,18 @@ def test_real_decks_convert(folder, main):
     assert np.all(np.isfinite(made.points))
     for table in (made.shells.thickness, made.springs.value, made.masses.matrix):
         assert np.all(np.isfinite(table))
+
+
+@pytest.mark.parametrize(
+    "card",
+    [
+        "PBEAM,1,5,2.,.5,.25,,,.1\n,,,,,,,,\n,YES,1.,2.,,.25\n,,,,,,,,\n,1.,1.",
+        "PBEAM,1,5,2.,.5,.25,,,.1\n,NO,.5,2.,.5,.25,,,.1\n,NO,1.,,,,,,.1\n,1.,1.,,,,,,\n,,,,,.1,,.1",
+        "PBEAML,1,5,,BAR\n,2.,1.,.1,YES,1.,2.,1.,.1",
+    ],
+)
+def test_stations_that_repeat_end_A_make_no_taper(bulk, card):
+    section = assembly(bulk(f"{PLATE}CBEAM,8,1,1,2,0.,0.,1.\n{card}\n")).parts[-1].section
+    assert section.kind == "beam"
+    assert section.area == pytest.approx(2.0)
+    assert section.nonstructural == pytest.approx(0.1)

@@ -9,6 +9,7 @@ from .conftest import PLATE
 
 Z = "0.,0.,0.,0.,0.,1.,1."  # a CORD2R's points A, B and the first of C
 
+BEAM, SIX = "CBEAM,8,1,1,2,0.,0.,1.\n", ",,,,,,,,\n"
 MISTAKES = {
     "grid": (("1,2,3,4", "1,2,3,44"), r":5: CQUAD4 7: grid 44 does not exist.* 4 points, 1 to 4"),
     "property": (("CQUAD4,7,101", "CQUAD4,7,102"), r"no PSHELL or PCOMP 102; there are PSHELL 101"),
@@ -49,6 +50,14 @@ MISTAKES = {
     "bush lateral": (("MAT1", "CBUSH,8,1,1,2\nPBUSH,1,K,1.,2.\nMAT1"), "neither orient"),
     "taper": (("MAT1", "CBEAM,8,1,1,2,0.,0.,1.\nPBEAM,1,5,1.,1.,1.\n,,,,,,,,\n,YESA,1.,2.\nMAT1"),
               "tapered"),
+    "taper, small numbers": (("MAT1", f"{BEAM}PBEAM,1,5,1.-4,1.-9,1.-9\n{SIX},YESA,1.,1.-4,2.-9"
+                              "\nMAT1"), "tapered"),
+    "taper of mass": (("MAT1", f"{BEAM}PBEAM,1,5,1.,1.,1.,,,.1\n{SIX},NO,1.,,,,,,.2\nMAT1"),
+                      "tapered"),
+    "taper of axis": (("MAT1", f"{BEAM}PBEAM,1,5,1.,1.,1.\n{SIX}\n\n,,,,,.1,.0,.2\nMAT1"),
+                      "tapered"),
+    "taper of a profile": (("MAT1", f"{BEAM}PBEAML,1,5,,BAR\n,2.,1.,,YES,1.,3.,1.\nMAT1"),
+                           "PBEAML 1: a tapered"),
     "profile": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,OVAL\n,1.\nMAT1"), "TYPE 'OVAL'"),
     "profile sizes": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,TUBE\n,1,2\nMAT1"), "no TUBE"),
     "spc set": (("MAT1", "SPC1,2,a,1\nMAT1"), "'A'"),

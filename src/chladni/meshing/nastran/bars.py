@@ -65,26 +65,51 @@ def _shape(card: Cards) -> tuple[Profile, float]:
 def _library(kind: str) -> Callable[[Context, Materials, Cards, int], BeamSection]:
     def read(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
         p, nsm = _shape(card)
+        if kind == "beam":
+            _refuse_taper(card, 9, SHAPES[card.words(4)[0].decode("latin-1")][1] + 1)
         values = (p.area, p.I1, p.I2, p.I12, p.J)
         return _section(ctx, materials, card, values, p.shear, nsm, kind)
 
     return read
 
 
+STATION = (b"YES", b"YESA", b"NO")  # SO: stress output at a station along the beam
+
+
+def _refuse_taper(card: Cards, first: int, count: int) -> None:
+    """Refuse a PBEAML whose dimensions or mass at another station are not those of end A.
+
+    End A has ``count`` fields from ``first``, each station SO, X/XB and as many; blanks repeat A.
+    """
+    own = np.nan_to_num(card.block(first, count, np.nan)[0])
+    k = first + count
+    while card.words(k)[0] in STATION:
+        _refuse_unlike(card, card.block(k + 2, count, np.nan)[0], own)
+        k += 2 + count
+
+
+def _refuse_unlike(card: Cards, there: np.ndarray, own: np.ndarray) -> None:
+    """Refuse a station that differs from end A; blanks repeat it."""
+    if not np.allclose(np.where(np.isnan(there), own, there), own, rtol=1e-6, atol=0):
+        raise card.refuse(
+            0, "a tapered beam is not supported; give it several elements, each uniform"
+        )
+
+
 def _pbeam(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
     """PBEAM, uniform: a tapered one is refused; K1, K2 are 1 unless given."""
     A, I1, I2, I12, J, nsm = card.block(3, 6, 0.0)[0].tolist()
     k = 9
-    if card.words(k)[0] not in (b"YES", b"YESA", b"NO"):
+    if card.words(k)[0] not in STATION:
         k += 8  # stress recovery points
-    while (word := card.words(k)[0]) in (b"YES", b"YESA", b"NO"):
-        end = card.block(k + 2, 5, np.nan)[0]
-        if not np.allclose(np.where(np.isnan(end), (A, I1, I2, I12, J), end), (A, I1, I2, I12, J)):
-            raise card.refuse(0, "a tapered beam is not supported; give it several elements")
+    while (word := card.words(k)[0]) in STATION:
+        _refuse_unlike(card, card.block(k + 2, 6, np.nan)[0], np.array([A, I1, I2, I12, J, nsm]))
         k += 16 if word == b"YES" else 8
     K1, K2 = card.block(k, 2, 1.0)[0].tolist()
     made = _section(ctx, materials, card, (A, I1, I2, I12, J), (K1, K2), nsm, "beam")
     L = ctx.scale.length
+    for j, n in ((4, 1), (8, 2), (12, 2)):  # NSI, (M1, M2), (N1, N2): end A, then end B
+        _refuse_unlike(card, card.block(k + j + n, n, np.nan)[0], card.block(k + j, n, 0.0)[0])
     at, neutral = (tuple((card.block(k + j, 2, 0.0)[0] * L).tolist()) for j in (8, 12))
     inertia = card.real(0, k + 4, 0.0) * ctx.scale.inertia * L
     return replace(made, neutral=neutral, nonstructural_at=at, nonstructural_inertia=inertia)
