@@ -214,3 +214,19 @@ def test_a_distorted_resonance_is_one_mode() -> None:
     near = np.abs(found.frequency - f0) < 3 * zeta * f0
     assert near.sum() == 1
     np.testing.assert_allclose(found.frequency[near], f0, rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_modes_crowded_beyond_the_band_do_not_spoil_it(seed: int) -> None:
+    """Six modes 12-30 % above, eight inside, two of them 0.15 % apart: all inside are found."""
+    rng = np.random.default_rng(seed)
+    inside = np.array([25.0, 40.0, 62.0, 88.0, 120.0, 150.0, 185.0, 185.3])
+    beyond = 200.0 * np.linspace(1.12, 1.3, 6)
+    f = np.concatenate([inside, beyond])
+    truth = Truth(f, 10 ** rng.uniform(-2.3, -1.9, len(f)), 12, 1, seed)
+    found = identify(truth.frf(np.arange(20.0, 200.0, 0.4), "accelerance", 0.01))
+    s = 2 * np.pi * np.geomspace(25, 190, 40) * (0.08 + 1j)
+    delta = np.log10(equalised(found, s) / truth.values(s, 2, undamped=True))
+    assert (found.inside).sum() == len(inside)
+    assert found.chi == pytest.approx(1.0, abs=0.05)
+    assert np.sqrt((np.abs(delta) ** 2).mean(axis=(1, 2))).max() < 0.02

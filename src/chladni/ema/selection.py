@@ -13,6 +13,7 @@ from .fitting import Data, Fit, Slope, bounded, polish, relocated, solve, stacke
 
 ORDERS = (6, 10, 15, 22, 31, 42, 56)
 _VF_STEPS = 6
+BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +144,9 @@ def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 40) -> tuple[Fi
     """Polish a little, take out what does not pay, again, until both are at rest.
 
     A pole does not pay if χ² rises by less than its price without it. It is no mode if it has
-    left the band by a tenth, sits at the damping limit, or lies inside with a frequency less sure
-    than its bandwidth.
+    left the band by three tenths, sits at the damping limit, or lies inside with a frequency less
+    sure than its bandwidth. Nearer than that a pole stands for what rings beyond: a crowd of modes
+    above the band is no constant, and what it leaves over would pass for modes inside.
     """
     fit, slope = polish(data, p, rule.largest, 0)
     for _ in range(rounds):
@@ -164,7 +166,7 @@ def _poor(data: Data, fit: Fit, slope: Slope, rule: Rule) -> np.ndarray:
     """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
     low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())
     size, half = np.abs(fit.p), np.abs(fit.p.real)
-    no_mode = (size < 0.9 * low) | (size > 1.1 * high) | (half > 0.98 * rule.largest * size)
+    no_mode = (size < low / BEYOND) | (size > BEYOND * high) | (half > 0.98 * rule.largest * size)
     inside = (low <= size) & (size <= high)
     no_mode |= inside & (uncertainty(fit.p, slope, rule.noise)[0] > half)
     gain = np.where(no_mode, 0.0, fit.gain)
