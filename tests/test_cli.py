@@ -1,12 +1,16 @@
 """The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from chladni.case import load_case
 from chladni.cli.app import COMMANDS, application, guarded
+from chladni.cli.diagnose import written
 from chladni.errors import AccuracyError, FileError
 
 NEEDED = {  # extra arguments a command cannot do without
@@ -221,6 +225,53 @@ def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
     assert {"report.html", "updated.bdf", "diagnosis.json", "evidence.png", "setup.png"} < names
     modes = call("modes", tmp_path / "answer" / "updated.bdf", "--units", "SI", "--count", 14)
     assert modes.exit_code == 0, modes.output
+
+
+LAMINATE = "PCOMP,1,,,,,,,SYM\n,1,2.5e-4,0.,,1,2.5e-4,45."
+
+
+def calibrated(case, out, factor=1.21):
+    """A laminated plate calibrated to the recording of one so much stiffer."""
+    out.mkdir()
+    text = deck_text(6, width=0.22)
+    (case / "plate.bdf").write_text(text.replace("2.1+11", f"{2.1e11 * factor:.4e}"))
+    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
+    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", case]
+    assert call("frf", case / "plate.bdf", *options).exit_code == 0
+    (case / "plate.bdf").write_text(text.replace("PSHELL,1,1,0.001,1,,1", LAMINATE))
+    done = call("calibrate", case, "--out", out)
+    assert done.exit_code == 0, done.output
+    return json.loads((out / "diagnosis.json").read_text())
+
+
+def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
+    """Stiffness over mass of the plies moves by what was concealed; the deck is read again."""
+    out = tmp_path / "answer"
+    d = calibrated(case, out)
+    assert d["files"]["deck"] == "updated.bdf"
+    assert call("modes", out / "updated.bdf", "--units", "SI", "--count", 8, "--out", out).output
+    f = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    assert call("modes", case / "plate.bdf", "--units", "SI", "--count", 8, "--out", out).output
+    before = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    assert f / before == pytest.approx(1.1, rel=0.01)
+
+
+def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
+    """One element of a laminate cannot be thinner than the rest: no deck, and a note says why."""
+    text = deck_text(6, width=0.22).replace("PSHELL,1,1,0.001,1,,1", LAMINATE)
+    (case / "plate.bdf").write_text(text)
+    opened = load_case(case)
+    shells = opened.assembly.shells
+    thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
+    final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
+    out = tmp_path / "answer"
+    out.mkdir()
+    path, notes = written(SimpleNamespace(folder=out), opened, final)
+    assert path is None
+    assert len(notes) == 1
+    assert notes[0].startswith("no updated deck was written: ")
+    assert "changed in a way its layers cannot" in notes[0]
+    assert not list(out.iterdir())
 
 
 def test_specimen_comes_back_as_a_deck(tmp_path):

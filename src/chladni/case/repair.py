@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from ..meshing.nastran.edits import Change
 from ..model.assembly import Assembly, Shells
 from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, ShellSection
 from ..units import UNITS, Units
+from .repair_laminate import laminate_changes, laminated
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, thickness, masses and springs to ground that differ.
+    """Edits of the deck: materials, laminates, thickness, masses, springs to ground that differ.
 
     Raises
     ------
@@ -26,7 +28,9 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     """
     units = units or UNITS["SI"]
     out: list[Change] = []
-    out += _materials(deck, before, after, units)
+    free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
+    out += _materials(deck, before, after, units, free)
+    out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
@@ -34,25 +38,29 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     return out
 
 
-def _uses(assembly: Assembly) -> Iterator[tuple[int, str, Material]]:
+def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]:
     """(position of the part, field of the section, material) of all that name a material."""
+    stacked = laminated(deck, assembly)
     for k, part in enumerate(assembly.parts):
+        if k in stacked:
+            continue
         for name in _MID if isinstance(part.section, ShellSection) else ("material",):
             if (material := getattr(part.section, name)) is not None:
                 yield k, name, material
 
 
-def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
+def _materials(
+    deck: Deck, before: Assembly, after: Assembly, units: Units, free: Iterator[int]
+) -> list[Change]:
     """Cards of materials changed; where only some users of one changed, a card of their own."""
-    known = {(k, name): m for k, name, m in _uses(before)}
+    known = {(k, name): m for k, name, m in _uses(deck, before)}
     users: dict[int, dict[Material, list[tuple[int, str]]]] = {}
-    for k, name, material in _uses(after):
+    for k, name, material in _uses(deck, after):
         if (old := known.get((k, name))) is None:
             raise ModelError(f"part {after.parts[k].name} has a {name} material the deck has not")
         kinds = users.setdefault(old.id, {})
         now = next((m for m in (old, *kinds) if _equal(m, material)), material)
         kinds.setdefault(now, []).append((k, name))
-    free = 1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind))
     out: list[Change] = []
     for id, kinds in users.items():
         for now, at in kinds.items():
@@ -62,10 +70,10 @@ def _materials(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
             if len(kinds) == 1:
                 out += _edited(deck, id, old, now, units)
                 continue
-            out.append(Add([_card(replace(now, id=free), units)], "of the parts that changed"))
-            out += [SetField("PSHELL", after.parts[k].id, _MID[name], free) for k, name in at]
-            free += 1
-    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(after))
+            new = next(free)
+            out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
+            out += [SetField("PSHELL", after.parts[k].id, _MID[name], new) for k, name in at]
+    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
     return out + (_axes(deck, before, after) if grain else [])
 
 
@@ -169,7 +177,10 @@ def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
     """PSHELL T where a whole part scales, T1 to T4 where it does not."""
     out: list[Change] = []
     ratio = after.shells.thickness / before.shells.thickness
+    stacked = laminated(deck, before)
     for k, part in enumerate(after.parts):
+        if k in stacked:
+            continue
         mine = np.flatnonzero(after.shells.part == k)
         if not len(mine) or not isinstance(part.section, ShellSection):
             continue

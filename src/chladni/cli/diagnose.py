@@ -11,7 +11,7 @@ from ..case import Case, load_case
 from ..case.repair import changes
 from ..dynamics.eigen import normal_modes
 from ..dynamics.frf import FRF
-from ..errors import FileError
+from ..errors import FileError, LabelError, ModelError
 from ..meshing.nastran import assembly, read_deck, write_deck
 from ..model.assembly import Assembly
 from ..progress import Progress, within
@@ -63,20 +63,29 @@ def _answered(job: Run, case: Case, search: bool) -> dict[str, Any]:
         found = judged(prepared, replace(found, trials=(first, *found.trials[1:])))
     stages = models(asked, found)
     job.progress("writing the deck", 0.82)
-    updated = write_deck(
-        case.deck,
-        job.folder / case.deck.path.with_name("updated.bdf").name,
-        changes(case.deck, case.assembly, stages.final, case.units),
-    )
-    stages = Models(stages.nominal, stages.calibrated, assembly(read_deck(updated), case.units))
+    updated, lost = written(job, case, stages.final)
+    if updated is not None:
+        stages = Models(stages.nominal, stages.calibrated, assembly(read_deck(updated), case.units))
     d = as_dict(asked, prepared, found, stages)
-    d["files"] = {"deck": updated.name, "report": "report.html", "diagnosis": "diagnosis.json"}
+    d["notes"] += lost
+    name = None if updated is None else updated.name
+    d["files"] = {"deck": name, "report": "report.html", "diagnosis": "diagnosis.json"}
     d["frequency_rms_percent"] = {
         k: rms(d["frequencies"], f"{k}_hz") for k in ("before", "calibrated", "after")
     }
     job.json("diagnosis.json", d)
     page(job, case, asked, prepared, found, stages, d, within(job.progress, 0.85, 1.0))
     return d
+
+
+def written(job: Run, case: Case, final: Assembly) -> tuple[Path | None, list[str]]:
+    """The updated deck; where no card can hold the change, none and a sentence."""
+    path = job.folder / case.deck.path.with_name("updated.bdf").name
+    try:
+        edits = changes(case.deck, case.assembly, final, case.units)
+        return write_deck(case.deck, path, edits), []
+    except (FileError, LabelError, ModelError) as error:
+        return None, [f"no updated deck was written: {error}"]
 
 
 def page(
