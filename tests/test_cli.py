@@ -150,12 +150,50 @@ def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
 
 
 def test_render(deck, tmp_path):
+    """Modes are counted from the first elastic one, so the plate's first is no rigid motion."""
     out = tmp_path / "out"
     options = ["--modes", "7-9", "--gif", 7, "--thickness", "--energy", 8]
     done = call("render", deck, *options, "--units", "SI", "--out", out)
     assert done.exit_code == 0, done.output
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
     assert {p.name for p in out.iterdir()} == due | {"report.html"}
+    assert "6 rigid motions are not counted" in (out / "report.html").read_text()
+
+
+def plates(heights):
+    """Free plates of 80 x 80 x 1 mm over each other, tied rigidly at one corner."""
+    lines = ["CEND", "BEGIN BULK", "MAT1,1,2.1+11,,.3,7850."]
+    for p, z in enumerate(heights, start=1):
+        lines.append(f"PSHELL,{p},1,.001,1,,1")
+        for i, j in np.ndindex(5, 5):
+            lines.append(f"GRID,{100 * p + 10 * i + j},,{0.02 * i},{0.02 * j},{z}")
+        for n, (i, j) in enumerate(np.ndindex(4, 4)):
+            a = 100 * p + 10 * i + j
+            lines.append(f"CQUAD4,{100 * p + n},{p},{a},{a + 10},{a + 11},{a + 1}")
+        if p > 1:
+            lines.append(f"RBE2,{900 + p},100,123456,{100 * p}")
+    return "\n".join([*lines, "ENDDATA", ""])
+
+
+def test_clearance_of_two_plates(tmp_path):
+    """Two plates of 1 mm at a distance of 3 mm leave 2 mm, and a force that closes them."""
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(plates([0.0, 0.003]))
+    options = ["--clearance", "--modes", 1, "--units", "SI", "--out", out]
+    done = call("render", deck, *options)
+    assert done.exit_code == 0, done.output
+    (pair,) = json.loads((out / "clearance.json").read_text())
+    assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
+    assert not pair["touching"]
+    assert "first contact" in (out / "report.html").read_text()
+
+
+def test_one_plate_has_no_clearance(tmp_path):
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(plates([0.0]))
+    done = call("render", deck, "--clearance", "--out", out)
+    assert (done.exit_code, out.exists()) == (2, False)
+    assert "no two parts" in done.output
 
 
 CASE = """

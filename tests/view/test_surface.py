@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.model.test_calculix import WELDS, coupon
 
 from chladni.errors import ShapeError
+from chladni.model.assembly import Assembly, Solids
+from chladni.model.connections import spot_welds
 from chladni.model.plates import box, folded_panel, plate
-from chladni.view.camera import best_view
+from chladni.view.camera import best_view, needed_views, visible
 from chladni.view.surface import Surface, skin, surface
 
 
@@ -83,3 +86,38 @@ def test_camera_is_a_right_handed_frame_that_holds_everything(structure):
     u0, u1, v0, v1 = camera.window
     uv = camera.project(seen.points)
     assert np.all((uv > [u0, v0]) & (uv < [u1, v1]))
+
+
+def test_two_sheets_need_two_views_and_one_needs_one():
+    """Of two plates over each other one is hidden: half of the faces; a plate hides nothing."""
+    one = surface(plate(1.0, 0.7, 20, 14, 1e-3))
+    n = len(one.points)
+    below = one.points + np.array([0, 0, 0.1])
+    two = Surface(np.vstack([one.points, below]), np.vstack([one.faces, one.faces + n]))
+    assert len(needed_views(one)) == 1
+    front, back = needed_views(two)
+    middle = two.points[two.faces].mean(axis=1)
+    assert front.toward @ back.toward < 0
+    for camera in (front, back):
+        assert 0.5 < visible(camera, two, middle).mean() < 0.75
+    assert np.all(visible(front, two, middle) | visible(back, two, middle))
+
+
+def test_joints_are_left_out_of_pictures_of_sheets():
+    """The solids of a weld are joints, a block of its own is not."""
+    welded, _ = spot_welds(coupon(), WELDS, ("a", "b"))
+    seen = surface(welded)
+    assert np.asarray(seen.joint).sum() == 6 * len(WELDS)
+    assert len(seen.without_joints().faces) == len(welded.shells)
+    points, nodes = block(1)
+    solids = (Solids(np.array([1]), nodes, np.zeros(1, int)),)
+    alone = Assembly(np.arange(1, 9), points, welded.parts[:1], solids=solids)
+    assert not np.asarray(surface(alone).joint).any()
+
+
+def test_short_lines_are_left_out_of_an_outline():
+    """A window of a tenth of the plate is a short line, the rim a long one."""
+    seen = surface(plate(1.0, 1.0, 10, 10, 1e-3))
+    holed = Surface(seen.points, np.delete(seen.faces, 44, axis=0))
+    assert len(holed.outline()) == 40 + 4
+    assert len(holed.outline(least=0.3)) == 40

@@ -1,14 +1,17 @@
 """``chladni render``: pictures of a deck or case, its modes and its fields."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 
-from ..dynamics.modes import ModalModel
+from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import FileError
-from ..report.blocks import Picture
+from ..meshing.clearance import Gaps, PairClearance, all_gaps, nearest, summary
+from ..report.blocks import Block, Picture, Table
 from ..report.words import number
 from .model import Model, load_model, on_faces
 from .run import Out, Run, Units, started
@@ -22,10 +25,16 @@ def run(
         list[int] | None, typer.Option(help="A mode whose strain energy is shown (repeatable).")
     ] = None,
     thickness: Annotated[bool, typer.Option("--thickness", help="Map of shell thickness.")] = False,
+    clearance: Annotated[
+        bool, typer.Option("--clearance", help="Map and table of the clearance between sheets.")
+    ] = False,
     units: Units = None,
     out: Out = None,
 ) -> None:
-    """Pictures: modes, an animation, thickness, strain energy; without options the structure."""
+    """Pictures: modes, animations, thickness, strain energy, clearance; modes are elastic ones.
+
+    The first mode is the first elastic one: rigid motions are not counted.
+    """
     chosen = numbers(modes)
     with started("render", source, out) as job:
         job.progress("reading the model", 0.0)
@@ -37,6 +46,8 @@ def run(
         if modal is not None:
             _moving(job, model, modal, chosen, gif or [])
             _energies(job, model, modal, energy or [])
+        if clearance:
+            _clearance(job, model, modal, sorted({*chosen, *(gif or []), *(energy or [])}))
         job.lead = f"{len(job.files)} pictures of {source.name}."
         job.say(job.lead)
 
@@ -63,10 +74,20 @@ def _modal(job: Run, model: Model, count: int) -> ModalModel | None:
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(count)
+    modal = model.modes(count + _RIGID)
+    if (rigid := int(rigid_modes(modal).sum())) > _RIGID:
+        modal = model.modes(count + rigid)
+    modal = modal.sel(slice(rigid, rigid + count))
     if len(modal) < count:
-        raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
+        raise FileError(f"{job.source} has {len(modal)} elastic modes, number {count} was asked")
+    if rigid:
+        job.notes.append(
+            f"{rigid} rigid motions are not counted: mode 1 here is number {rigid + 1} of all."
+        )
     return modal
+
+
+_RIGID = 6  # of a free structure in one piece
 
 
 def _still(job: Run, model: Model, thickness: bool) -> None:
@@ -109,11 +130,91 @@ def _energies(job: Run, model: Model, modal: ModalModel, chosen: list[int]) -> N
     if not len(model.assembly.shells):
         raise FileError(f"{job.source} has no shells, so there is no strain energy map")
     e = shell_energies(model.structure, modal.shapes[:, np.array(chosen) - 1])
-    density = e / np.linalg.norm(model.seen.areas()[: len(e)], axis=1)[:, None]
+    area = np.linalg.norm(model.seen.areas()[: len(e)], axis=1)
+    relative = e / e.sum(axis=0) * (area.sum() / area)[:, None]
     pictures = []
-    for column, k in zip(density.T, chosen, strict=True):
-        values = on_faces(model.seen, column / column.max())
+    for column, k in zip(relative.T, chosen, strict=True):
+        values = on_faces(model.seen, column)
         path = job.keep(f"energy_{k}.png", f"strain energy of mode {k}")
-        name = f"strain energy per area, mode {k} ({number(modal.frequency[k - 1])} Hz), relative"
-        pictures.append(scene.scalar_map(path, model.seen, values, name, cmap="magma"))
+        name = f"strain energy per area / mean, mode {k} ({scene.hertz(modal.frequency[k - 1])})"
+        limits = (0.0, scene.usual_limits(model.seen, values)[1])
+        pictures.append(
+            scene.scalar_map(path, model.seen, values, name, cmap="magma", limits=limits)
+        )
     job.section("Strain energy", [Picture(p) for p in pictures])
+
+
+def _clearance(job: Run, model: Model, modal: ModalModel | None, chosen: list[int]) -> None:
+    from ..view import scene
+
+    found = all_gaps(model.assembly, both_ways=True)
+    if not found:
+        raise FileError(f"{job.source} has no two parts of shells within {1e3 * _NEAR:g} mm")
+    pairs = sorted(
+        (summary(model.assembly, g) for g in found if g.parts[0] < g.parts[1]),
+        key=lambda pair: pair.least_free,
+    )
+    gap = np.maximum(1e3 * nearest(model.assembly, found), 0.0)
+    gap = np.fmin.reduce(gap[model.seen.faces], axis=1)
+    name = "clearance away from joints"
+    path = job.keep("clearance.png", "clearance between sheets")
+    scene.scalar_map(path, model.seen, gap, name, "mm", "YlOrRd_r", (0.0, 5.0))
+    job.json("clearance.json", [asdict(p) for p in pairs], "clearance of each pair of parts")
+    blocks: list[Block] = [Picture(path, _GREY), _pairs(pairs)]
+    if modal is not None:
+        blocks.append(_rattle(model, modal, chosen, found))
+    job.section("Clearance", blocks)
+
+
+_NEAR, _DAMPING = 0.010, 0.01
+_GREY = "Grey: no other sheet within 10 mm, or nearer than 18 mm to a joint."
+
+
+def _pairs(pairs: Sequence[PairClearance]) -> Table:
+    rows = [
+        (
+            *p.parts,
+            *(_mm(x) for x in (p.least, p.least_free, p.uncertainty)),
+            str(p.close),
+            "yes" if p.touching else "",
+        )
+        for p in pairs
+    ]
+    head = ("part", "other", "least", "away from joints", "known to ±", "below 0.5 mm", "touching")
+    return Table(head, rows, words=("part", "other", "touching"), caption=_PAIRS)
+
+
+_PAIRS = (
+    "Clearance [mm] between the sheets' faces at the nodes of the first part, how well flat shells "
+    "know it (h² κ/8 of both), and the nodes with less than 0.5 mm away from joints."
+)
+
+
+def _mm(x: float) -> str:
+    return f"{1e3 * x:.1f}" if np.isfinite(x) else "–"
+
+
+def _rattle(model: Model, modal: ModalModel, chosen: list[int], found: Sequence[Gaps]) -> Table:
+    """Where each mode closes a gap first, and the force at its liveliest point that does it."""
+    motion, f = model.motion(modal.shapes), modal.frequency
+    drive = np.linalg.norm(motion, axis=1).max(axis=0)
+    force = [g.first_contact(motion, f, _DAMPING, drive) for g in found]
+    for g, value in zip(found, force, strict=True):
+        value[~g.free | g.touching] = np.inf
+    rows = []
+    for k in chosen:
+        least = [float(value[:, k - 1].min()) for value in force]
+        at = int(np.argmin(least))
+        g, row = found[at], int(force[at][:, k - 1].argmin())
+        place = ", ".join(f"{1e3 * x:.0f}" for x in model.assembly.points[g.rows[row]])
+        pair = " – ".join(g.parts)
+        size = (_mm(g.clearance[row]), number(least[at], 2))
+        rows.append((str(k), number(f[k - 1]), pair, place, *size))
+    head = ("mode", "Hz", "first contact", "at x, y, z [mm]", "gap [mm]", "force [N]")
+    return Table(head, rows, words=("first contact", "at x, y, z [mm]"), caption=_RATTLE)
+
+
+_RATTLE = (
+    "Force amplitude at resonance, at the point that moves most and with 1 % damping, until two "
+    "sheets that do not touch at rest meet; places within 18 mm of a joint are left out."
+)

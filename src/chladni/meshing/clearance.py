@@ -4,8 +4,9 @@ A facet lies up to h² κ/8 inside the curved sheet it stands for; a clearance i
 than that on both sides, and a pair closer than its uncertainty is called touching.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -175,20 +176,33 @@ class PairClearance:
     place: tuple[float, float, float]
 
 
-def clearances(assembly: Assembly, within: float = 0.010) -> tuple[PairClearance, ...]:
-    """All pairs of parts that come within a distance of each other, nearest first."""
+def all_gaps(
+    assembly: Assembly, *, within: float = 0.010, away: float = 0.018, both_ways: bool = False
+) -> tuple[Gaps, ...]:
+    """The places of all pairs of parts that come within a distance; from either part or both."""
     names = [assembly.parts[p].name for p in np.unique(assembly.shells.part)]
     sheets = _sheets(assembly)
-    found = [
-        _summary(assembly, g)
-        for a, b in combinations(names, 2)
-        for g in [_gaps(assembly, sheets, (a, b), within, 0.018)]
-        if len(g.rows)
-    ]
+    pairs = permutations(names, 2) if both_ways else combinations(names, 2)
+    found = (_gaps(assembly, sheets, pair, within, away) for pair in pairs)
+    return tuple(g for g in found if len(g.rows))
+
+
+def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
+    """Least clearance of each point (n,) [m]; nan without a sheet near it, or by a joint."""
+    least = np.full(len(assembly.points), np.inf)
+    for g in gaps:
+        np.minimum.at(least, g.rows[g.free], g.clearance[g.free])
+    return np.where(np.isfinite(least), least, np.nan)
+
+
+def clearances(assembly: Assembly, within: float = 0.010) -> tuple[PairClearance, ...]:
+    """All pairs of parts that come within a distance of each other, nearest first."""
+    found = [summary(assembly, g) for g in all_gaps(assembly, within=within)]
     return tuple(sorted(found, key=lambda pair: pair.least_free))
 
 
-def _summary(assembly: Assembly, g: Gaps) -> PairClearance:
+def summary(assembly: Assembly, g: Gaps) -> PairClearance:
+    """What there is to say about a pair."""
     free = np.flatnonzero(g.free)
     if not len(free):
         free_least, at = float("inf"), int(g.clearance.argmin())

@@ -51,12 +51,26 @@ def best_view(seen: Surface, focus: np.ndarray | None = None, tilt: float = 24.0
     without faces is seen along the direction in which its points spread least. Where ``focus``
     (k, 3) points are better seen from behind, the eye goes there.
     """
-    d = _broadest(seen)
-    front = _looking(d, seen, tilt)
+    front, back = both_views(seen, tilt)
     if focus is None or not len(focus) or not len(seen.faces):
         return front
-    back = _looking(-d, seen, tilt)
-    return back if _visible(back, seen, focus) > 1.05 * _visible(front, seen, focus) else front
+    share = [float(np.mean(visible(camera, seen, focus))) for camera in (front, back)]
+    return back if share[1] > 1.05 * share[0] else front
+
+
+def both_views(seen: Surface, tilt: float = 24.0) -> tuple[Camera, Camera]:
+    """The best view and the same from behind."""
+    d = _broadest(seen)
+    return _looking(d, seen, tilt), _looking(-d, seen, tilt)
+
+
+def needed_views(seen: Surface) -> tuple[Camera, ...]:
+    """The best view; the one from behind too where a quarter of the faces is hidden."""
+    front, back = both_views(seen)
+    if not len(seen.faces):
+        return (front,)
+    shown = visible(front, seen, seen.points[seen.faces].mean(axis=1))
+    return (front,) if shown.mean() > 0.85 else (front, back)
 
 
 def _looking(d: np.ndarray, seen: Surface, tilt: float) -> Camera:
@@ -71,9 +85,9 @@ def _looking(d: np.ndarray, seen: Surface, tilt: float) -> Camera:
     return Camera(right, up, toward, (0.0, 1.0, 0.0, 1.0)).framing(seen.points[seen.used])
 
 
-def _visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 80) -> float:
-    """Share of the points that nothing lies clearly in front of, on a coarse depth map."""
-    middle = seen.points[seen.faces].mean(axis=1)
+def visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 120) -> np.ndarray:
+    """Points (k,) bool that nothing lies clearly in front of, on a coarse depth map."""
+    sheet = _samples(seen, (camera.window[1] - camera.window[0]) / cells)
     u0, u1, v0, v1 = camera.window
 
     def cell(points: np.ndarray) -> np.ndarray:
@@ -82,9 +96,20 @@ def _visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 80) 
         return np.asarray(i * cells + j)
 
     nearest = np.full(cells**2, -np.inf)
-    np.maximum.at(nearest, cell(middle), camera.depth(middle))
+    np.maximum.at(nearest, cell(sheet), camera.depth(sheet))
     hidden = nearest[cell(focus)] - camera.depth(focus)
-    return float(np.mean(hidden < 0.012 * seen.size))
+    return np.asarray(hidden < 0.006 * seen.size)
+
+
+def _samples(seen: Surface, step: float) -> np.ndarray:
+    """Points on the faces about a step apart (n, 3): k by k on each, k from the usual face."""
+    corners = seen.points[seen.faces]
+    side = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    k = int(np.clip(np.ceil(np.quantile(side, 0.9) / step), 1, 12)) if len(side) else 1
+    r = (np.arange(k) + 0.5) / k
+    xi, eta = (g.ravel() for g in np.meshgrid(r, r))
+    N = np.stack([(1 - xi) * (1 - eta), xi * (1 - eta), xi * eta, (1 - xi) * eta])
+    return np.einsum("cp,mci->mpi", N, corners).reshape(-1, 3)
 
 
 def _broadest(seen: Surface) -> np.ndarray:

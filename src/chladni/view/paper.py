@@ -2,7 +2,7 @@
 
 import io
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -25,7 +25,8 @@ def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
     """Write a PNG (or SVG, PDF by the suffix), by way of a temporary name."""
     FigureCanvasAgg(figure)
     with matplotlib.rc_context({"svg.fonttype": "path"}):
-        return atomic(path, lambda part: figure.savefig(part, dpi=dpi, facecolor="white"))
+        look: dict[str, Any] = {"facecolor": "white", "bbox_inches": "tight", "pad_inches": 0.08}
+        return atomic(path, lambda part: figure.savefig(part, dpi=dpi, **look))
 
 
 def pixels(figure: Figure, dpi: int = 100) -> np.ndarray:
@@ -53,21 +54,38 @@ def save_gif(images: list[np.ndarray], path: Path | str, seconds: float = 1.2) -
     return atomic(path, lambda part: part.write_bytes(data.getvalue()))
 
 
-def colour_bar(figure: Figure, ax: Axes, cmap: str, limits: tuple[float, float], text: str) -> None:
-    """A bar beside the axes."""
-    box = ax.get_position()
-    side = figure.add_axes((box.x1 + 0.015, box.y0 + 0.1 * box.height, 0.022, 0.8 * box.height))
+def colour_bar(
+    figure: Figure,
+    ax: Axes,
+    cmap: str,
+    limits: tuple[float, float],
+    text: str,
+    extend: Literal["neither", "both", "min", "max"] = "neither",
+) -> None:
+    """A bar beside the axes, 0.15 inches wide; pointed where values lie beyond its limits."""
+    box, wide = ax.get_position(), figure.get_size_inches()[0]
+    place = (box.x1 + 0.1 / wide, box.y0 + 0.1 * box.height, 0.15 / wide, 0.8 * box.height)
+    side = figure.add_axes(place)
     mapped = ScalarMappable(Normalize(*limits), colormaps[cmap])
-    figure.colorbar(mapped, cax=side).set_label(text, fontsize=9)
+    figure.colorbar(mapped, cax=side, extend=extend).set_label(text, fontsize=9)
     side.tick_params(labelsize=8)
 
 
-def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str) -> None:
+def motion_bar(figure: Figure, left: float, low: float, width: float, cmap: str) -> None:
+    """A flat bar from 0 to 1 that says what the colours of a mode mean."""
+    side = figure.add_axes((left, low, width, 0.09 / figure.get_size_inches()[1]))
+    mapped = ScalarMappable(Normalize(0, 1), colormaps[cmap])
+    figure.colorbar(mapped, cax=side, orientation="horizontal", ticks=[0, 0.5, 1])
+    side.set_title("displacement / largest", fontsize=8, pad=3)
+    side.tick_params(labelsize=7, length=2, pad=1)
+
+
+def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str, size: float = 7.5) -> None:
     """Text that can be read on any ground."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.2, foreground="white")]
-    style: dict[str, Any] = {"fontsize": 7.5, "color": colour, "ha": "center", "va": "center"}
+    style: dict[str, Any] = {"fontsize": size, "color": colour, "ha": "center", "va": "center"}
     u, v = place.tolist()
     ax.text(u, v, text, **style, path_effects=halo, zorder=7, clip_on=False)
 

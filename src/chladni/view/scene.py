@@ -16,12 +16,15 @@ from matplotlib.figure import Figure
 
 from ..errors import ShapeError
 from . import paper
-from .camera import Camera, best_view
+from .camera import Camera, best_view, both_views, needed_views, visible
 from .canvas import Paint, draw
 from .surface import Surface
 
+_MOTION = "viridis"
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
 _GHOST = 70.0  # degrees of a fold that the undeformed outline shows
+_LONG = 0.35  # part of the structure's size that a line of that outline must reach
+_CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # above so many faces element edges would only blacken the picture
 
 
@@ -44,10 +47,14 @@ def mode_shape(
     shape : (n, 3)   displacement of every point, any scale; complex is turned to its largest phase
     frequency :      [Hz]
     """
-    figure, ax = _sheet(camera := _roomy(seen))
-    _swung(ax, seen, _real(shape), camera)
+    seen = seen.without_joints()
+    camera, phi = _for_mode(seen, _real(shape))
+    figure, (ax,) = _sheets([camera])
+    _swung(ax, seen, phi, camera)
     ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
+    _triad(ax, camera)
     _scale_bar(ax, camera, seen.unit)
+    paper.motion_bar(figure, 0.45, 0.15 / figure.get_size_inches()[1], 0.22, _MOTION)
     return paper.save(figure, path)
 
 
@@ -59,16 +66,25 @@ def montage(
     numbers: Sequence[int] | None = None,
     columns: int = 4,
 ) -> Path:
-    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from 1 if not told."""
-    camera, r = _roomy(seen), shapes.shape[2]
+    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from 1 if not told.
+
+    Each mode is seen from the side that shows more of its motion.
+    """
+    seen, r = seen.without_joints(), shapes.shape[2]
     names, columns = list(numbers or range(1, r + 1)), min(columns, r)
-    rows = -(-r // columns)
-    tile = 12.0 / columns
-    figure = Figure(figsize=(12.0, rows * (tile / max(camera.aspect, 0.7) + 0.32)))
-    for k in range(r):
-        ax = figure.add_axes(_cell(k, rows, columns))
-        _swung(ax, seen, _real(shapes[:, :, k]), camera)
-        ax.set_title(f"{names[k]}    {hertz(frequency[k])}", fontsize=10)
+    rows, tile = -(-r // columns), 12.0 / columns
+    chosen = [_for_mode(seen, _real(shapes[:, :, k])) for k in range(r)]
+    front = _framed(seen, both_views(seen)[0])
+    height = rows * (tile / max(front.aspect, 0.7) + 0.32) + 0.5
+    figure = Figure(figsize=(12.0, height))
+    for k, (camera, phi) in enumerate(chosen):
+        ax = figure.add_axes(_cell(k, rows, columns, 0.5 / height))
+        _swung(ax, seen, phi, camera, edges=len(seen.faces) < _CLUTTER)
+        ax.set_anchor("N")
+        behind = "" if camera.toward @ front.toward > 0 else "  (from behind)"
+        ax.set_title(f"{names[k]}    {hertz(frequency[k])}{behind}", fontsize=10)
+        _triad(ax, camera, small=True)
+    paper.motion_bar(figure, 0.42, 0.2 / height, 0.16, _MOTION)
     return paper.save(figure, path, dpi=140)
 
 
@@ -81,12 +97,13 @@ def mode_gif(
     frames: int = 20,
 ) -> Path:
     """One period Re(φ e^{iωt}) that loops without a jump."""
-    camera, phi = _roomy(seen), _real(shape) if not np.iscomplexobj(shape) else shape
-    images = []
+    seen, phi, images = seen.without_joints(), np.asarray(shape), []
+    camera, _ = _for_mode(seen, _real(phi))
     for angle in 2 * np.pi * np.arange(frames) / frames:
-        figure, ax = _sheet(camera, width=5.0)
+        figure, (ax,) = _sheets([camera], width=5.0)
         _swung(ax, seen, np.real(phi * np.exp(1j * angle)), camera, peak=_peak(phi))
         ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
+        _triad(ax, camera)
         images.append(paper.pixels(figure))
     return paper.save_gif(images, path)
 
@@ -104,39 +121,81 @@ def scalar_map(
     """Colours by a value per face (m,) or per point (n,), with a colour bar.
 
     A thickness, an energy, a difference; not-a-number is grey. ``where`` adds a circle (point,
-    radius) [m].
+    radius) [m]. Where much is hidden the structure is shown from behind too; values beyond the
+    limits have the colour of the limit, and the bar is pointed there.
     """
-    values = _fitting(seen, values)
-    finite = values[np.isfinite(values)]
-    low, high = limits or ((finite.min(), finite.max()) if finite.size else (0.0, 1.0))
-    if low == high:
-        low, high = low - 0.5 * abs(low) - 1e-12, high + 0.5 * abs(high) + 1e-12
-    figure, ax = _sheet(camera := best_view(seen), bar=True)
-    draw(ax, seen, camera, Paint(values, (low, high), cmap, len(seen.faces) < _MANY))
+    seen, values = _sheets_of(seen, _fitting(seen, values))
+    low, high = limits or _ends(values)
+    cameras = needed_views(seen) if where is None else (best_view(seen, np.asarray([where[0]])),)
+    figure, axes = _sheets(cameras, bar=True)
+    for ax, camera in zip(axes, cameras, strict=True):
+        draw(ax, seen, camera, Paint(values, (low, high), cmap, len(seen.faces) < _MANY))
+        ax.set_anchor("S")
+        _triad(ax, camera)
+        _scale_bar(ax, camera, seen.unit)
     if where is not None:
-        _circle(ax, camera, *where)
-    paper.colour_bar(figure, ax, cmap, (low, high), f"{name} [{unit}]" if unit else name)
-    _scale_bar(ax, camera, seen.unit)
+        _circle(axes[0], cameras[0], *where)
+    text = f"{name} [{unit}]" if unit else name
+    paper.colour_bar(figure, axes[-1], cmap, (low, high), text, _beyond(values, low, high))
     return paper.save(figure, path)
 
 
+def _sheets_of(seen: Surface, values: np.ndarray) -> tuple[Surface, np.ndarray]:
+    """The sheets without the solids of joints, and their values."""
+    if len(values) == len(seen.faces) != len(seen.points):
+        values = values[~np.asarray(seen.joint)]
+    return seen.without_joints(), values
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    """The smallest and the largest value, a little apart."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    if low == high:
+        return low - 0.5 * abs(low) - 1e-12, high + 0.5 * abs(high) + 1e-12
+    return low, high
+
+
+def _beyond(values: np.ndarray, low: float, high: float) -> Any:
+    span = 1e-9 * (high - low)
+    under, over = np.nanmin(values) < low - span, np.nanmax(values) > high + span
+    return {(0, 0): "neither", (0, 1): "max", (1, 0): "min", (1, 1): "both"}[int(under), int(over)]
+
+
+def usual_limits(seen: Surface, values: np.ndarray, share: float = 0.02) -> tuple[float, float]:
+    """Limits that all but a share of the area of the faces (m,) lies within at either end."""
+    ok = np.isfinite(values)
+    area, v = np.linalg.norm(seen.areas(), axis=1)[ok], values[ok]
+    order = np.argsort(v)
+    part = np.cumsum(area[order]) / max(float(area.sum()), 1e-300)
+    low, high = np.searchsorted(part, [share, 1 - share])
+    return _ends(v[order][[low, min(int(high), len(v) - 1)]])
+
+
 def thickness_map(path: Path | str, seen: Surface, thickness: np.ndarray) -> Path:
-    """Thickness [m] of every face, shown in millimetres."""
+    """Thickness [m] of every face in millimetres; small thick plates do not set the scale."""
     scale, unit = (1e3, "mm") if seen.unit == "m" else (1.0, seen.unit)
-    return scalar_map(path, seen, scale * np.asarray(thickness), "thickness", unit, "cividis")
+    t = scale * np.asarray(thickness)
+    return scalar_map(path, seen, t, "thickness", unit, "YlGnBu", usual_limits(seen, t))
 
 
 def sensors(
-    path: Path | str, seen: Surface, outputs: Sequence[Marker], inputs: Sequence[Marker] = ()
+    path: Path | str,
+    seen: Surface,
+    outputs: Sequence[Marker],
+    inputs: Sequence[Marker] = (),
+    names: tuple[str, str] = ("sensor", "shaker"),
 ) -> Path:
-    """Where sensors (blue) and shakers (red) sit and which way they point."""
+    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things."""
     focus = np.array([m.point for m in (*outputs, *inputs)]).reshape(-1, 3)
-    figure, ax = _sheet(camera := best_view(seen, focus))
+    seen = seen.without_joints()
+    figure, (ax,) = _sheets([camera := best_view(seen, focus)])
     draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
+    _triad(ax, camera)
     reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
     for markers, colour, name in (
-        (outputs, paper.AFTER, "sensor"),
-        (inputs, paper.BEFORE, "shaker"),
+        (outputs, paper.AFTER, names[0]),
+        (inputs, paper.BEFORE, names[1]),
     ):
         _arrows(ax, camera, markers, colour, reach, name)
     if outputs or inputs:
@@ -159,7 +218,7 @@ def location(
     """
     meant = seen.points[seen.faces[faces]].mean(axis=1) if faces is not None else np.zeros((0, 3))
     focus = meant if point is None else np.asarray(point, dtype=float)[None]
-    figure, ax = _sheet(camera := best_view(seen, focus))
+    figure, (ax,) = _sheets([camera := best_view(seen, focus)])
     values = None if faces is None else np.where(faces, 0.55, np.nan)
     draw(ax, seen, camera, Paint(values, (0.0, 1.0), "Reds", len(seen.faces) < _MANY))
     if point is not None:
@@ -170,32 +229,57 @@ def location(
     return paper.save(figure, path)
 
 
-def _sheet(camera: Camera, width: float = 7.0, bar: bool = False) -> tuple[Figure, Axes]:
-    """A figure of the camera's proportions with room for a title (and a colour bar)."""
-    left, right = 0.02, 0.84 if bar else 0.98
-    picture = width * (right - left)
-    height = min(picture / camera.aspect, 1.3 * width)
-    figure = Figure(figsize=(width, height + 0.75))
-    total = height + 0.75
-    ax = figure.add_axes((left, 0.35 / total, right - left, height / total))
-    return figure, ax
+def _sheets(
+    cameras: Sequence[Camera], width: float = 7.0, bar: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """A figure with one view beside the other, and room for a title (and a colour bar)."""
+    n, margin, beside = len(cameras), 0.14, 0.9 if bar else 0.0
+    picture = width - 2 * margin - (beside if n == 1 else 0.0)
+    picture = picture if n == 1 else 0.75 * width
+    height = min(max(picture / c.aspect for c in cameras), 1.3 * width)
+    wide, high = n * picture + (n + 1) * margin + beside, height + 0.75
+    figure = Figure(figsize=(wide, high))
+    steps = [(margin + k * (picture + margin)) / wide for k in range(n)]
+    return figure, [
+        figure.add_axes((left, 0.35 / high, picture / wide, height / high)) for left in steps
+    ]
 
 
-def _cell(k: int, rows: int, columns: int) -> tuple[float, float, float, float]:
+def _cell(k: int, rows: int, columns: int, foot: float) -> tuple[float, float, float, float]:
     i, j = divmod(k, columns)
-    return (j / columns, 1 - (i + 0.97) / rows, 1 / columns, 0.85 / rows)
+    row = (1 - foot) / rows
+    return (j / columns, 1 - (i + 0.97) * row, 1 / columns, 0.85 * row)
 
 
-def _roomy(seen: Surface) -> Camera:
-    """The best view with room for the swing of a mode."""
-    camera, points = best_view(seen), seen.points[seen.used]
-    swing = _SWING * seen.size
+def _framed(seen: Surface, camera: Camera) -> Camera:
+    """The view with room for the swing of a mode."""
+    points, swing = seen.points[seen.used], _SWING * seen.size
     reach = [swing * d * s for d in (camera.right, camera.up) for s in (0.5, -0.5)]
     return camera.framing(np.concatenate([points + r for r in reach]), margin=0.02)
 
 
+def _for_mode(seen: Surface, phi: np.ndarray) -> tuple[Camera, np.ndarray]:
+    """The view that shows more of ∫ |u|² dA, and the sign that moves the larger part to the eye.
+
+    A sheet that moves away from the eye would vanish behind the one after it.
+    """
+    front, back = (_framed(seen, camera) for camera in both_views(seen))
+    if not len(seen.faces):
+        return front, phi
+    u, middle = phi[seen.faces].mean(axis=1), seen.points[seen.faces].mean(axis=1)
+    weight = np.linalg.norm(seen.areas(), axis=1) * (u * u).sum(axis=1)
+    shown = [weight @ visible(camera, seen, middle) for camera in (front, back)]
+    camera = back if shown[1] > 1.25 * shown[0] else front
+    return camera, phi if weight @ camera.depth(u) >= 0 else -phi
+
+
 def _swung(
-    ax: Axes, seen: Surface, shape: np.ndarray, camera: Camera, peak: float | None = None
+    ax: Axes,
+    seen: Surface,
+    shape: np.ndarray,
+    camera: Camera,
+    peak: float | None = None,
+    edges: bool = True,
 ) -> None:
     """A surface displaced by a shape whose largest value becomes a set part of its size."""
     peak = _peak(shape) if peak is None else peak
@@ -203,9 +287,9 @@ def _swung(
     colours = Paint(
         np.linalg.norm(shape, axis=1) / peak,
         (0.0, 1.0),
-        "viridis",
-        len(seen.faces) < _MANY,
-        seen.points[seen.outline(_GHOST)],
+        _MOTION,
+        edges and len(seen.faces) < _MANY,
+        seen.points[seen.outline(_GHOST, _LONG)],
     )
     draw(ax, moved, camera, colours)
 
@@ -267,6 +351,19 @@ def _scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
     beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
     ax.annotate(text.strip(), (u0 + length, v), (5, 0), **beside, annotation_clip=False)
     ax.set(xlim=(u0, u1), ylim=(v0, v1))
+
+
+def _triad(ax: Axes, camera: Camera, small: bool = False) -> None:
+    """The basic axes as three short lines below the lower right corner."""
+    u0, u1, v0, v1 = camera.window
+    reach = (0.05 if small else 0.06) * min(u1 - u0, v1 - v0)
+    origin = np.array([u1 - 1.8 * reach, v0 - 0.2 * reach])
+    tips = camera.project(np.eye(3)) * reach
+    for tip, name in zip(tips, "xyz", strict=True):
+        style = {"arrowstyle": "-", "color": "#555555", "lw": 0.9, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", tuple(origin + tip), tuple(origin), arrowprops=style, annotation_clip=False)
+        if np.linalg.norm(tip) > 0.3 * reach:
+            paper.halo_text(ax, origin + 1.45 * tip, name, "#555555", 6.0 if small else 7.5)
 
 
 def round_length(most: float) -> float:

@@ -4,10 +4,12 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import readonly
 from ..errors import ModelError, ShapeError
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, Average
 
 _SIDES = {  # faces of a solid by its number of nodes; a triangle repeats its last node
     8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
@@ -31,6 +33,7 @@ class Surface:
     lines : (k, 2) int     beams, bars, springs
     part : (m,) int        part of each face; outlines are drawn where parts meet
     unit : str             "m"; "" where the deck's own unit of length is not known
+    joint : (m,) bool      faces of welds and adhesive, which lie between or in sheets
     """
 
     points: np.ndarray
@@ -38,6 +41,7 @@ class Surface:
     lines: np.ndarray = field(default_factory=lambda: _no_rows(2))
     part: np.ndarray | None = None
     unit: str = "m"
+    joint: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, columns in (("points", 3), ("faces", 4), ("lines", 2)):
@@ -47,6 +51,8 @@ class Surface:
             object.__setattr__(self, name, readonly(np.asarray(getattr(self, name))))
         if self.part is None:
             object.__setattr__(self, "part", np.zeros(len(self.faces), dtype=np.int64))
+        if self.joint is None:
+            object.__setattr__(self, "joint", np.zeros(len(self.faces), dtype=bool))
 
     @classmethod
     def of(cls, points: np.ndarray, quads: np.ndarray, tris: np.ndarray | None = None) -> Self:
@@ -58,6 +64,11 @@ class Surface:
     def moved(self, displacement: np.ndarray) -> Self:
         """The same faces over displaced points (n, 3) [m]."""
         return replace(self, points=self.points + displacement)
+
+    def without_joints(self) -> Self:
+        """The sheets alone: the solids of joints lie in their surface and would shine through."""
+        keep = ~np.asarray(self.joint)
+        return replace(self, faces=self.faces[keep], part=np.asarray(self.part)[keep], joint=None)
 
     @property
     def size(self) -> float:
@@ -81,8 +92,11 @@ class Surface:
         a = self.areas()
         return a / np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-300)
 
-    def outline(self, crease: float = 35.0) -> np.ndarray:
-        """Edges (k, 2) that show the form: free, between parts, or folded by ``crease`` degrees."""
+    def outline(self, crease: float = 35.0, least: float = 0.0) -> np.ndarray:
+        """Edges (k, 2) that show the form: free, between parts, or folded by ``crease`` degrees.
+
+        Connected edges that reach less than ``least`` of the structure's size are left out.
+        """
         edges = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], -1), axis=-1)
         owner = np.repeat(np.arange(len(self.faces)), 4)
         edges = edges.reshape(-1, 2)
@@ -99,7 +113,21 @@ class Surface:
         n, part = self.normals(), np.asarray(self.part)
         fold = np.abs(np.einsum("ij,ij->i", n[one], n[two])) < np.cos(np.radians(crease))
         shown[~shown] = fold | (part[one] != part[two])
-        return np.concatenate([edges[begin[shown]], self.lines])
+        return np.concatenate([self._reaching(edges[begin[shown]], least), self.lines])
+
+    def _reaching(self, edges: np.ndarray, least: float) -> np.ndarray:
+        if not least or not len(edges):
+            return edges
+        n = len(self.points)
+        graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
+        line = connected_components(graph, directed=False)[1][edges[:, 0]]
+        long = [
+            k
+            for k in np.unique(line)
+            if np.linalg.norm(np.ptp(self.points[edges[line == k]].reshape(-1, 3), axis=0))
+            >= least * self.size
+        ]
+        return np.asarray(edges[np.isin(line, long)])
 
 
 def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -112,16 +140,26 @@ def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     return faces[at], np.asarray(part)[owner[at]], owner[at]
 
 
+def _carried(assembly: Assembly) -> np.ndarray:
+    """Which points (n,) are means of shells' points (RBE3): the corners of welds and adhesive."""
+    means = [t.reference for t in assembly.rigid if isinstance(t, Average)]
+    on = np.zeros(len(assembly.points), bool)
+    on[means if len(assembly.shells) else []] = True
+    return on
+
+
 def surface(assembly: Assembly, unit: str = "m") -> Surface:
     """All that can be seen of an assembly: shells, skins of solids, beams, springs, bushes.
 
     The shells' faces come first and in the deck's order, so a value per shell is a value per face.
     """
     faces, parts = [assembly.shells.nodes], [assembly.shells.part]
+    joints, carried = [np.zeros(len(assembly.shells), bool)], _carried(assembly)
     for solids in assembly.solids:
         outer, part, _ = skin(solids.nodes, solids.part)
         faces.append(outer)
         parts.append(part)
+        joints.append(carried[outer].all(axis=1))
     pairs = [assembly.beams.nodes, assembly.springs.nodes, assembly.bushes.nodes]
     lines = np.concatenate(pairs).astype(np.int64)
     seen = Surface(
@@ -130,6 +168,7 @@ def surface(assembly: Assembly, unit: str = "m") -> Surface:
         lines[(lines >= 0).all(axis=1)],
         np.concatenate(parts).astype(np.int64),
         unit,
+        np.concatenate(joints),
     )
     if not len(seen.faces) + len(seen.lines):
         raise ModelError("there is nothing to draw: no shells, solids, beams or springs")
