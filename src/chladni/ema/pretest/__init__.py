@@ -15,6 +15,9 @@ from .deletion import first_max as first_max
 from .deletion import first_min as first_min
 from .deletion import greedy as greedy
 from .deletion import qr_ranking as qr_ranking
+from .distinct import distinct as distinct
+from .distinct import excess as excess
+from .distinct import likeness as likeness
 from .exchange import best_layout as best_layout
 from .exchange import exchange as exchange
 from .gramians import Balanced as Balanced
