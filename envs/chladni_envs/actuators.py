@@ -10,8 +10,8 @@ from chladni.ema.pretest import best_layout, rattle_margin, shaking
 from chladni.errors import ShapeError
 
 from . import drawing
-from .placement import Reset, Step
-from .specimens import Specimen, of_case, plate
+from .placement import Reset, Step, of_case
+from .specimens import Specimen, plate
 
 WORST = 1e6  # condition numbers beyond this are no worse than useless
 
@@ -38,7 +38,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     sensors : (m,) int        positions of the sensors among the candidates; EFI by default
     access : (n,) bool        where a shaker can be mounted
     gap_shapes : (g, r)       relative motion across each gap [1/√kg]
-    clearance : (g,)          [m]
+    clearance : (g,)          [m]; access and gaps are found on the mesh of a case
     force : amplitude for which nothing may rattle [N]
     quantity : what the sensors measure
     case : folder or deck     whose mesh gives candidates and modes
@@ -66,6 +66,9 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             specimen = plate(7, 7, 6) if case is None else of_case(case, modes)
         s = self.specimen = specimen
         n, r = s.phi.shape
+        access = s.access if access is None else access
+        if gap_shapes is None and clearance is None:
+            gap_shapes, clearance = s.gap_shapes, s.clearance
         at = best_layout(s.phi, min(n, r + 2)) if sensors is None else np.asarray(sensors)
         self.shaker = shaking(s.frequency, s.damping, s.phi[at], s.phi, quantity)
         self.allowed = np.ones(n, bool) if access is None else np.asarray(access, bool).copy()
@@ -112,9 +115,10 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         """The places as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
-        xy = drawing.places(len(self.allowed), self.specimen.points)
+        s = self.specimen
+        xy, lines = drawing.places(len(self.allowed), s.points, s.outline)
         title = f"{int(self.chosen.sum())} actuators, condition {10**-self.score:.1f}"
-        return drawing.layout(xy, self.chosen, self.action_masks(), title)
+        return drawing.layout(xy, self.chosen, self.action_masks(), title, lines)
 
     def _observation(self) -> np.ndarray:
         """σ_min/σ_max of each candidate with those chosen, σ² = diag W_c diag W_o."""

@@ -11,14 +11,15 @@ from chladni.effects.effect import Effect, Parameter
 from chladni.ema.pretest import Linearised
 from chladni.errors import FileError
 from chladni.planning import Wishes, find_places
-from chladni.planning.plan import mounts_at, shapes, target_modes
+from chladni.planning.plan import motion, mounts_at, seen_at, target_modes
+from chladni.planning.rattle import openings
 from chladni.updating.calibration import Weighing
 from chladni.updating.likelihood import Responses
 from chladni.updating.prepare import prepare
 from chladni.updating.question import Places, Prepared, Question
 from chladni.updating.reduced import State, evaluate
 
-from .calibration import Question as Calibration
+from .questions import Question as Calibration
 from .specimens import Specimen
 
 REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
@@ -26,6 +27,9 @@ REACH = 2.0  # prior standard deviations at which a calibration environment has 
 
 def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None = None) -> Specimen:
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
+
+    With them goes what decides where to shake: a straight way to the place, and the clearances of
+    the mesh (:mod:`chladni.planning.rattle`).
 
     Parameters
     ----------
@@ -37,11 +41,20 @@ def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None 
     model = load_model(Path(case), units)
     places = find_places(model.assembly, candidates, unit=model.unit)
     target, _, _ = target_modes(model.structure, Wishes(modes=modes))
-    mounts = mounts_at(places)
-    normal = mounts.normal
-    labels = tuple(name for name, flat in zip(mounts.labels, normal, strict=True) if flat)
-    phi = shapes(model.structure, target, mounts)[normal]
-    return Specimen(mounts.points[normal], phi, target.frequency, target.damping, labels)
+    mounts, moving = mounts_at(places), motion(model.structure, target)
+    labels, seen = mounts.labels[: len(places)], model.seen
+    gaps = openings(model.assembly, moving)
+    return Specimen(
+        places.points,
+        seen_at(places, mounts, moving)[: len(places)],
+        target.frequency,
+        target.damping,
+        labels,
+        outline=seen.points[seen.outline()],
+        access=places.straight,
+        gap_shapes=gaps.motion,
+        clearance=gaps.clearance,
+    )
 
 
 class Recorded:

@@ -5,20 +5,36 @@ from typing import Any
 import numpy as np
 
 
-def places(n: int, points: np.ndarray | None) -> np.ndarray:
-    """Two coordinates (n, 2) to draw at: the two broadest axes of the points, or a circle."""
+def places(
+    n: int, points: np.ndarray | None, outline: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where to draw (n, 2) and the structure's edges (k, 2, 2) behind.
+
+    Points in space are seen along the axis in which they spread least; without points they stand
+    in a circle.
+    """
     if points is None:
         angle = 2 * np.pi * np.arange(n) / n
-        return np.column_stack([np.cos(angle), np.sin(angle)])
+        return np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((0, 2, 2))
+    points = np.asarray(points)
     broad = np.sort(np.argsort(-np.ptp(points, axis=0), kind="stable")[:2])
-    return np.asarray(points)[:, broad]
+    lines = np.zeros((0, 2, 2)) if outline is None else outline[:, :, broad]
+    return points[:, broad], lines
 
 
 def layout(
-    xy: np.ndarray, chosen: np.ndarray, legal: np.ndarray, title: str, size: float = 4.0
+    xy: np.ndarray,
+    chosen: np.ndarray,
+    legal: np.ndarray,
+    title: str,
+    lines: np.ndarray,
+    size: float = 4.0,
 ) -> np.ndarray:
-    """Places as dots: chosen ones filled, legal ones outlined, the rest faint (h, w, 3) uint8."""
+    """Dots on the structure's edges: chosen ones filled, legal ones outlined (h, w, 3) uint8."""
+    from matplotlib.collections import LineCollection
+
     figure, ax = _sheet(size, title)
+    ax.add_collection(LineCollection(list(lines), colors="0.85", linewidths=0.5))
     ax.scatter(*xy[~chosen & ~legal].T, s=8, c="0.8", linewidths=0)
     ax.scatter(*xy[legal & ~chosen].T, s=22, facecolors="none", edgecolors="0.5", linewidths=0.8)
     ax.scatter(*xy[chosen].T, s=30, c="#1f4e79", linewidths=0)

@@ -10,10 +10,17 @@ from chladni.ema.pretest import Candidates, Rules, Walk, candidates
 from chladni.errors import LabelError
 
 from . import drawing
-from .specimens import of_case, plate
+from .specimens import Specimen, plate
 
 Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
+
+
+def of_case(case: str, modes: int) -> Specimen:
+    """Candidates and target modes of a case folder or deck (:mod:`chladni_envs.cases`)."""
+    from .cases import specimen  # loads the finite element part of the package only now
+
+    return specimen(case, modes)
 
 
 class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
@@ -65,9 +72,10 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         modes: int = 24,
         render_mode: str | None = None,
     ) -> None:
+        self.outline: np.ndarray | None = None
         if phi is None:
             specimen = plate() if case is None else of_case(case, modes)
-            phi, points = specimen.phi, specimen.points
+            phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
         usual = min(n, -(-5 * self.candidates.unknowns // 4))
@@ -111,9 +119,9 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         """The layout as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
-        xy = drawing.places(len(self.candidates), self.points)
+        xy, lines = drawing.places(len(self.candidates), self.points, self.outline)
         title = f"{int(self.walk.kept.sum())} sensors, log det {self.walk.log_det:.2f}"
-        return drawing.layout(xy, self.walk.kept, self.mask, title)
+        return drawing.layout(xy, self.walk.kept, self.mask, title, lines)
 
     def _walk(self, broken: np.ndarray) -> Walk:
         rules = self.rules

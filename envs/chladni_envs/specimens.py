@@ -1,6 +1,6 @@
 """What the environments play on when no case is given: small structures with known modes."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,13 +15,21 @@ class Specimen:
     phi : (n, r)               mass-normalised shapes along each place's direction [1/√kg]
     frequency, damping : (r,)  [Hz], fraction of critical
     labels : tuple of str      what the places are called
+    outline : (k, 2, 3)        edges of the structure, for pictures [m]
+    access : (n,) bool         a shaker's rod leads straight to the place
+    gap_shapes : (g, r)        opening of gaps between sheets [1/√kg]
+    clearance : (g,)           of these [m]
     """
 
     points: np.ndarray
     phi: np.ndarray
     frequency: np.ndarray
     damping: np.ndarray
-    labels: tuple[str, ...] = field(default=())
+    labels: tuple[str, ...] = ()
+    outline: np.ndarray | None = None
+    access: np.ndarray | None = None
+    gap_shapes: np.ndarray | None = None
+    clearance: np.ndarray | None = None
 
 
 def plate(
@@ -52,10 +60,3 @@ def plate(
     labels = tuple(f"{k + 1}:+Z" for k in range(len(X)))
     points = np.column_stack([X, Y])
     return Specimen(points, phi, omega[low] / (2 * np.pi), np.full(modes, zeta), labels)
-
-
-def of_case(case: str, modes: int) -> Specimen:
-    """Candidates and target modes of a case folder or deck (:mod:`chladni_envs.cases`)."""
-    from .cases import specimen  # loads the finite element part of the package only now
-
-    return specimen(case, modes)

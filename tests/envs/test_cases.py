@@ -5,14 +5,16 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.ema.tables_write import write_npz
+from chladni.errors import ShapeError
 from chladni.fem.assemble import structure
 from chladni.meshing.nastran import write_assembly
 from chladni.model.plates import folded_panel
-from chladni_envs import agents, cases
+from chladni_envs import IDS, agents, cases
 
 SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
 SENSORS = ("34:+Z", "100:+Z", "187:+Z", "239:+Z", "313:+Z", "402:+Z", "470:+Z", "555:+Z")
@@ -63,17 +65,6 @@ def _recorded(panel):
     return FRF(H, f, SENSORS, (SENSORS[2],), "accelerance")
 
 
-def test_sensors_of_a_case(case):
-    env = gym.make("chladni_envs:chladni/SensorPlacement-v0", case=case, modes=8, n_sensors=10)
-    efi, best = (agents.play(env, a) for a in (agents.efi, agents.exchange(env)))
-    assert efi["log_det"] <= best["log_det"]
-
-
-def test_actuators_of_a_case(case):
-    env = gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8)
-    assert agents.play(env, agents.best_actuators(env))["condition"] < 1e3
-
-
 @pytest.fixture(scope="module")
 def recorded(case):
     """The case made ready for updating, once for both environments."""
@@ -84,6 +75,56 @@ def recorded(case):
 def ready(recorded, monkeypatch):
     monkeypatch.setattr(cases, "Recorded", lambda path: recorded)
     return recorded
+
+
+@pytest.mark.parametrize("id", IDS)
+@pytest.mark.filterwarnings("ignore:.*render:UserWarning")
+def test_contracts_with_a_case(ready, case, id):
+    """Gymnasium's checker and, where it is installed, that of Stable-Baselines3."""
+    env = gym.make(f"chladni_envs:{id}", case=case, render_mode="rgb_array")
+    check_env(env.unwrapped)
+    env.reset(seed=0)
+    assert env.render().shape[2] == 3
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
+    sb3.check_env(env.unwrapped, warn=False)
+
+
+@pytest.mark.parametrize("id", [i for i in IDS if "Placement" in i])
+def test_vectors_with_a_case_are_identical(case, id):
+    stories = []
+    for mode in ("sync", "async"):
+        envs = gym.make_vec(id, num_envs=2, vectorization_mode=mode, case=case, modes=8)
+        obs, _ = envs.reset(seed=5)
+        envs.action_space.seed(5)
+        story = [obs.copy()]
+        for _ in range(5):
+            obs, reward, *_ = envs.step(envs.action_space.sample())
+            story += [obs.copy(), reward.copy()]
+        envs.close()
+        stories.append(story)
+    for a, b in zip(*stories, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_shakers_of_a_case_are_vetoed_by_its_mesh(case):
+    """Gaps and access come from the mesh; a force beyond the first contact is a veto."""
+    specimen = cases.specimen(case, 8)
+    assert specimen.access.shape == (len(specimen.points),)
+    assert specimen.gap_shapes.shape == (len(specimen.clearance), 8)
+    closed = np.full(len(specimen.points), False)
+    with pytest.raises(ShapeError, match="access and rattle leave 0"):
+        gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8, access=closed)
+
+
+def test_sensors_of_a_case(case):
+    env = gym.make("chladni_envs:chladni/SensorPlacement-v0", case=case, modes=8, n_sensors=10)
+    efi, best = (agents.play(env, a) for a in (agents.efi, agents.exchange(env)))
+    assert efi["log_det"] <= best["log_det"]
+
+
+def test_actuators_of_a_case(case):
+    env = gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8)
+    assert agents.play(env, agents.best_actuators(env))["condition"] < 1e3
 
 
 def test_selection_of_a_case(ready, case):

@@ -25,10 +25,16 @@ def run(
     candidates: Annotated[int, typer.Option(help="Places to choose from.", min=2)] = 300,
     spacing: Annotated[float, typer.Option(help="Least distance of sensors [m].", min=0.0)] = 0.0,
     damping: Annotated[float, typer.Option(help="Expected damping ratio.", min=1e-6)] = 0.01,
+    force: Annotated[
+        float, typer.Option(help="Shaker force at which nothing may rattle [N].", min=1e-9)
+    ] = 5.0,
+    alike: Annotated[
+        float, typer.Option(help="Modes may look this much alike (AutoMAC).", min=0.0, max=1.0)
+    ] = 0.15,
     mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
     drawn: Annotated[
         int, typer.Option(help="Models with drawn thickness the layout must serve.", min=0)
-    ] = 0,
+    ] = 20,
     units: Units = None,
     out: Out = None,
 ) -> None:
@@ -41,6 +47,8 @@ def run(
         candidates=candidates,
         spacing=spacing,
         actuators=shakers,
+        force=force,
+        alike=alike,
         mass=mass,
         draws=drawn,
     )

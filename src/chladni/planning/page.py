@@ -15,6 +15,7 @@ from .summary import AVERAGES, PER_BANDWIDTH
 
 PICTURES = {
     "sensors.png": "the layout",
+    "shaker.png": "where to shake and where to hang",
     "auto_mac.png": "AutoMAC at the sensors",
     "modes.png": "the modes the sensors see least",
 }
@@ -35,10 +36,16 @@ def lead(result: dict[str, Any]) -> str:
 def notes(found: Plan) -> list[str]:
     """What was decided on the way, and what to mind."""
     refused = [f"{count} grids {why}" for why, count in found.places.refused.items()]
+    centres = int((~found.places.is_grid).sum())
     out = [
         f"{len(found.places)} places were looked at, spread over all flat surfaces that can be "
         f"reached; left out: {', '.join(refused)}."
     ]
+    if centres:
+        out.append(
+            f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
+            "keeps off the edges; sensors.csv gives their x, y, z."
+        )
     shift = np.abs(found.loaded / found.modal.frequency - 1).max()
     if shift > 0.005:
         out.append(
@@ -52,10 +59,31 @@ def notes(found: Plan) -> list[str]:
             "sensor fits, and no shaker at a normal drives it well; the layout was made for the "
             "others, and a sensor on a block was moved to it where that helps."
         )
+    out += _rattle_notes(found)
     if found.wishes.draws:
         out.append(
             f"The layout serves {found.wishes.draws} models with the thickness of every part drawn "
             f"with a standard deviation of {100 * found.wishes.spread:g} %."
+        )
+    return out
+
+
+def _rattle_notes(found: Plan) -> list[str]:
+    """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
+    out, force = [], found.wishes.force
+    if rattling := int((found.rattle.force < force).sum()):
+        out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
+    if blocked := int((~found.places.straight).sum()):
+        out.append(f"To {blocked} places no straight rod leads: they are for sensors only.")
+    if not found.actuators.allowed[found.together].all():
+        out.append(
+            "The shakers named are vetoed too: nothing better is left. Lower the force (--force)."
+        )
+    if found.openings.touching:
+        pairs = ", ".join(f"{a} and {b}" for a, b in found.openings.touching)
+        out.append(
+            f"Away from their joints the mesh lets touch: {pairs}. Their gap is less than the "
+            "facets leave in doubt, so when they rattle is not foretold: listen to them first."
         )
     return out
 
@@ -67,7 +95,7 @@ def sections(
     return [
         Section("Sensors", _sensors(found, result, seen, folder / "sensors.png")),
         Section("Modes", _modes(found, result, seen, built, folder)),
-        Section("Shaker and cords", _shaker(result)),
+        Section("Shaker and cords", _shaker(found, result, seen, folder / "shaker.png")),
         Section("Lines and duration", [Text([_test(result["test"])])]),
     ]
 
@@ -79,14 +107,15 @@ def _sensors(
     shakers = [_marker(a, "shaker") for a in result["actuators_together"]]
     picture = scene.sensors(path, seen, outputs, shakers)
     rows = [
-        (str(s["rank"]), s["label"], str(s["grid"]), _vector(s["direction"]))
+        (str(s["rank"]), s["label"], *_where(s), _vector(s["direction"]), s["mounted"])
         for s in result["sensors"]
     ]
     table = Table(
-        ("rank", "label", "grid", "direction"),
+        ("rank", "label", "grid", "place [m]", "direction", "mounted"),
         rows,
-        words=("label", "direction"),
-        caption="The most informative first; the last is the one to give up for something else.",
+        words=("label", "place [m]", "direction", "mounted"),
+        caption="The most informative first; the last is the one to give up for something else. "
+        "A place without a grid is the centre of a shell.",
     )
     moves = [
         f"Mode {m['mode']} was hardly seen ({number(m['before'], 2)} of its largest motion): the "
@@ -99,6 +128,11 @@ def _sensors(
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
         Items(moves or ["No sensor had to move for a mode to be seen."]),
     ]
+
+
+def _where(mount: dict[str, Any]) -> tuple[str, str]:
+    grid = "" if mount["grid"] is None else str(mount["grid"])
+    return grid, _vector(mount["point_m"])
 
 
 def _marker(mount: dict[str, Any], text: str) -> scene.Marker:
@@ -116,19 +150,25 @@ def _modes(
             str(m["mode"]),
             number(m["frequency_hz"], 5),
             number(m["visibility"], 2),
-            "" if m["seen"] else "hardly",
+            "yes" if m["seen"] else "hardly",
+            "yes" if m["seen_by_normals"] else "no, moves along the sheets",
             f"{100 * shift[k]:.2f} %",
         )
         for k, m in enumerate(result["modes"])
     ]
     table = Table(
-        ("mode", "Hz", "visibility", "seen", "shift by sensors"),
+        ("mode", "Hz", "visibility", "seen", "seen by normals", "shift by sensors"),
         rows,
-        words=("seen",),
+        words=("seen", "seen by normals"),
         caption="Visibility: largest motion a sensor sees over the largest anywhere.",
     )
     sweep = [(str(n), f"{100 * share:.0f} %") for n, share in found.sweep]
-    steps = Table(("target modes", "layout kept"), sweep, caption="When more modes are targeted.")
+    steps = Table(
+        ("target modes", "layout kept"),
+        sweep,
+        caption="Share of the sensors that stays when so many modes are targeted instead of those "
+        "in the row above.",
+    )
     names = [str(m["mode"]) for m in result["modes"]]
     mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
     least = _least_seen(found, seen, built, folder / "modes.png")
@@ -142,14 +182,19 @@ def _least_seen(found: Plan, seen: Surface, built: Structure, path: Path) -> Pat
     return scene.montage(path, seen, motion(built, shown), shown.frequency, numbers=numbers)
 
 
-def _shaker(result: dict[str, Any]) -> list[Facts | Table]:
+def _shaker(
+    found: Plan, result: dict[str, Any], seen: Surface, path: Path
+) -> list[Facts | Table | Picture]:
+    best = [_marker(a, str(k + 1)) for k, a in enumerate(result["actuators"][:10])]
     rows = [
         (
             str(k + 1),
             a["label"],
-            str(a["grid"]),
+            *_where(a),
             number(a["condition"]),
             number(a["least_over_mean_residue"], 2),
+            _rattling(a),
+            "no" if a["vetoed"] else "yes",
             "yes" if a["is_sensor"] else "",
         )
         for k, a in enumerate(result["actuators"][:10])
@@ -162,10 +207,28 @@ def _shaker(result: dict[str, Any]) -> list[Facts | Table]:
     ]
     caption = (
         "Condition: greatest over least Hankel singular value, the lower the better. Least "
-        "residue: driving-point residue of the mode driven worst, over the mean."
+        "residue: driving-point residue of the mode driven worst, over the mean. Rattles from: "
+        "force at resonance at which two sheets first meet. Allowed: a straight rod leads there, "
+        f"and nothing rattles at {found.wishes.force:g} N."
     )
-    columns = ("rank", "label", "grid", "condition", "least residue", "also a sensor")
-    return [Facts(facts), Table(columns, rows, words=("label", "also a sensor"), caption=caption)]
+    columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
+    words = ("rattles from", "allowed", "also a sensor")
+    table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
+    cords = [_hanger(found, int(g)) for g in result["hangers"]]
+    picture = scene.sensors(path, seen, cords, best, ("cord", "shaker, by rank"))
+    return [Facts(facts), Picture(picture, "Ten best shaker places (red), cords (blue)."), table]
+
+
+def _rattling(actuator: dict[str, Any]) -> str:
+    if actuator["rattles_between"] is None:
+        return "none foretold"
+    a, b = actuator["rattles_between"]
+    return f"{number(actuator['rattles_from_n'], 2)} N: {a} / {b}"
+
+
+def _hanger(found: Plan, grid: int) -> scene.Marker:
+    k = int(np.flatnonzero(found.places.ids == grid)[0])
+    return _marker({"point_m": found.places.points[k], "direction": found.places.normals[k]}, "")
 
 
 def _test(t: dict[str, Any]) -> str:

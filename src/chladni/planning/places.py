@@ -18,27 +18,48 @@ RELATIVE = 400.0  # where the unit of length is unknown a foot is this part of t
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Grids where a sensor can sit, in an order in which any first few cover the structure.
+    """Where a sensor can sit, in an order in which any first few cover the structure.
+
+    A place is a grid or, where no corner of a shell will do, its centre: a coarse mesh has no grid
+    within a narrow strip.
 
     Attributes
     ----------
-    ids : (n,) int          grids
-    rows : (n,) int         rows of points
+    ids : (n,) int          grid; for a centre a digit 1 set before the number of its shell, made
+                            as long as the longest number of the deck (see :func:`centre_ids`)
+    is_grid : (n,) bool
+    nodes : (n, 4) int      rows of points around the place; a grid repeats itself
+    weights : (n, 4)        of these
     points : (n, 3)         [m]
-    normals : (n, 3)        unit normal, as the shells around the grid are oriented
+    normals : (n, 3)        unit normal, as the shells around the place are oriented
     side : (n,)             +1, -1: the side of that normal which can be reached
-    refused : {why: count}  grids of the surface that were not taken
+    straight : (n,) bool    nothing stands in the way along the normal: room for a shaker's rod
+    refused : {why: count}  places of the surface that were not taken
     """
 
     ids: np.ndarray
-    rows: np.ndarray
+    is_grid: np.ndarray
+    nodes: np.ndarray
+    weights: np.ndarray
     points: np.ndarray
     normals: np.ndarray
     side: np.ndarray
+    straight: np.ndarray
     refused: Mapping[str, int]
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def moving(self, values: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Values of the points (n_points, ...) at (some of) the places."""
+        at = values[self.nodes[which]]
+        return np.asarray(np.einsum("nc,nc...->n...", self.weights[which], at))
+
+
+def centre_ids(assembly: Assembly) -> np.ndarray:
+    """Numbers that no grid bears for the centres of all shells: 47 -> 100047 beside grid 12345."""
+    longest = max(int(assembly.ids.max(initial=0)), int(assembly.shells.ids.max(initial=0)))
+    return np.asarray(assembly.shells.ids + 10 ** len(str(longest)))
 
 
 def find_places(
@@ -62,7 +83,7 @@ def find_places(
     Raises
     ------
     ModelError
-        If no grid passes.
+        If nothing passes.
     """
     seen = surface(assembly, unit)
     foot = foot or (FOOT if unit else seen.size / RELATIVE)
@@ -70,49 +91,108 @@ def find_places(
     sheet = seen.faces[: len(assembly.shells)] if len(assembly.shells) else seen.faces
     if not len(sheet):
         raise ModelError("the model has no surface a sensor could be glued to, only lines")
-    at = np.unique(sheet)
-    normals, bend = _bend(seen, sheet, at, foot)
+    every = _every(assembly, seen, sheet)
+    normals, bend = _bend(seen, sheet, every, foot)
     smooth = bend <= np.sin(np.radians(flat)) ** 2
     clear = smooth.copy()
-    clear[smooth] = _off_edges(seen, seen.points[at[smooth]], foot)
+    clear[smooth] = _off_edges(seen, every.points[smooth], foot)
+    grid = every.is_grid
     refused = {
-        "not flat": int((~smooth).sum()),
-        "near an edge, fold or joint": int((smooth & ~clear).sum()),
+        "not flat": int((~smooth & grid).sum()),
+        "near an edge, fold or joint": int((smooth & ~clear & grid).sum()),
     }
+    clear &= grid | ~_has_one(every, clear)
     if not clear.any():
         raise ModelError("no grid of the surface is flat and off the edges: refine the mesh")
-    order = spread(seen.points[at[clear]], min(3 * count, int(clear.sum())))
-    rows, n = at[clear][order], normals[clear][order]
-    side = _reachable(seen, seen.points[rows], n, foot, room, count)
+    at = np.flatnonzero(clear)
+    at = at[spread(every.points[at], min(3 * count, len(at)))]
+    side, straight = _reachable(seen, every.points[at], normals[at], foot, room, count)
     good = np.flatnonzero(side)[:count]
-    refused["not reachable"] = int((side[: good[-1]] == 0).sum()) if len(good) else len(rows)
+    refused["not reachable"] = int((side[: good[-1]] == 0).sum()) if len(good) else len(at)
     if not len(good):
         raise ModelError("no flat grid can be reached from outside")
-    rows = rows[good]
-    return Places(assembly.ids[rows], rows, seen.points[rows], n[good], side[good], refused)
+    return every.taken(at[good], normals[at[good]], side[good], straight[good], refused)
+
+
+@dataclass(frozen=True, eq=False)
+class _Every:
+    """All grids of the sheets, then the centres of all shells; as in :class:`Places`."""
+
+    ids: np.ndarray
+    is_grid: np.ndarray
+    nodes: np.ndarray
+    weights: np.ndarray
+    points: np.ndarray
+
+    def taken(
+        self,
+        at: np.ndarray,
+        normals: np.ndarray,
+        side: np.ndarray,
+        straight: np.ndarray,
+        refused: Mapping[str, int],
+    ) -> Places:
+        """Some of them, with what was found out about them."""
+        return Places(
+            self.ids[at],
+            self.is_grid[at],
+            self.nodes[at],
+            self.weights[at],
+            self.points[at],
+            normals,
+            side,
+            straight,
+            refused,
+        )
+
+
+def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:
+    grids = np.unique(sheet)
+    own = np.repeat(grids[:, None], 4, axis=1)
+    weights = np.tile([1.0, 0.0, 0.0, 0.0], (len(grids), 1))
+    if not len(assembly.shells):  # skins of solids have no numbers: grids only
+        sheet = sheet[:0]
+    three = (sheet[:, 2] == sheet[:, 3])[:, None]
+    centre = np.where(three, [1 / 3, 1 / 3, 1 / 3, 0.0], 0.25)
+    nodes, weights = np.concatenate([own, sheet]), np.concatenate([weights, centre])
+    return _Every(
+        np.concatenate([assembly.ids[grids], centre_ids(assembly)[: len(sheet)]]),
+        np.arange(len(nodes)) < len(grids),
+        nodes,
+        weights,
+        np.einsum("nc,nci->ni", weights, seen.points[nodes]),
+    )
+
+
+def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
+    """Whether a corner of the shell around a place is a clear grid (n,)."""
+    grids = np.zeros(int(every.nodes.max()) + 1, bool)
+    grids[every.nodes[clear & every.is_grid, 0]] = True
+    return np.asarray(grids[every.nodes].any(axis=1))
 
 
 def _bend(
-    seen: Surface, sheet: np.ndarray, at: np.ndarray, foot: float
+    seen: Surface, sheet: np.ndarray, every: _Every, foot: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Normal of each grid and the mean sin² of the surface's angle to it within a foot.
+    """Normal of each place and the mean sin² of the surface's angle to it within a foot.
 
     The tensor Σ A n nᵀ of the faces is blind to their orientation; its first vector is the normal,
-    with the sense that most of the faces around the grid have.
+    with the sense that most of the faces around the place have.
     """
-    faces = Surface(seen.points, sheet)
-    a = faces.areas()
+    a = Surface(seen.points, sheet).areas()
     size = np.linalg.norm(a, axis=1)
     tensor = np.einsum("mi,mj,m->mij", a, a, 1 / np.maximum(size, 1e-300))
     own, sense = np.zeros((len(seen.points), 3, 3)), np.zeros((len(seen.points), 3))
     for k in range(4):
         np.add.at(own, sheet[:, k], tensor)
         np.add.at(sense, sheet[:, k], a)
-    normals = np.linalg.eigh(own[at])[1][:, :, 2]
-    normals *= np.where(np.einsum("ni,ni->n", normals, sense[at]) < 0, -1.0, 1.0)[:, None]
-    centres = cKDTree(seen.points[sheet].mean(axis=1))
-    pairs = cKDTree(seen.points[at]).sparse_distance_matrix(centres, foot, output_type="ndarray")
-    wide = own[at]
+    grids, centres = every.nodes[every.is_grid, 0], int((~every.is_grid).sum())
+    wide = np.concatenate([own[grids], tensor[:centres]])
+    sense = np.concatenate([sense[grids], a[:centres]])
+    normals = np.linalg.eigh(wide)[1][:, :, 2]
+    normals *= np.where(np.einsum("ni,ni->n", normals, sense) < 0, -1.0, 1.0)[:, None]
+    middle = cKDTree(seen.points[sheet].mean(axis=1))
+    pairs = cKDTree(every.points).sparse_distance_matrix(middle, foot, output_type="ndarray")
     np.add.at(wide, pairs["i"], tensor[pairs["j"]])
     along = np.einsum("ni,nij,nj->n", normals, wide, normals)
     return normals, 1 - along / np.trace(wide, axis1=1, axis2=2)
@@ -148,14 +228,15 @@ def _farthest(far: np.ndarray) -> int:
 
 def _reachable(
     seen: Surface, points: np.ndarray, normals: np.ndarray, foot: float, room: float, enough: int
-) -> np.ndarray:
-    """+1 or -1: the side of the normal that has room and is seen from outside; 0: neither (n,).
+) -> tuple[np.ndarray, np.ndarray]:
+    """+1 or -1: the side of the normal that has room and is seen from outside, 0: neither (n,).
 
-    Stops when ``enough`` have been found; the rest stays 0.
+    With it whether the line of sight along the normal itself is free (n,) bool. Stops when
+    ``enough`` have been found; the rest stays 0.
     """
     triangles = np.concatenate([seen.faces[:, [0, 1, 2]], seen.faces[:, [0, 2, 3]]])
     corners = seen.points[triangles[triangles[:, 1] != triangles[:, 2]]]
-    sheet, out = Sheet.of(corners), np.zeros(len(points))
+    sheet, out, straight = Sheet.of(corners), np.zeros(len(points)), np.zeros(len(points), bool)
     lift = [
         locate(seen.points, seen.faces, points + side * room / 2 * normals).distance >= 0.4 * room
         for side in (1, -1)
@@ -165,10 +246,11 @@ def _reachable(
             break
         for side, free in zip((1, -1), lift, strict=True):
             n = side * normals[k]
-            if free[k] and sheet.clear(points[k] + 0.25 * foot * n, _sights(n)):
-                out[k] = side
+            start, sights = points[k] + 0.25 * foot * n, _sights(n)
+            if free[k] and sheet.clear(start, sights):
+                out[k], straight[k] = side, sheet.clear(start, sights[:1])
                 break
-    return out
+    return out, straight
 
 
 def _sights(n: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """From a structure to a test plan (thesis 4.1): sensors with direction, shaker, cords, lines."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,8 +12,10 @@ from ..ema import pretest
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
-from ..progress import Progress, silent
+from ..progress import Progress, silent, within
+from .draws import drawn, ensemble
 from .places import Places, find_places
+from .rattle import Openings, Rattle, first_rattle, openings
 
 SPARE = 6  # modes computed beyond those wanted, so that the sweep sees what lies above
 BLIND = 0.25  # of the floor: what no place sees better than this is not aimed at
@@ -32,7 +34,9 @@ class Wishes:
     damping : expected damping ratio of every mode
     candidates : places looked at
     spacing : least distance between two sensors [m]
+    alike : two modes may look alike at the sensors (AutoMAC) up to this; 1: as they come
     actuators : shakers that are to work together
+    force : amplitude of a shaker at which nothing may rattle [N]
     floor : least visibility of a mode: largest motion a sensor sees over the largest anywhere
     mass : of one sensor [kg]
     draws, spread : models drawn with every part's thickness uncertain by this share (1 sd);
@@ -46,7 +50,9 @@ class Wishes:
     damping: float = 0.01
     candidates: int = 300
     spacing: float = 0.0
+    alike: float = 0.15
     actuators: int = 1
+    force: float = 5.0
     floor: float = 0.2
     mass: float = 0.005
     draws: int = 0
@@ -60,7 +66,8 @@ class Mount:
 
     Attributes
     ----------
-    ids : (m,) int          grids
+    ids : (m,) int          grids, or numbers of centres as in :class:`Places`
+    place : (m,) int        position among the places
     points, directions : (m, 3)
     labels : tuple of str   412:+Z along an axis, else 412:n
     normal : (m,) bool      glued flat; False: on a block, along the sheet
@@ -68,6 +75,7 @@ class Mount:
     """
 
     ids: np.ndarray
+    place: np.ndarray
     points: np.ndarray
     directions: np.ndarray
     labels: tuple[str, ...]
@@ -92,7 +100,10 @@ class Plan:
     visible_before, visible : (r,)  before and after the moves
     log_det : {method: value}     of the layouts of several methods, before the moves
     sweep : ((modes, overlap), ...)  share of the layout kept when the sweep takes more modes
-    actuators : ActuatorRanking   over the normals, each alone
+    actuators : ActuatorRanking   over the normals, each alone; without a straight way to the
+                                  place, or where it rattles below the wished force: vetoed
+    rattle : Rattle               at the normals
+    openings : Openings           where sheets may meet
     together : (k,) int           the shakers that drive all modes most evenly together
     observable : (rank, states)
     quotient : float              of the observability gramian (thesis 4.1.1)
@@ -116,6 +127,8 @@ class Plan:
     log_det: dict[str, float]
     sweep: tuple[tuple[int, float], ...]
     actuators: pretest.ActuatorRanking
+    rattle: Rattle
+    openings: Openings
     together: np.ndarray
     observable: tuple[int, int]
     quotient: float
@@ -147,13 +160,21 @@ def plan(
     built = built or structure(assembly)
     modal, above, first = target_modes(built, wishes)
     mounts = mounts_at(places)
-    phi = shapes(built, above, mounts)
-    largest = np.linalg.norm(motion(built, modal), axis=1).max(axis=0)
+    moving = motion(built, above)
+    phi = seen_at(places, mounts, moving)
     progress("sensors", 0.6)
     r, normal = len(modal), mounts.normal
-    aimed = pretest.visibility(phi[normal, :r], largest) >= BLIND * wishes.floor
+    largest = np.linalg.norm(moving, axis=1).max(axis=0)
+    visible = pretest.visibility(phi[normal], largest) >= BLIND * wishes.floor
+    aimed, largest = visible[:r], largest[:r]
     flat = phi[normal, :r][:, aimed]
-    draws = _draws(assembly, wishes, mounts, r, progress)[:, :, aimed] if wishes.draws else flat
+    draws = flat
+    if wishes.draws:
+        stage = within(progress, 0.6, 0.75)
+        models = ensemble(built, float(modal.frequency[-1]), wishes.spread, stage)
+        basis = seen_at(places, mounts, recovered(built, models.basis))[normal]
+        _, draws = drawn(models, basis, r, wishes.draws, wishes.spread, wishes.seed)
+        draws = draws[:, :, aimed]
     ranked, log_det = _layout(draws, mounts, wishes)
     layout, moves = pretest.with_visible_modes(
         phi[:, :r], ranked, largest, floor=wishes.floor, rules=_near(mounts, wishes)
@@ -162,7 +183,14 @@ def plan(
     f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
     shaker = pretest.shaking(f[aimed], zeta[aimed], seen[:, aimed], flat)
     observed = pretest.observability_gramian(f, zeta, seen)
-    hangers, quiet = hang_points(built, modal, places)
+    gaps = openings(assembly, moving[:, :, :r])
+    rattle = first_rattle(f, zeta, phi[normal, :r], gaps)
+    ranking = pretest.ranked_actuators(
+        shaker, f[aimed], flat, margin=rattle.force / wishes.force, access=places.straight
+    )
+    enough = ranking.allowed.sum() >= wishes.actuators
+    hangers, quiet = hang_points(moving[:, :, :r], places)
+    three = places.moving(moving, mounts.place[layout])[..., :r]
     return Plan(
         wishes,
         places,
@@ -176,21 +204,18 @@ def plan(
         pretest.visibility(phi[ranked, :r], largest),
         pretest.visibility(seen, largest),
         log_det,
-        mode_sweep(_visible(phi[normal], aimed), wishes.sensors, int(aimed.sum())),
-        pretest.ranked_actuators(shaker, f[aimed], flat),
-        pretest.best_actuators(shaker, wishes.actuators),
+        mode_sweep(phi[normal][:, visible], wishes.sensors, int(aimed.sum())),
+        ranking,
+        rattle,
+        gaps,
+        pretest.best_actuators(shaker, wishes.actuators, ranking.allowed if enough else None),
         (pretest.modal_rank(f, seen), 2 * r),
         pretest.gramian_quotient(observed, f),
         pretest.auto_mac(seen),
-        _loaded(built, modal, mounts.ids[layout], wishes.mass),
+        pretest.loaded_frequency(f, three, wishes.mass),
         hangers,
         quiet,
     )
-
-
-def _visible(phi: np.ndarray, aimed: np.ndarray) -> np.ndarray:
-    """Shapes at the normals of the modes aimed at and of all above the targets."""
-    return phi[:, np.r_[aimed, np.ones(phi.shape[1] - len(aimed), bool)]]
 
 
 def target_modes(built: Structure, wishes: Wishes) -> tuple[ModalModel, ModalModel, int]:
@@ -211,37 +236,40 @@ def target_modes(built: Structure, wishes: Wishes) -> tuple[ModalModel, ModalMod
 
 def motion(built: Structure, modal: ModalModel) -> np.ndarray:
     """Translation of every point (n_points, 3, r)."""
-    u = built.T @ modal.shapes
+    return recovered(built, modal.shapes)
+
+
+def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
+    """Translation of every point (n_points, 3, k) in vectors over the free dofs (n_free, k)."""
+    u = built.T @ vectors
     return np.asarray(u.reshape(len(built.assembly.points), 6, -1)[:, :3])
 
 
-def shapes(built: Structure, modal: ModalModel, mounts: Mount) -> np.ndarray:
-    """Shapes at the mounts along their directions (m, r)."""
-    return np.asarray(built.along(mounts.ids, mounts.directions) @ modal.shapes)
+def seen_at(places: Places, mounts: Mount, moving: np.ndarray) -> np.ndarray:
+    """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
+    at = places.moving(moving, mounts.place)
+    return np.asarray(np.einsum("mir,mi->mr", at, mounts.directions))
 
 
 def mounts_at(places: Places) -> Mount:
     """Normals of all places, then the two axes of the basic frame most along each sheet."""
-    ids, points = [places.ids], [places.points]
-    directions, names = [places.normals], [_labels(places.ids, places.normals)]
-    side = [places.side]
+    place, directions = [np.arange(len(places))], [places.normals]
     across = np.argsort(np.abs(places.normals), axis=1)[:, :2]
     for k in range(2):
         axes = np.eye(3)[across[:, k]]
         good = np.abs(np.einsum("ij,ij->i", axes, places.normals)) < TANGENT
-        ids.append(places.ids[good])
-        points.append(places.points[good])
+        place.append(np.flatnonzero(good))
         directions.append(axes[good])
-        names.append(_labels(places.ids[good], axes[good]))
-        side.append(places.side[good])
-    count = sum(map(len, ids))
+    at, along = np.concatenate(place), np.concatenate(directions)
+    ids = places.ids[at]
     return Mount(
-        np.concatenate(ids),
-        np.concatenate(points),
-        np.concatenate(directions),
-        tuple(name for group in names for name in group),
-        np.arange(count) < len(places),
-        np.concatenate(side),
+        ids,
+        at,
+        places.points[at],
+        along,
+        tuple(_labels(ids, along)),
+        np.arange(len(at)) < len(places),
+        places.side[at],
     )
 
 
@@ -268,12 +296,16 @@ def _layout(phi: np.ndarray, mounts: Mount, wishes: Wishes) -> tuple[np.ndarray,
     rules = rules if wishes.spacing > 0 else pretest.Rules()
     efi = pretest.deletion(c, wishes.sensors, rules=rules).ranked
     greedy = pretest.greedy(c, wishes.sensors, rules=rules)
-    kept = pretest.exchange(c, efi, rules=rules)
-    best = pretest.deletion(c, wishes.sensors, rules=_only(kept, len(c))).ranked
+    best = kept = pretest.exchange(c, efi, rules=rules)
     layouts = {"greedy": greedy, "effective independence": efi, "with exchange": kept}
+    if wishes.alike < 1:
+        layouts["with modes told apart"] = best = pretest.distinct(
+            c, kept, ceiling=wishes.alike, rules=rules
+        )
     if wishes.spacing == 0 and c.rows.shape[0] == 1:
         layouts = {"pivoted QR": pretest.qr_ranking(c.rows[0])[: wishes.sensors], **layouts}
-    return best, {name: pretest.value("D", c.fisher(k)) for name, k in layouts.items()}
+    ranked = pretest.deletion(c, wishes.sensors, rules=_only(best, len(c))).ranked
+    return ranked, {name: pretest.value("D", c.fisher(k)) for name, k in layouts.items()}
 
 
 def _only(kept: np.ndarray, n: int) -> pretest.Rules:
@@ -281,22 +313,6 @@ def _only(kept: np.ndarray, n: int) -> pretest.Rules:
     forbidden = np.ones(n, bool)
     forbidden[kept] = False
     return pretest.Rules(forbidden=forbidden)
-
-
-def _draws(
-    assembly: Assembly, wishes: Wishes, mounts: Mount, r: int, progress: Progress
-) -> np.ndarray:
-    """Target shapes of models with drawn thickness, at the normals (draws, m, r)."""
-    rng, out = np.random.default_rng(wishes.seed), []
-    for k in range(wishes.draws):
-        progress(f"model {k + 1} of {wishes.draws} drawn", 0.6 + 0.15 * k / wishes.draws)
-        scale = np.exp(wishes.spread * rng.standard_normal(len(assembly.parts)).clip(-2, 2))
-        shells = assembly.shells
-        t = shells.thickness * scale[shells.part][:, None]
-        drawn = structure(replace(assembly, shells=replace(shells, thickness=t)))
-        modal, _, _ = target_modes(drawn, replace(wishes, modes=r, top=None))
-        out.append(shapes(drawn, modal, mounts)[mounts.normal])
-    return np.stack(out)
 
 
 def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:
@@ -313,27 +329,21 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
     return tuple((b, pretest.overlap(layouts[b], layouts[a])) for a, b in pairs)
 
 
-def _loaded(built: Structure, modal: ModalModel, ids: np.ndarray, mass: float) -> np.ndarray:
-    """Frequencies with the sensors on [Hz]."""
-    three = np.stack(
-        [built.along(ids, np.tile(axis, (len(ids), 1))) @ modal.shapes for axis in np.eye(3)], 1
-    )
-    return pretest.loaded_frequency(modal.frequency, three, mass)
-
-
 def hang_points(
-    built: Structure, modal: ModalModel, places: Places, count: int = 4, first: int = 5
+    moving: np.ndarray, places: Places, count: int = 4, first: int = 5
 ) -> tuple[np.ndarray, np.ndarray]:
     """Grids that move least in the first modes, well apart: near nodes, where cords add least.
 
-    Returns the grids and their rms motion, each mode over its largest anywhere.
+    Returns the grids and their rms motion, each mode over its largest anywhere; ``moving`` is the
+    motion of all points (n_points, 3, r).
     """
-    size = np.linalg.norm(motion(built, modal.sel(slice(0, first))), axis=1)
-    quiet = np.sqrt(((size[places.rows] / size.max(axis=0)) ** 2).mean(axis=1))
+    size = np.linalg.norm(moving[:, :, :first], axis=1)
+    quiet = np.sqrt(((places.moving(size) / size.max(axis=0)) ** 2).mean(axis=1))
+    quiet[~places.is_grid] = np.inf  # a case names hangers by grid
     reach = 0.3 * float(np.linalg.norm(np.ptp(places.points, axis=0)))
     chosen: list[int] = []
     for k in np.argsort(quiet, kind="stable"):
         away = np.linalg.norm(places.points[chosen] - places.points[k], axis=1)
-        if len(chosen) < count and np.all(away >= reach):
+        if len(chosen) < count and np.all(away >= reach) and np.isfinite(quiet[k]):
             chosen.append(int(k))
     return places.ids[chosen], quiet[chosen]

@@ -21,6 +21,7 @@ def summary(found: Plan) -> dict[str, Any]:
         "actuators": [_actuator(found, int(i)) for i in found.actuators.order[:SHOWN]],
         "actuators_together": [_mount(found, int(i)) for i in found.together],
         "hangers": found.hangers,
+        "rattle": _rattle(found),
         "modes": _modes(found),
         "moves": [
             {
@@ -44,7 +45,7 @@ def _mount(found: Plan, i: int) -> dict[str, Any]:
     m = found.mounts
     return {
         "label": m.labels[i],
-        "grid": int(m.ids[i]),
+        "grid": int(m.ids[i]) if found.places.is_grid[m.place[i]] else None,
         "direction": m.directions[i],
         "point_m": m.points[i],
         "mounted": "flat" if m.normal[i] else "on a block",
@@ -61,11 +62,31 @@ def _sensors(found: Plan) -> list[dict[str, Any]]:
 
 
 def _actuator(found: Plan, i: int) -> dict[str, Any]:
+    place = int(found.rattle.place[i])
     return {
         **_mount(found, i),
         "condition": found.actuators.condition[i],
         "least_over_mean_residue": found.actuators.residue[i],
+        "straight_way_to_it": bool(found.places.straight[found.mounts.place[i]]),
+        "rattles_from_n": None if place < 0 else found.rattle.force[i],
+        "rattles_between": None if place < 0 else found.openings.pairs[found.openings.pair[place]],
+        "rattles_in_mode": None if place < 0 else found.first + 1 + int(found.rattle.mode[i]),
+        "vetoed": not bool(found.actuators.allowed[i]),
         "is_sensor": bool(i in found.layout),
+    }
+
+
+def _rattle(found: Plan) -> dict[str, Any]:
+    """What the mesh says of clearances, whichever place is shaken."""
+    return {
+        "force_n": found.wishes.force,
+        "places_vetoed": int((found.rattle.force < found.wishes.force).sum()),
+        "without_a_straight_way": int((~found.places.straight).sum()),
+        "open_places": len(found.openings.clearance),
+        "least_clearance_m": float(found.openings.clearance.min(initial=np.inf))
+        if len(found.openings.clearance)
+        else None,
+        "touching_pairs": [list(pair) for pair in found.openings.touching],
     }
 
 
@@ -117,13 +138,17 @@ def durations(found: Plan) -> dict[str, Any]:
 
 
 def sensors_csv(found: Plan) -> str:
-    """The table a case reads: sensors in order of rank, then the shakers."""
+    """The table a case reads: sensors in order of rank, then the shakers.
+
+    A place that is no grid is given by x, y, z [m]; its label is a number no grid has.
+    """
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
-    write(["label", "grid", "nx", "ny", "nz", "role", "mass"])
+    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
     rows = [(int(i), "output", found.wishes.mass) for i in found.layout]
     for i, role, mass in [*rows, *((int(i), "input", 0.0) for i in found.together)]:
         m = _mount(found, i)
+        place = [""] * 3 if m["grid"] is not None else [f"{x:.7g}" for x in m["point_m"]]
         direction = [f"{x:.9g}" for x in m["direction"]]
-        write([m["label"], m["grid"], *direction, role, f"{mass:g}"])
+        write([m["label"], m["grid"], *place, *direction, role, f"{mass:g}"])
     return text.getvalue()

@@ -1,0 +1,102 @@
+"""Which shaker places rattle: the force at which two sheets first meet, from the mesh's gaps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..meshing.clearance import Gaps, all_gaps
+from ..model.assembly import Assembly
+
+WITHIN = 0.010  # sheets farther apart than this do not meet [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Openings:
+    """Places where two sheets stand apart and may meet, all pairs of parts together.
+
+    Attributes
+    ----------
+    pairs : ((str, str), ...)       parts
+    pair : (g,) int                 position of the pair of each place
+    points : (g, 3)                 [m]
+    clearance : (g,)                [m]
+    motion : (g, r)                 opening in each mode [1/√kg]
+    touching : ((str, str), ...)    pairs that touch somewhere away from joints as the mesh has it:
+                                    they rub or rattle at any force, or are nearer than the mesh
+                                    can tell
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    pair: np.ndarray
+    points: np.ndarray
+    clearance: np.ndarray
+    motion: np.ndarray
+    touching: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rattle:
+    """What meets first where each candidate is shaken, at its resonance of least force.
+
+    Attributes
+    ----------
+    force : (n,)      amplitude at which the first place closes [N]; inf where none can
+    place : (n,) int  of the openings; -1 where none can
+    mode : (n,) int   -1 where none can
+    """
+
+    force: np.ndarray
+    place: np.ndarray
+    mode: np.ndarray
+
+
+def openings(assembly: Assembly, motion: np.ndarray) -> Openings:
+    """Gaps away from joints whose clearance is more than the mesh's facets leave in doubt.
+
+    Parameters
+    ----------
+    motion : (n_points, 3, r)   shapes at all points, mass-normalised [1/√kg]
+    """
+    found = all_gaps(assembly, within=WITHIN)
+    open_ = [g.free & ~g.touching for g in found]
+    r = motion.shape[2]
+    return Openings(
+        tuple(g.parts for g in found),
+        np.concatenate([np.zeros(0, int), *(np.full(m.sum(), k) for k, m in enumerate(open_))]),
+        _joined([assembly.points[g.rows[m]] for g, m in _zip(found, open_)], 3),
+        np.concatenate([np.zeros(0), *(g.clearance[m] for g, m in _zip(found, open_))]),
+        _joined([g.relative_motion(motion)[m] for g, m in _zip(found, open_)], r),
+        tuple(g.parts for g in found if (g.free & g.touching).any()),
+    )
+
+
+def _zip(found: tuple[Gaps, ...], masks: list[np.ndarray]) -> list[tuple[Gaps, np.ndarray]]:
+    return list(zip(found, masks, strict=True))
+
+
+def _joined(blocks: list[np.ndarray], columns: int) -> np.ndarray:
+    return np.concatenate([np.zeros((0, columns)), *blocks])
+
+
+def first_rattle(
+    frequency: np.ndarray, damping: np.ndarray, phi: np.ndarray, gaps: Openings
+) -> Rattle:
+    """F = min c 2ζω² / |φ_ir ψ_gr| over gaps g and modes r, for each candidate i.
+
+    Its value is :func:`chladni.ema.pretest.rattle_margin` at one newton; here with the culprit.
+
+    Parameters
+    ----------
+    phi : (n, r)   shapes at the candidates [1/√kg]
+    """
+    n, (g, r) = len(phi), gaps.motion.shape
+    force, culprit = np.full(n, np.inf), np.full(n, -1)
+    peak = 1 / (2 * np.asarray(damping) * (2 * np.pi * np.asarray(frequency)) ** 2)
+    per_newton = np.abs(gaps.motion) * peak / gaps.clearance[:, None]  # (g, r)
+    worst = per_newton.argmax(axis=0) if g else np.zeros(r, int)
+    closing = np.abs(phi) * (per_newton[worst, np.arange(r)] if g else np.zeros(r))
+    mode = closing.argmax(axis=1)
+    most = closing[np.arange(n), mode]
+    hit = most > 0
+    force[hit], culprit[hit] = 1 / most[hit], worst[mode[hit]]
+    return Rattle(force, culprit, np.where(hit, mode, -1))
