@@ -89,12 +89,15 @@ class Pattern:
     def add(self, data: np.ndarray, matrices: np.ndarray, rows: Rows = slice(None)) -> None:
         """Add element matrices (r, 6k, 6k) of these rows of elements to the csr's values."""
         nodes, slot = self.pairs.nodes[rows], self.pairs.slot[rows]
-        start, width = self.start[nodes][:, :, None], self.pairs.width[nodes][:, :, None]
-        A = matrices.reshape(len(nodes), nodes.shape[1], 6, nodes.shape[1], 6)
-        for r in range(6):
-            at = start + width * self.above[r] + slot * self.along[r]
-            at = at[..., None] + np.arange(self.along[r])
-            np.add.at(data, at.ravel(), A[:, :, r][..., self.mask[r]].ravel())
+        m, k = nodes.shape
+        r, c = np.nonzero(self.mask)
+        rank = np.cumsum(self.mask, axis=1)[r, c] - 1
+        first = self.start[nodes][..., None] + self.pairs.width[nodes][..., None] * self.above[r]
+        at = slot[..., None] * self.along[r]
+        at += (first + rank)[:, :, None]
+        A = matrices.reshape(m, k, 6, k, 6).swapaxes(2, 3)
+        values = np.ascontiguousarray(A) if self.mask.all() else A[..., r, c]
+        np.add.at(data, at.ravel(), values.ravel())
 
 
 def pattern(shared: Pairs, mask: np.ndarray) -> Pattern:

@@ -25,7 +25,7 @@ from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
 VARYING_SPIN = 0.1  # squared: share of the drilling stiffness for what varies of ω - rz
-CHUNK = 512  # elements a pass: what fits the cache
+CHUNK = 256  # elements a pass: what fits the cache
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
 MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
 Rows = np.ndarray | slice
