@@ -6,6 +6,8 @@ import scipy.sparse as sp
 from .frf import Residual
 from .modes import ModalModel
 
+_ENTRIES = 2_000_000  # of the matrices that are held at a time
+
 
 def coupled_receptance(
     modal: ModalModel,
@@ -33,12 +35,33 @@ def coupled_receptance(
     -------
     (n_f, n_out, n_in) complex [m/N]
     """
-    omega = 2 * np.pi * np.asarray(frequency, dtype=float)[:, None, None]
-    w_r, eye = 2 * np.pi * modal.frequency, np.eye(len(modal))
-    modal_loss = np.diag(2j * modal.damping * (w_r**2 if structural else w_r))
-    Z = np.diag(w_r**2) - omega**2 * eye + (1 if structural else omega) * modal_loss
-    for factor, A in ((1j * omega, V), (1j, loss)):
-        if A is not None and A.nnz:
-            Z = Z + factor * (modal.shapes.T @ (A @ modal.shapes))
-    H = phi_out @ np.linalg.solve(Z, np.broadcast_to(phi_in.T, (len(omega), *phi_in.T.shape)))
-    return H if residual is None else H + residual.at(1j * omega[:, 0, 0])
+    omega = 2 * np.pi * np.asarray(frequency, dtype=float)
+    w_r = 2 * np.pi * modal.frequency
+    c = 2j * modal.damping * (w_r**2 if structural else w_r)
+    d = w_r**2 - omega[:, None] ** 2 + (1 if structural else omega[:, None]) * c
+    tied = {
+        power: modal.shapes.T @ (A @ modal.shapes)
+        for power, A in enumerate((loss, V))
+        if A is not None and A.nnz
+    }
+    H = _solved(d, tied, omega, phi_out, phi_in.T)
+    return H if residual is None else H + residual.at(1j * omega)
+
+
+def _solved(
+    d: np.ndarray,
+    tied: dict[int, np.ndarray],
+    omega: np.ndarray,
+    left: np.ndarray,
+    right: np.ndarray,
+) -> np.ndarray:
+    """L [diag(d) + i Σ ω^p A_p]⁻¹ R line by line; ``tied`` is {p: A_p}."""
+    if not tied:
+        return np.asarray((left / d[:, None, :]) @ right)
+    r, out = d.shape[1], []
+    step = max(1, _ENTRIES // max(r * r, 1))
+    for k in range(0, len(omega), step):
+        w = omega[k : k + step, None, None]
+        Z = d[k : k + step, :, None] * np.eye(r) + sum(1j * w**p * A for p, A in tied.items())
+        out.append(left @ np.linalg.solve(Z, np.broadcast_to(right, (len(w), *right.shape))))
+    return np.concatenate(out)

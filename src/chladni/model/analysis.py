@@ -4,10 +4,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .follow import Following
+
 
 @dataclass(frozen=True)
 class Subcase:
-    """One subcase: the sets it selects, 0 where it selects none."""
+    """One subcase: the sets it selects, 0 where it selects none.
+
+    ``outputs`` are the points whose motion it asks for, as runs of ids from first to last;
+    ``residual`` says whether residual vectors go beside the modes.
+    """
 
     id: int
     spc: int = 0
@@ -18,6 +24,8 @@ class Subcase:
     dload: int = 0
     damping: int = 0
     suport: int = 0
+    outputs: tuple[tuple[int, int], ...] = field(default=(), kw_only=True)
+    residual: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +128,7 @@ class Analysis:
     loads : dict of Load        static loads, combinations (LOAD) resolved
     prescribed : dict of Motion SPCD, and SPC with a displacement
     frequency : dict            frequencies of response [Hz], increasing
+    following : dict            those that follow the modes, by the same ids
     damping : dict              (f (k,) [Hz], ζ (k,)) modal damping tables
     eigen : dict                (lowest [Hz], highest [Hz], count) of eigenvalue requests, NaN or
         0 where open
@@ -132,6 +141,7 @@ class Analysis:
     loads: dict[int, Load] = field(default_factory=dict)
     prescribed: dict[int, Motion] = field(default_factory=dict)
     frequency: dict[int, np.ndarray] = field(default_factory=dict)
+    following: dict[int, tuple[Following, ...]] = field(default_factory=dict)
     damping: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     eigen: dict[int, tuple[float, float, int]] = field(default_factory=dict)
     dynamic: dict[int, tuple[Excitation, ...]] = field(default_factory=dict)

@@ -185,6 +185,39 @@ def test_static_loads_excite(bulk):
     np.testing.assert_allclose(base.amplitude, 2e-3 / 1e-6)
 
 
+def test_frequencies_that_follow_modes(bulk):
+    text = PLATE + "FREQ3,1,2.,50.,,5\nFREQ4,1,1.,90.,.2,3\nFREQ5,2,,100.,.5,2.\nFREQ,1,7.\n"
+    modes = np.array([10.0, 60.0])
+    for unit, factor in ((None, 1.0), (UNITS["mm-kg-ms"], 1e3)):
+        asked = analysis(bulk(text), unit)
+        first = np.unique(np.concatenate([rule(modes * factor) for rule in asked.following[1]]))
+        (second,) = (rule(modes * factor) for rule in asked.following[2])
+        ranges = [2, 4, 6, 8, 10, 20, 30, 40, 50]
+        around = [8, 10, 12, 48, 60, 72]
+        np.testing.assert_allclose(first, np.unique([*ranges, *around]) * factor)
+        np.testing.assert_allclose(second, np.array([5, 20, 30]) * factor)
+        assert asked.frequency[1].tolist() == [7 * factor]
+    with pytest.raises(FileError, match="FREQ3 1: TYPE 'CUBIC'"):
+        analysis(bulk(PLATE + "FREQ3,1,2.,50.,CUBIC\n"))
+    with pytest.raises(FileError, match="FSPD 2"):
+        analysis(bulk(PLATE + "FREQ4,1,2.,50.,2.\n"))
+
+
+def test_what_the_case_control_wants_to_see(bulk):
+    before = (
+        "SOL 111\nCEND\nSET 9 = 1, 10 THRU 20 EXCEPT 15,\n  16, 40\nRESVEC(NOINRL) = YES\n"
+        "DISP(PHASE, PLOT) = 9\nSUBCASE 1\nFREQ=5\nSUBCASE 2\nACCE=ALL\nRESVEC=NO\n"
+    )
+    one, two = analysis(bulk(PLATE, before)).subcases
+    assert one.outputs == ((1, 1), (10, 14), (17, 20), (40, 40))
+    assert two.outputs[0][0] == 1
+    assert two.outputs[0][1] > 10**12
+    assert (one.residual, two.residual) == (True, False)
+    assert (
+        analysis(bulk(PLATE + "PARAM,RESVEC,YES\n", "SOL 111\nCEND\nFREQ=1\n")).subcases[0].residual
+    )
+
+
 def test_damping_and_frequencies(bulk):
     text = PLATE + (
         "TABDMP1,1\n,0.,.02,100.,.04,ENDT\nTABDMP1,2,CRIT\n,0.,.01,100.,.02,ENDT\n"

@@ -4,15 +4,14 @@ from collections.abc import Iterator
 
 from ...model.analysis import Analysis, Subcase
 from ...units import Units
-from . import excitation
-from .context import context
+from . import excitation, frequencies
+from .context import context, parameter
 from .deck import Deck
 from .loads import loads, motions
 
 _LEFT_OUT = {
     "PLOAD1": "distributed loads on beams", "RFORCE": "centrifugal loads", "TEMP": "temperatures",
-    "TEMPD": "temperatures", "FREQ3": "frequencies that follow the modes",
-    "FREQ4": "frequencies that follow the modes", "FREQ5": "frequencies that follow the modes",
+    "TEMPD": "temperatures",
     "TLOAD1": "loads in time", "TLOAD2": "loads in time", "ACCEL": "acceleration fields",
     "ACCEL1": "acceleration fields", "FORCE2": "forces along a cross product",
     "OMIT": "static reduction", "OMIT1": "static reduction", "ASET": "static reduction",
@@ -29,7 +28,8 @@ def analysis(deck: Deck, units: Units | None = None) -> Analysis:
         subcases=tuple(_subcases(deck)),
         loads=static,
         prescribed=moved,
-        frequency=excitation.frequencies(ctx),
+        frequency=frequencies.listed(ctx),
+        following=frequencies.following(ctx),
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
@@ -39,8 +39,11 @@ def analysis(deck: Deck, units: Units | None = None) -> Analysis:
 
 def _subcases(deck: Deck) -> Iterator[Subcase]:
     names = ("SPC", "MPC", "LOAD", "METHOD", "FREQ", "DLOAD", "SDAMP", "SUPORT")
+    always = parameter(deck, "RESVEC") == "YES"
     for case in deck.case.subcases:
-        yield Subcase(case.id, *(case.get(name) for name in names))
+        chosen = (case.get(name) for name in names)
+        wanted = case.residual or always
+        yield Subcase(case.id, *chosen, outputs=case.outputs, residual=wanted)
 
 
 def _notes(deck: Deck) -> Iterator[str]:

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from .case_sets import EVERY, continued, members
+
 _SOLUTIONS: Final = {
     "SESTATIC": 101, "SESTATICS": 101, "STATIC": 101, "STATICS": 101,
     "SEMODES": 103, "MODES": 103, "SEDFREQ": 108, "SEMFREQ": 111, "SEBUCKL": 105,
@@ -20,6 +22,8 @@ _SELECTS: Final = {
 }  # fmt: skip
 _COMMAND = re.compile(r"^\s*([A-Z]\w*)\s*(?:\([^)]*\))?\s*=\s*([\w.]+)")
 _SUBCASE = re.compile(r"^\s*(SUBCASE|SUBCOM|SYM|REPCASE)\s*=?\s*(\d+)", re.I)
+_SET = re.compile(r"^\s*SET\s+(\d+)\s*=\s*(.*)", re.I)
+_OUTPUTS: Final = ("DISP", "VELO", "ACCE", "VECT")  # how the requests for motion begin
 _PARAM = re.compile(r"^\s*PARAM\s*,\s*(\w+)\s*,\s*([^,\s]+)", re.I)
 _SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
 
@@ -31,6 +35,8 @@ class Subcase:
     id: int
     selects: dict[str, int]
     matrices: dict[str, str] = field(default_factory=dict)  # direct matrices: K2GG, M2PP...
+    outputs: tuple[tuple[int, int], ...] = ()  # points whose motion is asked for, first to last
+    residual: bool = False  # RESVEC: residual vectors beside the modes
 
     def get(self, what: str) -> int:
         """Set id selected, 0 where none is."""
@@ -50,9 +56,11 @@ class CaseControl:
 def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
     """Parse the lines before BEGIN BULK; ``sections``: there is a case control at all."""
     sol, common, cases, current, parameters = 0, _Case(0), [], None, {}
-    for line in lines:
-        text = line.split("$")[0]
-        if found := _SOL.match(text):
+    sets: dict[int, tuple[tuple[int, int], ...]] = {}
+    for text in continued(line.split("$")[0] for line in lines):
+        if found := _SET.match(text):
+            sets[int(found[1])] = members(found[2])
+        elif found := _SOL.match(text):
             sol = _solution(found[1])
         elif found := _SUBCASE.match(text):
             current = _Case(int(found[2]))
@@ -60,7 +68,7 @@ def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
         elif found := _PARAM.match(text):
             parameters[found[1].upper()] = found[2].upper()
         elif found := _COMMAND.match(text.upper()):
-            (current or common).add(found[1], found[2])
+            (current or common).add(found[1], found[2], sets)
     made = [case.over(common) for case in cases] or [common.over(_Case(0))]
     return CaseControl(sol, tuple(made) if sections else (), sections, parameters)
 
@@ -72,19 +80,32 @@ class _Case:
         self.id = id
         self.selects: dict[str, int] = {}
         self.matrices: dict[str, str] = {}
+        self.outputs: list[tuple[int, int]] | None = None
+        self.residual: bool | None = None
 
-    def add(self, command: str, value: str) -> None:
-        """Keep a selection; anything else is output requests."""
+    def add(self, command: str, value: str, sets: dict[int, tuple[tuple[int, int], ...]]) -> None:
+        """Keep a selection, a request for motion; anything else is other output."""
         name = _SELECTS.get(command)
-        if name and value.isdecimal():
+        if command == "RESVEC":
+            self.residual = value not in ("NO", "NOSYSTEM")
+        elif command[:4] in _OUTPUTS:
+            asked = (EVERY,) if value == "ALL" else sets.get(int(value) if value.isdecimal() else 0)
+            self.outputs = [*(self.outputs or ()), *(asked or ())]
+        elif name and value.isdecimal():
             self.selects[name] = int(value)
         elif name and "2" in name:
             self.matrices[name] = value
 
     def over(self, common: "_Case") -> Subcase:
         """The subcase with what stands above all subcases."""
+        own = (self.outputs, common.outputs)
+        residual = (self.residual, common.residual)
         return Subcase(
-            self.id, {**common.selects, **self.selects}, {**common.matrices, **self.matrices}
+            self.id,
+            {**common.selects, **self.selects},
+            {**common.matrices, **self.matrices},
+            tuple(next((o for o in own if o is not None), [])),
+            next((r for r in residual if r is not None), False),
         )
 
 

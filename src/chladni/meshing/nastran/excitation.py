@@ -1,11 +1,10 @@
-"""Dynamic loads, frequencies and damping: RLOAD, DLOAD, DAREA, LSEQ, TABLED, FREQ, TABDMP1."""
+"""Dynamic loads, frequencies and damping: RLOAD, DLOAD, DAREA, LSEQ, TABLED, TABDMP1."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from ...errors import FileError
 from ...model.analysis import Excitation, Load, Motion, Table
 from .context import Context, digits
 from .loads import terms
@@ -213,49 +212,6 @@ def damping(ctx: Context) -> dict[int, tuple[np.ndarray, np.ndarray]]:
                 )
             zeta = {"G": g / 2, "CRIT": g, "Q": 1 / (2 * np.where(g > 0, g, 1.0))}[kind]
             out[tid] = (f / ctx.scale.time, zeta)
-    return out
-
-
-def _freq(card: Cards) -> np.ndarray:
-    """FREQ: a list."""
-    return np.array([card.real(0, k) for k in range(2, len(card.fields(0)) + 1) if card.word(0, k)])
-
-
-def _freq1(card: Cards) -> np.ndarray:
-    """FREQ1: f_1 + k Δf, k = 0 ... n."""
-    count = _count(card, card.integer(0, 4, 1))
-    return np.asarray(card.real(0, 2) + card.real(0, 3) * np.arange(count + 1))
-
-
-def _freq2(card: Cards) -> np.ndarray:
-    """FREQ2: n logarithmic steps."""
-    a, b = card.real(0, 2), card.real(0, 3)
-    if not 0 < a < b:
-        raise card.refuse(0, f"the frequencies {a:g} and {b:g} do not increase from above zero")
-    return np.geomspace(a, b, _count(card, card.integer(0, 4, 1)) + 1)
-
-
-def _count(card: Cards, n: int) -> int:
-    if not 0 < n <= 1_000_000:
-        raise card.refuse(0, f"{n} steps are not between 1 and a million")
-    return n
-
-
-_FREQUENCIES: dict[str, Callable[[Cards], np.ndarray]] = {
-    "FREQ": _freq, "FREQ1": _freq1, "FREQ2": _freq2,
-}  # fmt: skip
-
-
-def frequencies(ctx: Context) -> dict[int, np.ndarray]:
-    """FREQ, FREQ1, FREQ2 by set [Hz]; several cards of a set are taken together."""
-    found: dict[int, list[np.ndarray]] = {}
-    for name, read in _FREQUENCIES.items():
-        for cards in ctx.deck.present(name):
-            for i, sid in enumerate(cards.integers(1).tolist()):
-                found.setdefault(sid, []).append(read(cards.single(i)))
-    out = {sid: np.unique(np.concatenate(parts)) / ctx.scale.time for sid, parts in found.items()}
-    if any(np.any(f < 0) for f in out.values()):
-        raise FileError(f"{ctx.deck.path}: a frequency of response is negative")
     return out
 
 

@@ -1,0 +1,62 @@
+"""Frequencies of response that follow the modes (Nastran's FREQ3, FREQ4, FREQ5).
+
+MSC Nastran Quick Reference Guide, remarks to these entries.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+SAME = 1e-5  # of their range: nearer frequencies are one (PARAM,DFREQ)
+
+
+Following = Callable[[np.ndarray], np.ndarray]  # from modal frequencies to those of response [Hz]
+
+
+@dataclass(frozen=True)
+class Between:
+    """f = (a + b)/2 + (b - a)/2 |x|^(1/c) sgn x, x = -1 ... 1: ``count`` from mode to mode.
+
+    a, b are neighbours among low, the modes within, and high [Hz]; c > 1 gathers them at the ends.
+    """
+
+    low: float
+    high: float
+    count: int = 10
+    cluster: float = 1.0
+    logarithmic: bool = False
+
+    def __call__(self, modes: np.ndarray) -> np.ndarray:
+        """Frequencies of every range, its ends included."""
+        inside = modes[(modes > self.low) & (modes < self.high)]
+        ends = np.unique(np.concatenate([[self.low], inside, [self.high]]))
+        ends = np.log(ends) if self.logarithmic else ends
+        x = np.linspace(-1, 1, self.count)
+        way = np.sign(x) * np.abs(x) ** (1 / self.cluster)
+        a, b = ends[:-1, None], ends[1:, None]
+        f = np.append(((a + b) / 2 + (b - a) / 2 * way).ravel(), ends)
+        return np.asarray(np.exp(f) if self.logarithmic else f)
+
+
+@dataclass(frozen=True)
+class Times:
+    """f = m f_r within low ... high [Hz]: factors m of every modal frequency."""
+
+    low: float
+    high: float
+    factors: tuple[float, ...]
+
+    def __call__(self, modes: np.ndarray) -> np.ndarray:
+        """Products that lie in the band."""
+        f = np.outer(modes, self.factors).ravel()
+        return np.asarray(f[(f >= self.low) & (f <= self.high) & (f > 0)])
+
+
+def merged(lists: Sequence[np.ndarray]) -> np.ndarray:
+    """All frequencies once, increasing; those within SAME of the range of another are it."""
+    f = np.unique(np.concatenate([np.zeros(0), *lists]))
+    if not len(f):
+        return f
+    near = np.diff(f) < SAME * (f[-1] - f[0])
+    return np.asarray(f[np.append(True, ~near)])
