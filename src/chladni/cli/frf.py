@@ -16,16 +16,16 @@ from ..dynamics.frf import FRF, Quantity, residual_flexibility
 from ..dynamics.modes import ModalModel
 from ..ema.tables_write import write_npz
 from ..errors import FileError, LabelError
-from ..model.analysis import Analysis
+from ..model.analysis import Analysis, Subcase
 from ..report.blocks import Picture, Table
 from ..report.words import number
-from .model import Model, is_case, load_deck, load_model
-from .run import Out, Run, Units, started
+from .model import DeckModels, Model, is_case, load_deck, load_model
+from .run import Allow, Out, Run, Units, started
 
 UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
 _MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
 REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
-_SHOWN = 12
+_SHOWN, _MOST = 12, 1200  # pictures; dofs a deck may ask for at once
 
 
 def run(
@@ -43,6 +43,7 @@ def run(
         str, typer.Option(help="receptance, mobility or accelerance.")
     ] = "accelerance",
     units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
     """Frequency responses between degrees of freedom; without --input those the deck asks for."""
@@ -52,14 +53,16 @@ def run(
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
         if not input:
-            found = of_deck(job, source, units, output or [])
+            found = of_deck(job, source, units, allow or [], output or [])
         else:
-            model, frequency = load_model(source, units), np.linspace(low, high, lines)
-            found = response(job, model, _asked(output), input, frequency, damping)
-        if found.quantity != "transmissibility":
-            found = found.to(cast(Quantity, quantity))
-        write_npz(job.keep("frf.npz", "the responses as arrays"), found)
-        _page(job, found)
+            model, frequency = load_model(source, units, allow or ()), np.linspace(low, high, lines)
+            found = [response(job, model, _asked(output), input, frequency, damping)]
+        for k, one in enumerate(found):
+            if one.quantity != "transmissibility":
+                one = one.to(cast(Quantity, quantity))
+            name = f"frf_{k + 1}.npz" if k else "frf.npz"
+            write_npz(job.keep(name, "the responses as arrays"), one)
+            _page(job, one)
 
 
 def _asked(output: list[str] | None) -> list[str]:
@@ -150,36 +153,96 @@ def _from_base(
     )
 
 
-def of_deck(job: Run, source: Path, units: str | None, outputs: Sequence[str]) -> FRF:
+def of_deck(
+    job: Run, source: Path, units: str | None, allow: Sequence[str], outputs: Sequence[str]
+) -> list[FRF]:
     """Displacements under the deck's own dynamic loads, one column a subcase.
+
+    Subcases at other frequencies stand in an FRF of their own.
 
     Raises
     ------
     FileError
         If it is a case, or a deck that asks for no frequency response.
     """
-    from ..fem.respond import response as answer
-
     if is_case(source):
         raise FileError(f"{source}: a case needs --input and --output, as --input 12:+Z")
-    model, asked = load_deck(source, units)
+    models = load_deck(source, units, allow)
+    asked = models.analysis
     cases = [c for c in asked.subcases if c.dload and c.frequency]
     if not cases:
         raise FileError(f"{source} asks for no frequency response; give --input and --output")
-    labels = list(outputs) or _loaded(model, asked)
-    ends = [parse(text) for text in labels]
-    dofs = np.array([(point, c) for point, c, _ in ends])
-    columns = []
-    for k, case in enumerate(cases):
-        job.progress(f"subcase {case.id}", 0.2 + 0.6 * k / len(cases))
-        f, u = answer(model.structure, asked, case, dofs)
-        columns.append(u * [sign for *_, sign in ends])
+    labels = list(outputs) or wanted(models.model(cases[0].id), asked, cases, job)
     job.notes.extend(asked.notes)
     job.notes.append(
         "Each input is a subcase with all its loads, as the deck gives them: values are motion, "
         "not motion per unit force."
     )
-    return FRF(np.stack(columns, axis=2), f, tuple(labels), tuple(f"subcase {c.id}" for c in cases))
+    if asked.solution == 111 and not any(c.residual for c in cases):
+        job.notes.append(
+            "Modes beyond those of METHOD are missing, as in Nastran without RESVEC; RESVEC = YES "
+            "in the case control adds residual vectors."
+        )
+    return _gathered(labels, cases, _columns(job, models, cases, labels))
+
+
+def _columns(
+    job: Run, models: DeckModels, cases: Sequence[Subcase], labels: Sequence[str]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(frequencies, displacements) of every subcase, each under its own supports."""
+    from ..fem.respond import response as answer
+
+    ends = [parse(text) for text in labels]
+    dofs, signs = np.array([(point, c) for point, c, _ in ends]), [sign for *_, sign in ends]
+    built: dict[tuple[int, int], Model] = {}
+    out = []
+    for k, case in enumerate(cases):
+        job.progress(f"subcase {case.id}", 0.2 + 0.6 * k / len(cases))
+        held = (case.spc, case.mpc)
+        if held not in built:
+            built[held] = models.model(case.id)
+        f, u = answer(built[held].structure, models.analysis, case, dofs)
+        out.append((f, u * signs))
+    return out
+
+
+def _gathered(
+    labels: Sequence[str], cases: Sequence[Subcase], columns: list[tuple[np.ndarray, np.ndarray]]
+) -> list[FRF]:
+    """Subcases at the same frequencies side by side."""
+    groups: dict[bytes, list[int]] = {}
+    for k, (f, _) in enumerate(columns):
+        groups.setdefault(f.tobytes(), []).append(k)
+    return [
+        FRF(
+            np.stack([columns[k][1] for k in group], axis=2),
+            columns[group[0]][0],
+            tuple(labels),
+            tuple(f"subcase {cases[k].id}" for k in group),
+        )
+        for group in groups.values()
+    ]
+
+
+def wanted(model: Model, asked: Analysis, cases: Sequence[Subcase], job: Run) -> list[str]:
+    """Dofs whose motion the case control asks for; the loaded ones where it names none or all."""
+    ids = model.assembly.ids
+    runs = [run for case in cases for run in case.outputs]
+    named = np.zeros(len(ids), bool)
+    for first, last in runs:
+        named |= (ids >= first) & (ids <= last)
+    if not named.any() or 6 * named.sum() > _MOST:
+        if named.any():
+            job.notes.append(
+                f"The deck asks for the motion of {named.sum()} points; of so many only the "
+                "loaded ones were taken, others with --output."
+            )
+        return _loaded(model, asked)
+    scalar = model.assembly.scalar_points
+    alone = np.zeros(len(ids), bool) if scalar is None else np.asarray(scalar, bool)
+    return [
+        label(int(ids[k]), c) for k in np.flatnonzero(named) for c in range(1, 2 if alone[k] else 7)
+    ]
 
 
 def _loaded(model: Model, asked: Analysis) -> list[str]:
@@ -197,23 +260,31 @@ def _page(job: Run, found: FRF) -> None:
     from ..view import plots
 
     unit = (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
+    peak = np.abs(found.values).max(axis=0)
+    at = found.frequency[np.abs(found.values).argmax(axis=0)]
+    count = max(1, _SHOWN // len(found.inputs))
+    shown = sorted(np.argsort(-peak.max(axis=1), kind="stable")[:count].tolist())
     pictures = []
     for j, drive in enumerate(found.inputs):
-        for i, answer in enumerate(found.outputs[:_SHOWN]):
+        for i in (i for i in shown if peak[i, j] > 0):
+            answer = found.outputs[i]
             name = re.sub(r"[^A-Za-z0-9]+", "_", f"frf_{answer}_from_{drive}".replace("-", "m"))
             title, curve = f"{answer} from {drive}", (found.frequency, found.values[:, i, j])
             path = job.keep(f"{name}.png", title)
             plots.frf(path, {"model": curve}, title, unit)
             pictures.append(Picture(path))
-    peak = np.abs(found.values).max(axis=0)
-    at = found.frequency[np.abs(found.values).argmax(axis=0)]
     rows = [
-        (answer, drive, number(peak[i, j]), number(at[i, j]))
-        for i, answer in enumerate(found.outputs)
+        (found.outputs[i], drive, number(peak[i, j]), number(at[i, j]))
+        for i in shown
         for j, drive in enumerate(found.inputs)
     ]
+    if len(found.outputs) > len(shown):
+        job.notes.append(
+            f"The {len(shown)} outputs that move most are shown; all {len(found.outputs)} are in "
+            "the arrays."
+        )
     heads = ("output", "input", f"largest [{unit}]" if unit else "largest", "at [Hz]")
-    f = found.frequency
-    job.lead = f"{len(rows)} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
+    f, count = found.frequency, len(found.outputs) * len(found.inputs)
+    job.lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
     job.section("Responses", [*pictures, Table(heads, rows, ("output", "input"))])
     job.say(job.lead)

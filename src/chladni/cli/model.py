@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,8 +16,12 @@ from ..errors import FileError, LabelError
 from ..fem.assemble import Structure, structure
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
+from ..units import Units
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
+
+if TYPE_CHECKING:
+    from ..meshing.nastran import Deck
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +73,9 @@ class Model:
         return np.asarray(u.reshape(len(self.assembly.points), 6, -1)[:, :3])
 
 
-def load_model(source: Path, units: str | None = None) -> Model:
+def load_model(
+    source: Path, units: str | None = None, allow: Sequence[str] = (), subcase: int | None = None
+) -> Model:
     """The model of a bare deck, or of a case (folder or case.toml).
 
     Raises
@@ -82,20 +89,36 @@ def load_model(source: Path, units: str | None = None) -> Model:
         from ..case import load_case
 
         return Model(source, load_case(source).assembly)
-    return load_deck(source, units)[0]
+    return load_deck(source, units, allow).model(subcase)
 
 
-def load_deck(source: Path, units: str | None = None) -> tuple[Model, Analysis]:
-    """The model of a bare deck and what the deck asks of it."""
-    from ..meshing.nastran import assembly, read_deck
+@dataclass(frozen=True, eq=False)
+class DeckModels:
+    """A bare deck, what it asks for, and its model under each subcase."""
+
+    source: Path
+    deck: "Deck"
+    units: Units | None
+    analysis: Analysis
+
+    def model(self, subcase: int | None = None) -> Model:
+        """The model under the supports and equations of a subcase, or of the one for modes."""
+        from ..meshing.nastran import assembly
+
+        made = assembly(self.deck, self.units, subcase)
+        return Model(self.source, made, "" if self.units is None else "m")
+
+
+def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:
+    """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
+    from ..meshing.nastran import read_deck
     from ..meshing.nastran.analysis import analysis
 
     if not source.is_file():
         raise FileError(f"no file {source}{beside(source)}")
     system = None if units is None else unit_system(units)
-    deck = read_deck(source)
-    model = Model(source, assembly(deck, system), "" if system is None else "m")
-    return model, analysis(deck, system)
+    deck = read_deck(source, allow)
+    return DeckModels(source, deck, system, analysis(deck, system))
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:

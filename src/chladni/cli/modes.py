@@ -10,19 +10,23 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..report.blocks import Facts, Picture, Table
 from ..report.words import number
 from .model import Model, load_model
-from .run import Out, Run, Units, started
+from .run import Allow, Out, Run, Units, started
 
 
 def run(
     source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
     count: Annotated[int, typer.Option(help="How many modes.", min=1)] = 20,
     units: Units = None,
+    allow: Allow = None,
+    subcase: Annotated[
+        int | None, typer.Option(help="Whose supports hold; the first that seeks modes.", min=0)
+    ] = None,
     out: Out = None,
 ) -> None:
     """Normal modes: frequencies, shapes, mass, energy of each part, a VTU file and pictures."""
     with started("modes", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units)
+        model = load_model(source, units, allow or (), subcase)
         job.progress("matrices", 0.1)
         modal = _solved(job, model, count)
         job.progress("energies", 0.6)

@@ -23,6 +23,10 @@ Units = Annotated[
     str | None,
     typer.Option(help="Unit system of a bare deck: SI, mm-t-s, mm-kg-ms, mm-kg-s, in-lb-s."),
 ]
+Allow = Annotated[
+    list[str] | None,
+    typer.Option("--allow", help="Card of a deck to leave out although it carries stiffness."),
+]
 
 
 @dataclass

@@ -102,12 +102,12 @@ def _refuse_unknown(deck: Deck) -> None:
         if carries(name) and name not in deck.allowed:
             raise FileError(
                 f"{table.where(0)}: {name} (of which there are {len(table)}) carries stiffness, "
-                f"mass or a tie and is not understood; take it out or allow it: allow=({name!r},)"
+                f"mass or a tie and is not understood; take it out or allow it: --allow {name}"
             )
     chosen = {m for case in deck.case.subcases for m in case.matrices.items()}
     if chosen and "DMIG" not in deck.allowed:
         name, matrix = sorted(chosen)[0]
         raise FileError(
             f"{deck.path}: the case control selects {name} = {matrix}; direct input "
-            "matrices (DMIG) are not understood: allow=('DMIG',)"
+            "matrices (DMIG) are not understood; allow it: --allow DMIG"
         )

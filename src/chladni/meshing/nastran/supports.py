@@ -13,8 +13,8 @@ from .table import Cards
 def selected(deck: Deck, kind: str, subcase: int | None = None) -> tuple[int, ...]:
     """Sets of SPC or MPC cards that hold, additions (SPCADD, MPCADD) resolved.
 
-    The first subcase (or the one asked for) selects; where there is no case control, or it
-    selects none, the only set of the deck is taken.
+    The subcase asked for selects, else the first that looks for modes, else the first that selects
+    any; where there is no case control the only set of the deck is taken.
 
     Raises
     ------
@@ -44,6 +44,8 @@ def _chosen(deck: Deck, kind: str, subcase: int | None) -> int:
             known = ", ".join(str(c.id) for c in cases)
             raise FileError(f"{deck.path}: there is no subcase {subcase}; there are {known}")
         return found[0].get(kind)
+    if modal := [c for c in cases if c.get("METHOD")]:
+        return modal[0].get(kind)
     return next((c.get(kind) for c in cases if c.get(kind)), 0)
 
 

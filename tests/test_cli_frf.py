@@ -1,0 +1,110 @@
+"""``chladni frf`` and ``chladni modes`` on decks as they stand: subcases, requests, allowances."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from chladni.cli.app import application
+
+TWO = """SOL 108
+CEND
+FREQ = 6
+DLOAD = 5
+SET 3 = 1, 9
+DISP = 3
+SUBCASE 1
+SPC = 1
+SUBCASE 2
+SPC = 2
+SUBCASE 7
+SPC = 1
+FREQ = 8
+BEGIN BULK
+GRID,1,,0.,0.,0.,,23456
+GRID,2,,1.,0.,0.,,23456
+CELAS2,1,4000.,1,1,2,1
+CELAS2,2,1000.,2,1
+CONM2,3,1,,0.1
+CONM2,4,2,,0.5
+SPC1,1,1,2
+SPC1,2,6,2
+RLOAD1,5,7,,,8
+DAREA,7,1,1,3.0
+TABLED1,8
+,0.,1.,100.,1.,ENDT
+FREQ1,6,5.,5.,3
+FREQ,8,2.
+ENDDATA
+"""
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+def responses(folder, name="frf.npz"):
+    with np.load(folder / name, allow_pickle=False) as held:
+        return (
+            held["frequency_hz"],
+            held["outputs"].tolist(),
+            held["inputs"].tolist(),
+            held["values"],
+        )
+
+
+def stiffness(w, held):
+    """Z of the two masses, the second of them held or not."""
+    Z = np.array([[4000 - 0.1 * w**2, -4000], [-4000, 5000 - 0.5 * w**2]])
+    return Z[:1, :1] if held else Z
+
+
+def test_every_subcase_has_its_own_supports_and_frequencies(tmp_path):
+    """u_1 = (Z⁻¹ p)_1 with the dofs that this subcase leaves free."""
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(TWO)
+    done = call("frf", deck, "--quantity", "receptance", "--out", out)
+    assert done.exit_code == 0, done.output
+    f, outputs, inputs, H = responses(out)
+    assert inputs == ["subcase 1", "subcase 2"]
+    assert outputs == [f"1:+{c}" for c in ("X", "Y", "Z", "RX", "RY", "RZ")]
+    for k, line in enumerate(f):
+        for case, held in enumerate((True, False)):
+            Z = stiffness(2 * np.pi * line, held)
+            exact = np.linalg.solve(Z, [3.0, 0.0][: len(Z)])[0]
+            np.testing.assert_allclose(H[k, 0, case], exact, rtol=1e-9)
+    f, _, inputs, H = responses(out, "frf_2.npz")
+    assert (f.tolist(), inputs) == ([2.0], ["subcase 7"])
+    np.testing.assert_allclose(H[0, 0, 0], 3 / stiffness(4 * np.pi, True)[0, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("subcase", "count"), [(1, 1), (2, 2)])
+def test_modes_under_the_supports_of_a_subcase(tmp_path, subcase, count):
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(TWO)
+    done = call("modes", deck, "--subcase", subcase, "--out", out)
+    assert done.exit_code == 0, done.output
+    f = json.loads((out / "modes.json").read_text())["frequency_hz"]
+    assert len(f) == count
+    for line in f:
+        assert abs(np.linalg.det(stiffness(2 * np.pi * line, count == 1))) < 1e-3
+
+
+def test_supports_are_those_of_the_subcase_that_seeks_modes(tmp_path):
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    text = TWO.replace("SUBCASE 2\n", "SUBCASE 2\nMETHOD = 4\n")
+    deck.write_text(text.replace("ENDDATA", "EIGRL,4,,,2\nENDDATA"))
+    assert call("modes", deck, "--out", out).exit_code == 0
+    assert len(json.loads((out / "modes.json").read_text())["frequency_hz"]) == 2
+
+
+def test_a_card_is_left_out_on_request_only(tmp_path):
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(TWO.replace("CELAS2,1", "CWELD,77,1\nCELAS2,1"))
+    refused = call("modes", deck, "--out", out)
+    assert refused.exit_code == 2
+    assert "CWELD" in refused.output
+    assert "--allow CWELD" in refused.output
+    assert not out.exists()
+    assert call("modes", deck, "--allow", "CWELD", "--out", out).exit_code == 0
