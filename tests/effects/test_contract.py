@@ -73,7 +73,7 @@ def cases(bench):
         "sensor-mass": (catalogue.sensor_mass(cloth, setup)[0], [-0.5], [-20]),
         "suspension": (catalogue.suspension(cloth, setup, bench.grids)[1], [-0.7], [-20]),
         "thickness-distribution": (
-            thickness_distribution(cloth, 0, local, 9), local, [-40, *local[1:]],
+            thickness_distribution(cloth, 0, 9), local, [-40, *local[1:]],
         ),
         "sensor-fault": (sensors.sensor_fault("7+Z", 1, CHANNELS, 1, 0.4), [0.4], [0]),
         "mesh-error": (over, [1.0], [0]),

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from ..model.assembly import Assembly
 from .effect import Effect, FieldChange, Parameter
@@ -12,29 +14,30 @@ from .sheet import Sheet
 
 @dataclass(frozen=True, eq=False)
 class ThicknessDistribution(Effect):
-    """t(x) = t0 (1 - α q(x)), q = exp(-|x - c|² / 2R²): a smooth local thinning.
+    """t(x) = t0 (1 - α q(x)), q = exp(-|x - c|² / 2R²): a smooth local thinning of one sheet.
 
-    x = (logit of α / 0.6, ln R, c in the two principal directions of the part [length scale]).
+    x = (logit of α / 0.6, ln R, u, v [length scale]); the centre c lies on the quadric that follows
+    the sheet about where the search began. Parts that share grids are one sheet: the thinning of a
+    pressed panel does not end at a fold.
     """
 
     name = "thickness-distribution"
     claim = "the sheet is thinner here than the deck says"
 
-    position: int = 0
-    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
+    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # groups of the sheet
     centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the groups
-    plane: np.ndarray = field(default_factory=lambda: np.zeros((2, 3)))
-    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    surface: "Surface" = field(default_factory=lambda: Surface())
     size: float = 1.0
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
-    structure_points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    structure_ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
+    ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def _bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
         """Q at points X (n,), averaged over a group of variance ``blur``."""
-        flat = (X - self.origin) @ self.plane.T - self.size * x[2:4]
+        d2 = ((X - self.at(x)) ** 2).sum(axis=1)
         R2 = (self.size * np.exp(x[1])) ** 2
-        return np.asarray(R2 / (R2 + blur) * np.exp(-(flat**2).sum(axis=1) / (2 * (R2 + blur))))
+        return np.asarray(R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur))))
 
     def _log(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(
@@ -50,32 +53,39 @@ class ThicknessDistribution(Effect):
         return (FieldChange("t", self._log(x), slope),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """Thickness at the corners of the part's shells."""
+        """Thickness at the corners of the sheet's shells."""
         shells = assembly.shells
-        chosen = shells.part == self.position
         q = self._bump(x, assembly.points)[shells.nodes]
-        factor = np.where(chosen[:, None], 1 - thinning(x[0]) * q, 1.0)
+        factor = np.where(self.shells[:, None], 1 - thinning(x[0]) * q, 1.0)
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """Thinning α and radius R; the place stands in ``settled``."""
+        """The deepest thinning on the sheet and the radius R; the place stands in ``settled``."""
         rows = super().reported(x, sd)
-        low, high = (thinning(x[0] + s * 1.96 * 2 * sd[0]) for s in (-1, 1))
-        return [{**rows[0], "value": thinning(x[0]), "low": low, "high": high}, rows[1]]
+        there = float(self._bump(x, self._deepest(x)[1][None])[0])
+        value, low, high = (there * thinning(x[0] + s * 1.96 * 2 * sd[0]) for s in (0, -1, 1))
+        return [{**rows[0], "value": value, "low": low, "high": high}, rows[1]]
 
     def settled(self, x: np.ndarray) -> dict[str, Any]:
-        """The place a fit moved it to."""
-        point = [float(v) for v in self.at(x)]
+        """The place a fit moved it to: where the sheet is thinnest."""
+        grid, deepest = self._deepest(x)
+        point = [float(v) for v in deepest]
         text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
-        d2 = ((self.structure_points - self.at(x)) ** 2).sum(axis=1)
-        grid = int(self.structure_ids[np.argmin(d2)])
         radius = float(self.size * np.exp(x[1]))
         own = {"text": text, "point_m": point, "radius_m": radius, "grids": [grid]}
         return {**self.where(), **own}
 
+    def _deepest(self, x: np.ndarray) -> tuple[int, np.ndarray]:
+        """Grid and point where the sheet is thinnest: c, or the grid next to it if c is outside."""
+        c = self.at(x)
+        d2 = ((self.points - c) ** 2).sum(axis=1)
+        k = int(np.argmin(d2))
+        outside = d2[k] > (0.25 * self.size * np.exp(x[1])) ** 2
+        return int(self.ids[k]), self.points[k] if outside else c
+
     def at(self, x: np.ndarray) -> np.ndarray:
         """The centre in the basic frame (3,) [m]."""
-        return np.asarray(self.origin + self.size * x[2:4] @ self.plane)
+        return self.surface.at(self.size * x[2:4])
 
 
 def thinning(x: float) -> float:
@@ -83,26 +93,79 @@ def thinning(x: float) -> float:
     return float(0.6 / (1 + np.exp(-x)))
 
 
-def thickness_distribution(
-    sheet: Sheet, position: int, start: np.ndarray, places: int
-) -> ThicknessDistribution:
-    """A thinning of one part, searched from ``start`` (x of the effect)."""
-    groups = np.flatnonzero(sheet.part == position)
-    X, area = sheet.centre[groups], sheet.area[groups]
-    origin = np.average(X, axis=0, weights=area)
-    plane = np.linalg.svd(X - origin, full_matrices=False)[2][:2]
-    size = float(np.sqrt(area.sum()))
-    name = sheet.structure.assembly.parts[position].name
+def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDistribution:
+    """A thinning of the sheet that one group of shells belongs to, searched from that group on.
+
+    The unknown place is paid for by the spread of u and v; ``places`` counts the sheets tried.
+    """
+    part = int(sheet.part[group])
+    own = sheets(sheet)
+    inside = own == own[group]
+    assembly = sheet.structure.assembly
+    grids = np.unique(sheet.nodes[inside[sheet.group]])
+    size = float(np.sqrt(sheet.area[sheet.part == part].sum()))
+    name = assembly.parts[part].name
     unknown = (
-        Parameter("thinning", "-", -1.6, 1.2, kind="linear", step=0.8, starts=(start[0],)),
-        Parameter("R", "m", np.log(0.15), 0.5, size, step=0.3, starts=(start[1],)),
-        Parameter("along", "m", 0.0, 0.4, size, "linear", step=0.1, starts=(start[2],)),
-        Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(start[3],)),
+        Parameter("thinning", "-", -1.6, 1.2, kind="linear", step=0.8, starts=(-1.0,)),
+        Parameter("R", "m", np.log(0.15), 0.5, size, step=0.3, starts=(np.log(0.18),)),
+        Parameter("along", "m", 0.0, 0.4, size, "linear", step=0.1, starts=(0.0,)),
+        Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(0.0,)),
     )
     return ThicknessDistribution(
         unknown, f"on {name}", (name,), places=places,
-        position=position, inside=(sheet.part == position).astype(float), centre=sheet.centre,
-        plane=plane, origin=origin, size=size, variance=sheet.area / 12,
-        structure_points=sheet.structure.assembly.points,
-        structure_ids=sheet.structure.assembly.ids,
+        shells=inside[sheet.group], inside=inside.astype(float), centre=sheet.centre,
+        surface=surface(sheet, group, size), size=size, variance=sheet.area / 12,
+        points=assembly.points[grids], ids=assembly.ids[grids],
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
+
+    ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
+    uv, v² in metres, and holds within ``reach``: further out h stays at what it is there.
+    """
+
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3)[:2])
+    normal: np.ndarray = field(default_factory=lambda: np.eye(3)[2])
+    bend: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    reach: float = np.inf
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """The point (3,) [m] that has the coordinates u (2,) [m]."""
+        near = u * min(1.0, self.reach / max(float(np.linalg.norm(u)), 1e-300))
+        h = float(_quadric(near[None])[0] @ self.bend)
+        return np.asarray(self.origin + u @ self.axes + h * self.normal)
+
+
+def _quadric(u: np.ndarray) -> np.ndarray:
+    """1, u, v, u², uv, v² (n, 6)."""
+    x, y = u.T
+    return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
+
+
+def surface(sheet: Sheet, group: int, size: float) -> Surface:
+    """The quadric through the corners of the part's shells, near ones counting most."""
+    assembly = sheet.structure.assembly
+    own = np.unique(sheet.nodes[sheet.part[sheet.group] == sheet.part[group]])
+    X, c = assembly.points[own], sheet.centre[group]
+    w = np.exp(-((X - c) ** 2).sum(axis=1) / (2 * (0.25 * size) ** 2))
+    middle = np.average(X, axis=0, weights=w)
+    axes = np.linalg.svd((X - middle) * np.sqrt(w)[:, None], full_matrices=False)[2]
+    u = (X - c) @ axes[:2].T
+    A = _quadric(u) * np.sqrt(w)[:, None]
+    ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
+    bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
+    return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
+
+
+def sheets(sheet: Sheet) -> np.ndarray:
+    """Which sheet each group belongs to (g,): parts that share grids are one."""
+    parts = sheet.part[sheet.group]
+    touch = sp.coo_array(
+        (np.ones(4 * len(parts)), (np.repeat(parts, 4), sheet.nodes.ravel())),
+        shape=(len(sheet.structure.assembly.parts), len(sheet.structure.assembly.points)),
+    ).tocsr()
+    return np.asarray(connected_components(touch @ touch.T, directed=False)[1][sheet.part])

@@ -8,8 +8,7 @@ from scipy.stats import norm, qmc
 from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.sensors import sensor_fault
-from ..effects.sheet import Sheet
-from ..effects.thickness import thickness_distribution
+from ..effects.thickness import sheets, thickness_distribution
 from ..errors import ModelError
 from .likelihood import LN10, Poles, Responses
 from .reduced import evaluate
@@ -142,19 +141,14 @@ RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
 def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Local thinning: its slope at every group and radius, the two best places per baseline."""
     sheet = search.bench.sheet
-    shapes = [
-        (k, g, np.array([-2.0, np.log(radius), *_flat(sheet, int(k), int(g))]))
-        for k in np.unique(sheet.part)
-        for g in np.flatnonzero(sheet.part == k)
-        for radius in RADII
-    ]
-    effects = [thickness_distribution(sheet, int(k), x, len(sheet)) for k, _, x in shapes]
-    bumps = np.stack(
-        [e.fields(x)[0].value for e, (_, _, x) in zip(effects, shapes, strict=True)], axis=1
-    )
+    count = len(set(sheets(sheet).tolist()))
+    tried = [thickness_distribution(sheet, g, count) for g in range(len(sheet))]
+    effects = [e for e in tried for _ in RADII]
+    starts = [np.array([-2.0, np.log(radius), 0.0, 0.0]) for _ in tried for radius in RADII]
+    bumps = np.stack([e.fields(x)[0].value for e, x in zip(effects, starts, strict=True)], axis=1)
     out: list[Candidate] = []
     taken: list[int] = []
-    where = sheet.centre[[g for _, g, _ in shapes]]
+    where = np.repeat(sheet.centre, len(RADII), axis=0)
     for base in bases:
         slopes = thickness_slopes(base, search.bench.model, search.data)
         amount, score = direction_scores(base, slopes @ bumps)
@@ -163,15 +157,9 @@ def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
             if np.isfinite(score[k]):
                 taken.append(k)
                 alpha = np.clip(amount[k] * 0.6 / (1 + np.exp(2.0)), 0.02, 0.4)
-                start = np.array([np.log(alpha / (0.6 - alpha)), *shapes[k][2][1:]])
+                start = np.array([np.log(alpha / (0.6 - alpha)), *starts[k][1:]])
                 out.append((effects[k], start, base.x))
     return out
-
-
-def _flat(sheet: Sheet, part: int, g: int) -> np.ndarray:
-    """Place of a group in the part's own plane, in units of its size (2,)."""
-    effect = thickness_distribution(sheet, int(part), np.zeros(4), 1)
-    return np.asarray((sheet.centre[g] - effect.origin) @ effect.plane.T / effect.size)
 
 
 def _faults(search: Search, null: Trial, data: Responses) -> list[Candidate]:
@@ -213,11 +201,8 @@ def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
 def _thin_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
     sheet = search.bench.sheet
     some = catalogue.spread(sheet.centre, 30)
-    effects: list[Effect] = []
-    for g in some:
-        k = int(sheet.part[g])
-        x = np.array([-1.0, np.log(0.18), *_flat(sheet, k, int(g))])
-        effects.append(thickness_distribution(sheet, k, x, len(sheet)))
+    count = len(set(sheets(sheet).tolist()))
+    effects: list[Effect] = [thickness_distribution(sheet, int(g), count) for g in some]
     return _best_of(search, bases, effects, sheet.centre[some])
 
 
