@@ -139,7 +139,7 @@ def _energies(job: Run, model: Model, modal: ModalModel, chosen: list[int]) -> N
         name = f"strain energy per area / mean, mode {k} ({scene.hertz(modal.frequency[k - 1])})"
         limits = (0.0, scene.usual_limits(model.seen, values)[1])
         pictures.append(
-            scene.scalar_map(path, model.seen, values, name, cmap="magma", limits=limits)
+            scene.scalar_map(path, model.seen, values, name, cmap="YlOrRd", limits=limits)
         )
     job.section("Strain energy", [Picture(p) for p in pictures])
 

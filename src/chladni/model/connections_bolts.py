@@ -5,6 +5,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..errors import ModelError
 from .assembly import Assembly, Beams, Bushes, Masses, RigidBody
@@ -37,15 +39,38 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
 
 
 def rim(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
-    """Rows of the points round a hole: the free edge within `radius`, else the nearest shell's.
+    """Rows of the points round a hole: its rim, else free edges within `radius`, else a shell's.
 
-    A coarse mesh does not resolve a bolt hole; there one shell stands for it.
+    A hole is a closed free edge no wider than four radii whose middle is within two radii. Where a
+    mesh does not resolve a bolt hole, the nearest shell stands for it.
     """
-    edge = np.unique(free_edges(surface.nodes))
+    sides = free_edges(surface.nodes)
+    if len(loop := _loop(surface.points, sides, place, radius)):
+        return loop
+    edge = np.unique(sides)
     near = edge[np.linalg.norm(surface.points[edge] - place, axis=1) <= radius]
     if len(near) >= 3:
         return near
     return np.unique(surface.nodes[surface.feet(place[None]).shell[0]])
+
+
+def _loop(points: np.ndarray, sides: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
+    """Rows of the small closed edge nearest to a place; none if there is none."""
+    near = sides[np.linalg.norm(points[sides[:, 0]] - place, axis=1) <= 6 * radius]
+    if not len(near):
+        return np.zeros(0, int)
+    rows, ends = np.unique(near, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(len(rows), len(rows)))
+    piece = connected_components(graph, directed=False)[1]
+    best, out = 2 * radius, np.zeros(0, int)
+    for k in range(piece.max() + 1):
+        ring, x = rows[piece == k], points[rows[piece == k]]
+        closed = len(ring) >= 3 and (piece[ends[:, 0]] == k).sum() == len(ring)
+        away = float(np.linalg.norm(x.mean(axis=0) - place))
+        if closed and np.linalg.norm(np.ptp(x, axis=0)) <= 4 * radius and away <= best:
+            best, out = away, ring
+    return out
 
 
 def _spider(id_: int, centre: int, rows: np.ndarray) -> RigidBody:

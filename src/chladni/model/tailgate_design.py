@@ -113,6 +113,18 @@ class TailgateDesign:
     latch: tuple[float, float, float] = (0.095, 0.042, 0.112)  # half width, s from-to
     bracket: tuple[float, float, float] = (0.110, 0.345, 0.482)
     bracket_depth: float = 0.058
+    # empty bolt holes: radius (0: none); y, s, sheet behind the inner panel, on both sides
+    hole: float = 0.0035
+    holes: tuple[tuple[float, float, str, bool], ...] = (
+        (0.485, 0.940, "upper reinforcements", True),
+        (0.390, 0.995, "upper reinforcements", True),
+        (0.518, 0.360, "lower reinforcements", True),
+        (0.518, 0.430, "lower reinforcements", True),
+        (0.030, 0.077, "latch reinforcement", False),
+        (-0.030, 0.077, "latch reinforcement", False),
+        (0.098, 0.428, "wiper motor bracket", False),
+        (-0.098, 0.428, "wiper motor bracket", False),
+    )
     # gauges (Table 1)
     t_inner: float = 0.7e-3
     t_outer_upper: float = 0.7e-3
@@ -146,6 +158,8 @@ class TailgateDesign:
         for name, allowed in (("hem", HEMS), ("hem_stretch", STRETCHES)):
             if (value := getattr(self, name)) not in allowed:
                 raise ModelError(f"{name} is {value!r}; it may be {', '.join(allowed)}")
+        if not 0 <= self.hole <= 0.005:
+            raise ModelError(f"hole is {self.hole:g} m; bolt holes have radii up to 5 mm")
         for f in fields(self):
             if f.name.startswith("t_") and not 1e-4 <= getattr(self, f.name) <= 1e-2:
                 raise ModelError(f"{f.name} is {getattr(self, f.name):g} m; sheets are 0.1-10 mm")

@@ -90,7 +90,7 @@ def forming_mesh(skin: Skin, finest: float = 5.5e-3) -> FormedMesh:
     """All pressings, hems unfolded, on a graded mesh of their own with formed thickness."""
     made = {part: forming(skin, part) for part in STRENGTH}
     sheets = []
-    for name, sheet in pressings(skin.at_size(0.010)).items():
+    for name, sheet in pressings(skin.at_size(0.010), holes=False).items():
         part = without_side(name)
         depth = depth_field(skin, part)
         sheets.append(formed_sheet(skin.at, depth, sheet, part, made[part], finest))

@@ -293,22 +293,10 @@ def screwed(frame: Frame) -> Joined:
     return assembly, tuple(report)
 
 
-HOLES: tuple[tuple[float, float, str, bool], ...] = (  # y, s, second sheet, on both sides
-    (0.485, 0.940, UPPER, True),
-    (0.390, 0.995, UPPER, True),
-    (0.518, 0.360, LOWER, True),
-    (0.518, 0.430, LOWER, True),
-    (0.030, 0.077, LATCH, False),
-    (-0.030, 0.077, LATCH, False),
-    (0.098, 0.428, BRACKET, False),
-    (-0.098, 0.428, BRACKET, False),
-)
-
-
 def holes(skin: Skin) -> list[tuple[np.ndarray, Pair]]:
     """Places (3,) of the empty bolt holes and the sheets they go through."""
     out = []
-    for y, s, name, both in HOLES:
+    for y, s, name, both in skin.design.holes:
         for sign, side in ((1, LEFT), (-1, RIGHT)) if both else ((1, ""),):
             pair = (INNER, name + side)
             out.append((middle(skin, np.array([(sign * y, s)]), pair)[0], pair))

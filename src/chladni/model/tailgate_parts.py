@@ -20,6 +20,7 @@ from .mesher_curves import (
     rounded,
     stadium,
 )
+from .mesher_holes import bored
 from .mesher_sheets import Patches, Sheet, fold, mirrored
 from .tailgate_shape import Skin
 
@@ -279,20 +280,41 @@ def bracket(skin: Skin) -> Sheet:
     return out.sheet(BRACKET, skin.at)
 
 
-def pressings(skin: Skin) -> dict[str, Sheet]:
-    """All sheets by name; those of a pair end in left (+y) and right."""
+def pressings(skin: Skin, holes: bool = True) -> dict[str, Sheet]:
+    """All sheets by name, with or without bolt holes; a pair's end in left (+y) and right."""
     edge = borders(skin)
     fine = skin.at_size(skin.design.inner_size * skin.design.size)
-    upper, lower = upper_left(skin), lower_left(skin)
+    inner, held = inner_panel(fine, borders(fine)), _held(skin)
+    if holes and skin.design.hole:
+        inner, held = _bored(skin, inner, held)
+    upper, lower = held[UPPER + LEFT], held[LOWER + LEFT]
     sheets = [
-        inner_panel(fine, borders(fine)),
+        inner,
         outer_upper_panel(skin, edge),
         outer_lower_panel(skin, edge),
         upper,
         mirrored(upper, UPPER + RIGHT, skin.at),
         lower,
         mirrored(lower, LOWER + RIGHT, skin.at),
-        latch(skin),
-        bracket(skin),
+        held[LATCH],
+        held[BRACKET],
     ]
     return {sheet.name: sheet for sheet in sheets}
+
+
+def _held(skin: Skin) -> dict[str, Sheet]:
+    """What is welded to the inner panel, the left ones of pairs."""
+    sheets = (upper_left(skin), lower_left(skin), latch(skin), bracket(skin))
+    return {sheet.name: sheet for sheet in sheets}
+
+
+def _bored(skin: Skin, inner: Sheet, held: dict[str, Sheet]) -> tuple[Sheet, dict[str, Sheet]]:
+    """Bolt holes through the reinforcements, and through the inner panel where those then are."""
+    d, held = skin.design, dict(held)
+    depth = dict(zip(held, (skin.upper, skin.lower, skin.latch, skin.bracket), strict=True))
+    for y, s, part, both in d.holes:
+        name = part + LEFT if both else part
+        held[name], at = bored(held[name], np.array([y, s]), d.hole, depth[name], skin.at)
+        for side in (1, -1) if both else (1,):
+            inner, _ = bored(inner, at * (side, 1), d.hole, skin.inner, skin.at)
+    return inner, held
