@@ -68,7 +68,7 @@ def stacked(one: Assembly, gap: float) -> Assembly:
 
 
 def test_the_centre_stays_on_a_curved_sheet():
-    """A bowl of radius 0.5 m, 10 mm deep at 100 mm: a tangent plane misses that, the quadric a tenth."""
+    """A bowl 10 mm deep at 100 mm: a tangent plane misses all of it, the quadric a tenth."""
     flat = plate(0.6, 0.6, 24, 24, 1e-3)
     X = flat.points - [0.3, 0.3, 0.0]
     bowl = replace(flat, points=np.c_[X[:, :2], (X[:, :2] ** 2).sum(axis=1)])
