@@ -7,13 +7,12 @@ from collections.abc import Callable
 from dataclasses import asdict
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
-from ..meshing.curvature import Candidates
 from ..meshing.thickness import Mapped
 from ..model.assembly import Assembly
 from ..model.hood import HoodDesign, hood_specimen
@@ -30,6 +29,9 @@ from ..report.words import number
 from ..units import units as unit_system
 from .model import on_faces
 from .run import Out, Run, started
+
+if TYPE_CHECKING:
+    from ..planning import Places
 
 
 def run(
@@ -66,13 +68,13 @@ def run(
 
 
 def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
-    from ..meshing.curvature import candidates
     from ..meshing.quality import check_mesh
+    from ..planning import find_places
     from ..view import scene
     from ..view.surface import surface
 
     made = specimen.assembly
-    places, check = candidates(made), check_mesh(made)
+    places, check = find_places(made), check_mesh(made)
     joints = Counter(j.kind for j in specimen.joints)
     write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
     after = mapped.assembly if mapped else made
@@ -89,10 +91,8 @@ def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
     job.json("specimen.json", facts)
     seen = surface(made)
     markers = [
-        scene.Marker(tuple(x), tuple(n), str(g))
-        for x, n, g in zip(
-            places.points.tolist(), places.normal.tolist(), places.ids.tolist(), strict=True
-        )
+        scene.Marker(tuple(x), tuple(n), "")
+        for x, n in zip(places.points.tolist(), places.outward.tolist(), strict=True)
     ]
     t = on_faces(seen, after.thickness())
     pictures = [
@@ -198,9 +198,16 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
         raise ModelError(f"a setting has the wrong kind of value: {error}") from error
 
 
-def _candidates(places: Candidates) -> str:
+def _candidates(places: "Places") -> str:
     rows = (
-        f"{g}:n,{g},{x:.6f},{y:.6f},{z:.6f},output"
-        for g, (x, y, z) in zip(places.ids.tolist(), places.normal.tolist(), strict=True)
+        f"{g}:n,{f'{g},,,' if is_grid else ',{:.7g},{:.7g},{:.7g}'.format(*x)},"
+        f"{n[0]:.6f},{n[1]:.6f},{n[2]:.6f},output"
+        for g, is_grid, x, n in zip(
+            places.ids.tolist(),
+            places.is_grid.tolist(),
+            places.points.tolist(),
+            places.outward.tolist(),
+            strict=True,
+        )
     )
-    return "\n".join(["label,grid,nx,ny,nz,role", *rows, ""])
+    return "\n".join(["label,grid,x,y,z,nx,ny,nz,role", *rows, ""])

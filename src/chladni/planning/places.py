@@ -50,6 +50,11 @@ class Places:
     def __len__(self) -> int:
         return len(self.ids)
 
+    @property
+    def outward(self) -> np.ndarray:
+        """Unit normal on the side that can be reached (n, 3)."""
+        return self.normals * self.side[:, None]
+
     def moving(self, values: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Values of the points (n_points, ...) at (some of) the places."""
         at = values[self.nodes[which]]
