@@ -245,7 +245,7 @@ def test_can_be_written_as_json(case):
 def test_reversed_channel_is_reported_with_its_sign(cases):
     fault = sensors.sensor_fault("7+Z", 1, CHANNELS, -1, 0.0)
     row = fault.reported(np.array([np.log(2.0)]), np.array([0.1]))[0]
-    assert_allclose(row["value"], -0.5)
+    assert_allclose(row["value"], -2.0)
     assert row["low"] <= row["value"] <= row["high"]
     assert_allclose(fault.outputs(np.zeros(1)).value[1], 1j * np.pi / np.log(10))
 

@@ -10,11 +10,7 @@ from .effect import ChannelChange, Effect, Parameter
 
 @dataclass(frozen=True, eq=False)
 class SensorFault(Effect):
-    """Gain and sign of one channel: what was recorded is ± e^-x times the truth.
-
-    The fitted x is what must be added to the model's log level less the recording's; reported is
-    the factor by which the recording is off.
-    """
+    """Gain and sign of one channel: what was recorded is ± e^x times the truth."""
 
     name = "sensor-fault"
     claim = "a channel's gain or sign is wrong"
@@ -28,8 +24,8 @@ class SensorFault(Effect):
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
         """The factor on the channel, negative where its sign is wrong too."""
         row = super().reported(x, sd)[0]
-        low, high = sorted(self.sign / row[k] for k in ("low", "high"))
-        return [{**row, "value": self.sign / row["value"], "low": low, "high": high}]
+        low, high = sorted(self.sign * row[k] for k in ("low", "high"))
+        return [{**row, "value": self.sign * row["value"], "low": low, "high": high}]
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
         """X / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
