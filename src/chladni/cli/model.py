@@ -31,6 +31,7 @@ class Model:
     source: Path
     assembly: Assembly
     unit: str = "m"  # of length; "" where a bare deck came without its unit system
+    notes: tuple[str, ...] = ()  # what of the deck was left out
 
     @cached_property
     def structure(self) -> Structure:
@@ -99,26 +100,31 @@ class DeckModels:
     source: Path
     deck: "Deck"
     units: Units | None
-    analysis: Analysis
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """Loads, frequencies, damping; read when first asked for."""
+        from ..meshing.nastran.analysis import analysis
+
+        return analysis(self.deck, self.units)
 
     def model(self, subcase: int | None = None) -> Model:
         """The model under the supports and equations of a subcase, or of the one for modes."""
         from ..meshing.nastran import assembly
+        from ..meshing.nastran.analysis import REDUCED, left_out
 
-        made = assembly(self.deck, self.units, subcase)
-        return Model(self.source, made, "" if self.units is None else "m")
+        made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, REDUCED)
+        return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
 
 
 def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:
     """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
     from ..meshing.nastran import read_deck
-    from ..meshing.nastran.analysis import analysis
 
     if not source.is_file():
         raise FileError(f"no file {source}{beside(source)}")
     system = None if units is None else unit_system(units)
-    deck = read_deck(source, allow)
-    return DeckModels(source, deck, system, analysis(deck, system))
+    return DeckModels(source, read_deck(source, allow), system)
 
 
 def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:

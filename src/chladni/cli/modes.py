@@ -27,6 +27,7 @@ def run(
     with started("modes", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units, allow or (), subcase)
+        job.notes.extend(model.notes)
         job.progress("matrices", 0.1)
         modal = _solved(job, model, count)
         job.progress("energies", 0.6)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from chladni.errors import FileError
 from chladni.meshing.nastran import SetField, numbers, read_deck, write_deck
+from chladni.meshing.nastran.context import id_list
 
 from .conftest import ANCHORS, PLATE, real_decks
 
@@ -292,3 +293,23 @@ def test_hundred_thousand_quadrilaterals_in_two_seconds(tmp_path):
     assert deck["CQUAD4"].ids(1, 6).shape == (n * n, 6)
     assert deck["GRID"].block(3, 3).shape == ((n + 1) ** 2, 3)
     assert time.process_time() - start < 2.0 * 2  # twice the promise, for slow machines
+
+
+def test_a_byte_order_mark_is_no_card(tmp_path):
+    """The first line counts, whatever an editor put before it."""
+    for text in (PLATE, f"SOL 103\nCEND\nBEGIN BULK\n{PLATE}"):
+        path = tmp_path / "deck.bdf"
+        path.write_text("\ufeff" + text, encoding="utf-8")
+        deck = read_deck(path)
+        assert deck["GRID"].integers(1).tolist() == [1, 2, 3, 4]
+        assert deck.case.sol == (103 if "SOL" in text else 0)
+
+
+def test_skipped_lines_are_not_read(bulk):
+    text = f"{PLATE}SKIPON\nCWELD,1,2\nGRID,9\nSKIPOFF\nGRID,8,,1.,1.,1.\nskipon\nGRID,7\n"
+    assert bulk(text)["GRID"].integers(1).tolist() == [1, 2, 3, 4, 8]
+
+
+def test_exceptions_from_a_range(bulk):
+    deck = bulk(PLATE + "SPC1,1,123,1,THRU,9,EXCEPT,2,4,20,21,THRU,25,BY,2\n")
+    assert id_list(deck["SPC1"], 0, 3) == [1, 3, 5, 6, 7, 8, 9, 20, 21, 23, 25]

@@ -1,6 +1,6 @@
 """What a deck asks for: subcases, loads, frequencies, damping, excitation."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from ...model.analysis import Analysis, Subcase
 from ...units import Units
@@ -17,6 +17,7 @@ _LEFT_OUT = {
     "OMIT": "static reduction", "OMIT1": "static reduction", "ASET": "static reduction",
     "ASET1": "static reduction", "TABLED4": "power-series tables",
 }  # fmt: skip
+REDUCED = ("OMIT", "OMIT1", "ASET", "ASET1")  # Guyan's: its frequencies are not the structure's
 
 
 def analysis(deck: Deck, units: Units | None = None) -> Analysis:
@@ -33,7 +34,7 @@ def analysis(deck: Deck, units: Units | None = None) -> Analysis:
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
-        notes=tuple(_notes(deck)),
+        notes=tuple(left_out(deck)),
     )
 
 
@@ -46,8 +47,8 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
         yield Subcase(case.id, *chosen, outputs=case.outputs, residual=wanted)
 
 
-def _notes(deck: Deck) -> Iterator[str]:
+def left_out(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
     """Cards that are read but not acted upon, one sentence each."""
-    for name, what in _LEFT_OUT.items():
+    for name in names:
         for cards in deck.present(name):
-            yield f"{cards.where(0)}: {name} ({what}) is left out"
+            yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"

@@ -205,15 +205,13 @@ def _spoints(deck: Deck, grids: np.ndarray) -> np.ndarray:
 
 
 def id_list(cards: Cards, i: int, first: int) -> list[int]:
-    """Ids in fields ``first``... of card i, THRU and BY spelled out."""
-    words = cards.fields(i)[first - 1 :]
+    """Ids in fields ``first``... of card i: THRU, BY and EXCEPT spelled out."""
+    words = [w for w in cards.fields(i)[first - 1 :] if w]
     out: list[int] = []
-    k = 0
-    words = [w for w in words if w]
+    last = k = 0  # where the latest THRU ends, while EXCEPT is at work
     while k < len(words):
         if words[k] in ("THRU", "TO") and out and k + 1 < len(words):
-            step = 1
-            last = _whole(cards, i, words[k + 1])
+            step, last = 1, _whole(cards, i, words[k + 1])
             if k + 3 < len(words) and words[k + 2] == "BY":
                 step = max(_whole(cards, i, words[k + 3]), 1)
                 k += 2
@@ -221,6 +219,12 @@ def id_list(cards: Cards, i: int, first: int) -> list[int]:
                 raise cards.refuse(i, f"the range {out[-1]} THRU {last} is too long")
             out.extend(range(out[-1] + step, last + 1, step))
             k += 2
+        elif words[k] == "EXCEPT" and last:
+            k += 1
+            while k < len(words) and (id := _whole(cards, i, words[k])) <= last:
+                out = [x for x in out if x != id]
+                k += 1
+            last = 0
         else:
             out.append(_whole(cards, i, words[k]))
             k += 1

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import FileError
 from .cards import carries
 from .case import CaseControl, case_control
-from .layout import tables
+from .layout import BOM, tables
 from .names import part_names
 from .sources import Source, sources
 from .table import Cards, empty, joined
@@ -79,7 +79,7 @@ def _case(files: tuple[Source, ...]) -> CaseControl:
     """Case control of the main file, its own includes read in place."""
     main = files[0]
     first, _ = main.bulk
-    text = [line.decode("latin-1") for line in main.lines[: max(first, 0)]]
+    text = [line.removeprefix(BOM).decode("latin-1") for line in main.lines[: max(first, 0)]]
     for include in reversed(main.includes):
         target = main.path.parent / include.name
         if include.past <= first and target.is_file():

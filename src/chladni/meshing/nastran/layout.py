@@ -11,6 +11,7 @@ from .replicate import expanded
 from .sources import Source
 from .table import Cards
 
+BOM = b"\xef\xbb\xbf"  # some editors begin a file with it
 _BLANK, _STAR, _PLUS, _COMMA, _DOLLAR = b" *+,$"
 _ARITHMETIC = np.arange(80)
 
@@ -54,6 +55,8 @@ def _classified(source: Source) -> _Lines:
     """Blank out comments, drop empty lines, tell the formats apart."""
     first, past = source.bulk
     raw = [t.expandtabs(8) if b"\t" in t else t for t in source.lines[first:past]]
+    if raw and first == 0:
+        raw[0] = raw[0].removeprefix(BOM)
     origin: np.ndarray = np.arange(first, past)
     if any(b"=" in t and t[:1] != b"$" for t in raw):
         raw, at = expanded(raw, source.path, first)
@@ -68,6 +71,7 @@ def _classified(source: Source) -> _Lines:
     at = (text[dollar] == _DOLLAR).argmax(axis=1)
     text[dollar] = np.where(_ARITHMETIC >= at[:, None], _BLANK, text[dollar])
     keep = (text != _BLANK).any(axis=1)
+    keep &= ~_skipped(text)
     for include in source.includes:
         keep &= (origin < include.first) | (origin >= include.past)
     number = np.flatnonzero(keep)
@@ -76,6 +80,16 @@ def _classified(source: Source) -> _Lines:
         int(i): _split(raw[number[i]]) for i in np.flatnonzero((text[:, :72] == _COMMA).any(axis=1))
     }
     return _formats(origin[number], text, tokens)
+
+
+def _skipped(text: np.ndarray) -> np.ndarray:
+    """Lines (m,) from a SKIPON to its SKIPOFF, both included."""
+    names = np.ascontiguousarray(text[:, :8]).view("S8").ravel()
+    names = np.strings.rstrip(names) if len(names) else names
+    return np.asarray(
+        (np.cumsum(names == b"SKIPON") > np.cumsum(names == b"SKIPOFF"))
+        | np.isin(names, (b"SKIPON", b"SKIPOFF"))
+    )
 
 
 def _split(line: bytes) -> list[bytes]:
