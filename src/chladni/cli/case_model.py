@@ -11,7 +11,7 @@ from ..dynamics.frf import FRF, residual_flexibility
 from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure
-from ..fem.locate import locate, rows_at
+from ..fem.locate import rows_of
 from ..fem.solve import inertia_load
 from .model import Model
 
@@ -27,14 +27,11 @@ def rows(places: Places, built: Structure) -> sp.csr_array:
     A place that is no grid is on the nearest shell; the base has no row of its own (zeros).
     """
     found = sp.lil_array((len(places.labels), built.T.shape[1]))
-    on_grid = np.flatnonzero(places.grids > 0)
-    off_grid = np.flatnonzero((places.grids <= 0) & ~places.base)
-    if len(on_grid):
-        found[on_grid] = built.along(places.grids[on_grid], places.directions[on_grid])
-    if len(off_grid):
-        a = built.assembly
-        located = locate(a.points, a.shells.nodes, places.points[off_grid])
-        found[off_grid] = rows_at(built, located, places.directions[off_grid])
+    real = np.flatnonzero(~places.base)
+    if len(real):
+        found[real] = rows_of(
+            built, places.grids[real], places.points[real], places.directions[real]
+        )
     return sp.csr_array(found)
 
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
 from ..fem.assemble import Structure
-from ..fem.locate import locate, rows_at
+from ..fem.locate import rows_of
 from ..model.assembly import Assembly
 from .calibration import Weighing
 from .likelihood import Poles, Responses
@@ -36,14 +36,7 @@ class Places:
 
     def rows(self, built: Structure) -> sp.csr_array:
         """Rows over the free dofs of the structure (k, n)."""
-        out = sp.lil_array((len(self.labels), built.T.shape[1]))
-        at = np.flatnonzero(self.grids > 0)
-        if len(at):
-            out[at] = built.along(self.grids[at], self.directions[at])
-        free = np.flatnonzero(self.grids <= 0)
-        if len(free):
-            out[free] = _on_shell(built, self.points[free], self.directions[free])
-        return sp.csr_array(out)
+        return rows_of(built, self.grids, self.points, self.directions)
 
     def around(self, built: Structure) -> sp.csr_array:
         """Rows at each place and four more, two standard deviations away in the sheet."""
@@ -56,13 +49,8 @@ class Places:
             e2 = np.cross(n, e1)
             step = 1.4 * self.sd[k]
             near = self.points[k] + step * np.array([e1, -e1, e2, -e2])
-            rows.append(_on_shell(built, near, np.tile(n, (4, 1))))
+            rows.append(rows_of(built, np.zeros(4, int), near, np.tile(n, (4, 1))))
         return sp.csr_array(sp.vstack(rows))
-
-
-def _on_shell(built: Structure, points: np.ndarray, directions: np.ndarray) -> sp.csr_array:
-    assembly = built.assembly
-    return rows_at(built, locate(assembly.points, assembly.shells.nodes, points), directions)
 
 
 @dataclass(frozen=True, eq=False)
