@@ -101,8 +101,8 @@ def steps_per_second(id: str, seconds: float, **options: Any) -> float:
     return count / (process_time() - start)
 
 
-def environments(phi: Shapes, n: int, seconds: float) -> None:
-    """Steps a second of every environment."""
+def environments(phi: Shapes, n: int, seconds: float, case: str | None) -> None:
+    """Steps a second of every environment, on a case too where one is given."""
     print("\nsteps a second, agent's random choice included (CPU time)")
     cases: dict[str, tuple[str, dict[str, Any]]] = {
         "sensors, 64 x 8": ("chladni/SensorPlacement-v0", {}),
@@ -111,6 +111,7 @@ def environments(phi: Shapes, n: int, seconds: float) -> None:
             "chladni/SensorPlacement-v0",
             {"phi": phi, "n_sensors": n},
         ),
+        **on_case(case),
         "actuators, 49 x 6": ("chladni/ActuatorPlacement-v0", {}),
         "parameters, 8": ("chladni/ParameterSelection-v0", {}),
         "calibration, 4": ("chladni/Calibration-v0", {}),
@@ -119,14 +120,30 @@ def environments(phi: Shapes, n: int, seconds: float) -> None:
         print(f"{name:26}{steps_per_second(id, seconds, **options):10.0f}")
 
 
+def on_case(case: str | None) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Thirty sensors for fifteen modes, and two shakers, of a case folder or deck."""
+    if case is None:
+        return {}
+    both = {"case": case, "modes": 15}
+    return {
+        "sensors of the case": ("chladni/SensorPlacement-v0", {**both, "n_sensors": 30}),
+        "the same, adding": (
+            "chladni/SensorPlacement-v0",
+            {**both, "n_sensors": 30, "moves": "add"},
+        ),
+        "actuators of the case": ("chladni/ActuatorPlacement-v0", both),
+    }
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=1.0, help="for each environment")
+    parser.add_argument("--case", help="folder or deck whose mesh gives candidates and modes")
     args = parser.parse_args()
     phi = np.random.default_rng(0).normal(size=(400, 24))
     methods(phi, 30)
-    environments(phi, 30, args.seconds)
+    environments(phi, 30, args.seconds, args.case)
 
 
 if __name__ == "__main__":
