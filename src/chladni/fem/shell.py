@@ -188,6 +188,20 @@ def mass(
     return M
 
 
+def mass_by_thickness(
+    geo: ShellGeometry, t: np.ndarray, change: np.ndarray, rho: np.ndarray, coupled: bool = True
+) -> np.ndarray:
+    """dM_e = ∫ ρδt N Nᵀ ⊗ 1 + ρt²δt/4 N Nᵀ ⊗ (1 - n nᵀ) dA for a change δt (m, 4) of t."""
+    M, change = np.zeros((len(geo), 24, 24)), np.broadcast_to(change, t.shape)
+    for rows in _chunks(geo):
+        part = geo[rows]
+        weight, N = _quadrature(part)
+        areal = rho[rows, None] * (change[rows] @ N.T) * weight
+        rotary = areal * (t[rows] @ N.T) ** 2 / 4 * coupled
+        M[rows] = _mass(part, N, areal, rotary, coupled)
+    return M
+
+
 def areal_mass(geo: ShellGeometry, t: np.ndarray, rho: np.ndarray, nsm: np.ndarray) -> np.ndarray:
     """m_k = ∫ (ρt + nsm) N_k dA (m, 4) [kg], the share of each corner."""
     share = np.zeros((len(geo), 4))

@@ -72,6 +72,23 @@ def elasticity(material: object) -> np.ndarray:
     return C
 
 
+def elasticity_derivative(material: Isotropic, name: str) -> np.ndarray:
+    """dC/dE or dC/dnu (6, 6); a G of its own stays."""
+    E, nu = material.E, material.nu
+    below, own = (1 + nu) * (1 - 2 * nu), material.G is not None
+    if name == "E":
+        lam, twice, G = nu / below, 1 / (1 + nu), 1 / (2 * (1 + nu))
+    elif name == "nu":
+        lam, twice = E * (1 + 2 * nu**2) / below**2, -E / (1 + nu) ** 2
+        G = twice / 2
+    else:
+        raise ModelError(f"no modulus {name!r} of a solid; there are E and nu")
+    dC = np.zeros((6, 6))
+    dC[:3, :3] = lam + twice * np.eye(3)
+    dC[3:, 3:] = 0.0 if own else G * np.eye(3)
+    return dC
+
+
 def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
     """Raise where an element has no volume or turns inside out."""
     family = FAMILIES[X.shape[1]]
@@ -119,7 +136,32 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     return K
 
 
+def stiffness_derivative(
+    X: np.ndarray, C: np.ndarray, dC: np.ndarray, modes: np.ndarray | int = 21
+) -> np.ndarray:
+    """dK_e = ∫ (B + A G)ᵀ dC (B + A G) dV, G = -K_aa⁻¹ K_au of C: exact, by stationarity.
+
+    Parameters
+    ----------
+    C, dC : (m, 6, 6)    elasticity and its change [Pa]
+    """
+    modes, n = np.broadcast_to(np.asarray(modes), len(X)), 3 * X.shape[1]
+    out = np.empty((len(X), n, n))
+    for kind in np.unique(modes):
+        at = modes == kind
+        K, dK = (_whole(FAMILIES[X.shape[1]], X[at], A[at], int(kind)) for A in (C, dC))
+        follow = np.linalg.solve(K[:, n:, n:], -K[:, n:, :n])
+        carry = np.concatenate([np.broadcast_to(np.eye(n), (len(K), n, n)), follow], axis=1)
+        out[at] = carry.swapaxes(1, 2) @ dK @ carry
+    return out
+
+
 def _integrated(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+    """The same with the internal strains condensed out."""
+    return _condensed(_whole(family, X, C, modes), 3 * X.shape[1])
+
+
+def _whole(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
     """Σ w |det J| Bᵀ C B over displacements and the first ``modes`` internal strains."""
     J0 = family.gradients(family.centre) @ X
     turn = _to_basic(np.linalg.inv(J0)) * np.linalg.det(J0)[:, None, None]
@@ -133,7 +175,7 @@ def _integrated(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.
             inner = turn @ family.enhanced(xi)[:, :modes] / dV[:, None, None]
             B = np.concatenate([B, inner], axis=2)
         K = K + (w * np.abs(dV))[:, None, None] * (B.transpose(0, 2, 1) @ C @ B)
-    return _condensed(np.asarray(K), 3 * X.shape[1])
+    return np.asarray(K)
 
 
 def _compatible(family: Family, X: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,206 @@
+"""Every derivative of an operator leaves a Taylor remainder of second order."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.errors import ModelError
+from chladni.fem import derivative
+from chladni.fem.assemble import structure
+from chladni.model.assembly import Assembly, Average, Bushes, Masses, Scalars, Solids
+from chladni.model.plates import folded_panel
+from chladni.model.properties import Isotropic, Orthotropic, Part, SolidSection
+
+STEPS = np.array([2e-2, 1e-2, 5e-3])
+GLUE = Isotropic(2e9, 0.42, 1200.0)
+SHEET = ("t", "E", "nu", "rho")
+
+
+@pytest.fixture(scope="module")
+def made() -> Assembly:
+    """A panel with a warped corner, a brick and a wedge of glue, a spider, a bush, lumps."""
+    base = folded_panel(0.2, 0.1, 0.04, 0.01, 0.05)
+    n, top = len(base.ids), base.points.max(axis=0)
+    brick = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1.1, 1), (0, 0.9))])
+    extra = np.vstack([0.02 * brick + top + 0.1, [[0.1, 0.05, 0.02]]])
+    points = np.vstack([base.points, extra])
+    points[3, 2] += 0.004
+    solids = (
+        Solids(np.array([901]), n + np.arange(8)[None], np.array([2])),
+        Solids(np.array([902]), n + np.array([[0, 1, 2, 4, 5, 6]]), np.array([2])),
+    )
+    reference = len(points) - 1
+    near = np.argsort(np.linalg.norm(base.points - points[reference], axis=1))[:9]
+    spider = Average(
+        77, reference, (1, 2, 3, 4, 5, 6), tuple((int(k), (1, 2, 3), 1.0) for k in near)
+    )
+    other = int(near[0]) + 1
+    one = np.array([1])
+    bush = Bushes(
+        one, np.array([[reference, other]]), np.eye(3)[None], points[[reference]],
+        np.array([[1e6, 2e6, 3e6, 40.0, 50.0, 60.0]]), np.full((1, 6), 3.0), np.zeros((1, 6)),
+    )  # fmt: skip
+    scalar = Scalars(one, np.array([[5, -1]]), np.array([[3, 1]]), np.array([2e4]), np.zeros(1))
+    mass = Masses(one, np.array([reference]), 0.1 * np.diag([1, 1, 1, 1e-4, 2e-4, 3e-4])[None])
+    return replace(
+        base, ids=np.arange(1, len(points) + 1), points=points,
+        parts=(*base.parts, Part(9, "glue", SolidSection(GLUE))), solids=solids,
+        rigid=(spider,), bushes=bush, springs=scalar, dampers=scalar, masses=mass,
+    )  # fmt: skip
+
+
+def remainder_order(change, slope, value):
+    """Order of |A(p + h) - A(p) - h dA/dp|; inf where the operator is linear in p."""
+    at = structure(change(0.0)).system
+    out = []
+    for name in "MVK":
+        left, scale = [], 0.0
+        for step in STEPS * value:
+            moved = getattr(structure(change(step)).system, name) - getattr(at, name)
+            left.append(abs(moved - step * getattr(slope, name)).max())
+            scale = max(scale, abs(moved).max())
+        if scale > 0:
+            tiny = max(left) < 1e-9 * scale + 1e-13 * abs(getattr(at, name)).max()
+            out.append(np.inf if tiny else np.log2(left[0] / left[1]))
+            out.append(np.inf if tiny else np.log2(left[1] / left[2]))
+    assert out, "nothing changed"
+    return min(out)
+
+
+def with_material(assembly, part, **changes):
+    section = assembly.parts[part].section
+    names = [n for n in ("membrane", "bending", "shear", "material") if getattr(section, n, None)]
+    new = {n: replace(getattr(section, n), **changes) for n in names}
+    parts = list(assembly.parts)
+    parts[part] = parts[part].with_section(**new)
+    return assembly.with_parts(tuple(parts))
+
+
+def thicker(assembly, part, step):
+    shells = assembly.shells
+    t = shells.thickness + step * (shells.part == part)[:, None]
+    return replace(assembly, shells=replace(shells, thickness=t))
+
+
+@pytest.mark.parametrize(
+    ("name", "coupled"), [*((n, True) for n in SHEET), ("t", False), ("rho", False)]
+)
+def test_sheet(made, name, coupled):
+    made = replace(made, coupled_mass=coupled)
+    material = made.parts[0].section.membrane
+    value = 1e-3 if name == "t" else getattr(material, name)
+
+    def change(step):
+        if name == "t":
+            return thicker(made, 0, step)
+        return with_material(made, 0, **{name: value + step})
+
+    slope = derivative.by_part(structure(made), 0, name)
+    order = remainder_order(change, slope, value)
+    assert order > (50 if name in ("E", "rho") else 1.9)
+
+
+@pytest.mark.parametrize("name", ["E1", "E2", "G12", "nu12"])
+def test_grain(made, name):
+    grain = Orthotropic(2e10, 8e9, 0.28, 5e9, 4e9, 3e9, 700.0)
+    parts = list(made.parts)
+    parts[1] = parts[1].with_section(membrane=grain, bending=grain, shear=None)
+    made = made.with_parts(tuple(parts))
+    value = getattr(grain, name)
+    slope = derivative.by_part(structure(made), 1, name)
+    order = remainder_order(
+        lambda step: with_material(made, 1, **{name: value + step}), slope, value
+    )
+    assert order > 1.9
+
+
+@pytest.mark.parametrize("name", ["E", "nu", "rho"])
+@pytest.mark.parametrize(("own", "full"), [(None, False), (7e8, True)])
+def test_adhesive(made, name, own, full):
+    parts = list(made.parts)
+    parts[2] = Part(9, "glue", SolidSection(replace(GLUE, G=own), full))
+    made = made.with_parts(tuple(parts))
+    value = getattr(GLUE, name)
+    slope = derivative.by_part(structure(made), 2, name)
+    order = remainder_order(
+        lambda step: with_material(made, 2, **{name: value + step}), slope, value
+    )
+    assert order > 1.9
+
+
+@pytest.mark.parametrize("direction", [2, 6])
+@pytest.mark.parametrize("name", ["K", "B"])
+def test_bush(made, direction, name):
+    field = "stiffness" if name == "K" else "viscous"
+    value = getattr(made.bushes, field)[0, direction - 1]
+
+    def change(step):
+        new = getattr(made.bushes, field) + step * np.eye(6)[direction - 1]
+        return replace(made, bushes=replace(made.bushes, **{field: new}))
+
+    slope = derivative.by_bush(structure(made), 0, direction, name)
+    assert remainder_order(change, slope, value) == np.inf
+
+
+@pytest.mark.parametrize("family", ["springs", "dampers"])
+def test_scalar(made, family):
+    old = getattr(made, family)
+    slope = {"springs": derivative.by_spring, "dampers": derivative.by_damper}[family](
+        structure(made), 0
+    )
+    order = remainder_order(
+        lambda step: replace(made, **{family: replace(old, value=old.value + step)}), slope, 2e4
+    )
+    assert order == np.inf
+
+
+def test_point_mass(made):
+    def change(step):
+        return replace(
+            made, masses=replace(made.masses, matrix=made.masses.matrix * (1 + 10 * step))
+        )
+
+    assert remainder_order(change, derivative.by_mass(structure(made), 0), 0.1) == np.inf
+
+
+def test_radius_of_a_spider(made):
+    """Points fade out smoothly: the slope holds across the radius at which one drops out."""
+    spider = made.rigid[0]
+    far = [np.linalg.norm(made.points[n] - made.points[spider.reference]) for n, *_ in spider.terms]
+    for R in (1.3 * max(far), max(far) * (1 - 1e-3)):
+        here = structure(derivative.with_radius(made, 0, R))
+        slope = derivative.by_radius(here, spider, R)
+        order = remainder_order(
+            lambda step, R=R: derivative.with_radius(made, 0, R + step), slope, R
+        )
+        assert order > 1.7
+        assert abs(slope.K).max() > 0
+        assert abs(slope.M).max() > 0
+        assert abs(slope.V).max() > 0
+
+
+def test_slopes_are_symmetric(made):
+    built = structure(derivative.with_radius(made, 0, 0.3))
+    for slope in (
+        derivative.by_radius(built, made.rigid[0], 0.3),
+        derivative.by_part(built, 2, "nu"),
+    ):
+        for A in (slope.M, slope.V, slope.K):
+            assert_allclose((A - A.T).toarray(), 0, atol=1e-9 * max(abs(A).max(), 1))
+
+
+def test_what_a_part_has_not_is_named(made):
+    built = structure(made)
+    with pytest.raises(ModelError, match="part glue has no 't'; there are E, nu, rho"):
+        derivative.by_part(built, 2, "t")
+    with pytest.raises(ModelError, match="a bush has K and B along 1 to 6"):
+        derivative.by_bush(built, 0, 7)
+    with pytest.raises(ModelError, match="fewer than three of its points"):
+        derivative.with_radius(made, 0, 1e-4)
+    tied = replace(made, rigid=(*made.rigid, replace(made.rigid[0], id=78)))
+    with pytest.raises(ModelError, match="RBE3 77 has no radius here"):
+        derivative.by_radius(
+            built.__class__(tied, built.T, built.system, built.loss), made.rigid[0], 1
+        )
