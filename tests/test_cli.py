@@ -287,6 +287,8 @@ def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
     out = tmp_path / "answer"
     d = calibrated(case, out)
     assert d["files"]["deck"] == "updated.bdf"
+    assert any("of 5 starts, 4 of them random, ended within 1" in note for note in d["notes"])
+    assert "missing physics was not looked for" in (out / "report.html").read_text()
     assert call("modes", out / "updated.bdf", "--units", "SI", "--count", 8, "--out", out).output
     f = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
     assert call("modes", case / "plate.bdf", "--units", "SI", "--count", 8, "--out", out).output

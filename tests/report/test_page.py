@@ -117,6 +117,13 @@ def test_every_verdict_is_one_sentence(verdict):
         assert "None" not in said
 
 
+def test_a_calibration_alone_claims_no_more():
+    """No alternative was tried: nothing is said of what is missing."""
+    d = {"verdict": "calibration only", "effects": [], "alternatives": [], "fit": None}
+    assert "not looked for" in sentence(d)
+    assert "no physics is missing" in sentence({**d, "alternatives": [{"name": "point-mass"}]})
+
+
 @pytest.mark.parametrize("d", [{}, {"verdict": "nothing missing", "effects": [], "fit": None}])
 def test_what_is_missing_is_left_out(tmp_path, d):
     text, tags = read(write_page(tmp_path, d))

@@ -62,6 +62,8 @@ def sentence(d: Mapping[str, Any]) -> str:
     if verdict == "nonlinear":
         why = what or "no linear model fits"
         return f"The structure does not answer in proportion to the force: {why}."
+    if "alternatives" in d and not d["alternatives"] and not effects:
+        return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":

@@ -88,6 +88,7 @@ def held_out(prepared: Prepared, winner: Trial) -> np.ndarray:
     return own if own.any() else held
 
 
+STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 VETO = 0.8  # held-out Q, over that of plain calibration, above which nothing is named
 
 
@@ -178,6 +179,8 @@ def alternatives(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
     """Why a hypothesis was not named, with a number."""
+    if not named and gain > threshold(trial.data):
+        return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
     if not named:
         return (
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
@@ -282,8 +285,16 @@ def structured(prepared: Prepared, diagnosis: Diagnosis) -> dict[str, Any]:
         chi = 1.0 if prepared.identified is None else prepared.identified.chi
         known = 0.01 * chi / np.log(10)
         text = f"{left:.2g} decades rms, the recording is known to about {known:.1g}"
-    is_so = bool(left > 5 * known and diagnosis.found is not None)
-    end = "that is structured, not noise" if is_so else "nothing more can be read from that"
+    far = left > STRUCTURED * known
+    is_so = bool(far and diagnosis.found is not None)
+    if is_so:
+        end = "that is structured, not noise"
+    elif not far:
+        end = "nothing more can be read from that"
+    elif diagnosis.trials:
+        end = "mesh error and scatter within the parts account for it as well as any effect tried"
+    else:
+        end = "more than noise; a diagnosis says whether physics is missing"
     return {
         "is": is_so,
         "left": left,
