@@ -152,6 +152,13 @@ def test_pairing_by_shapes_finds_swapped_modes(seed: int) -> None:
     np.testing.assert_allclose(pairs.mac, 1, atol=1e-12)
 
 
+@pytest.mark.parametrize(("gap", "alike"), [(0.02, True), (0.2, False)])
+def test_half_alike_modes_are_paired_only_where_near(gap: float, alike: bool) -> None:
+    """MAC 0.6: a pair at 2 %, strangers at 20 % whatever else is there to pair with."""
+    pairs = pair(np.array([100.0 * np.exp(gap)]), np.array([100.0]), np.array([[0.6]]))
+    assert len(pairs) == alike
+
+
 def test_pairing_of_nothing() -> None:
     assert len(pair(np.array([1.0]), np.zeros(0))) == 0
     np.testing.assert_array_equal(pair(np.array([10.0]), np.array([100.0])).alone_test, [0])

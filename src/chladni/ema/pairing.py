@@ -40,7 +40,8 @@ def pair(
     """One-to-one pairing of modes.
 
     With shapes: the assignment of largest Σ MAC - (Δ ln f / 4 width)² (Hungarian method, Kuhn
-    1955); pairs below ``least_mac`` are dissolved. Without: the cheapest *monotone* path with
+    1955); pairs below ``least_mac`` are dissolved, and the farther apart in frequency, the more
+    alike two modes must be (0.95 at ``farthest``). Without: the cheapest *monotone* path with
     free skips (Needleman and Wunsch 1970), so modes a test could not see do not shift the rest.
 
     Parameters
@@ -81,7 +82,8 @@ def _assigned(
     """Hungarian assignment; what is not alike or too far off is dissolved."""
     from scipy.optimize import linear_sum_assignment
 
-    allowed = (mac >= least) & (np.abs(gap) <= farthest)
+    due = least + max(0.95 - least, 0.0) * np.abs(gap) / farthest
+    allowed = (mac >= due) & (np.abs(gap) <= farthest)
     score = np.where(allowed, 1 + mac - np.minimum((gap / (4 * width)) ** 2, 0.9), 0.0)
     m, n = linear_sum_assignment(score, maximize=True)
     kept = allowed[m, n]
