@@ -35,7 +35,7 @@ def changes(bench):
         "thickness": (ordinary(cloth, "t", [0]), np.array([0.2])),
         "thinner": (ordinary(cloth, "t", [1]), np.array([-0.2])),
         "stiffer": (ordinary(cloth, "E", [0]), np.array([0.5])),
-        "thinning": (thickness_distribution(cloth, 0, start, 1), start),
+        "thinning": (thickness_distribution(cloth, 0, 1), start),
         "mass": (catalogue.point_mass(cloth, setup, bench.grids, k, 1), np.array([1.0, 0.2, 0.1])),
         "masses": (catalogue.sensor_mass(cloth, setup)[0], np.array([0.5])),
         "spring": (
