@@ -19,8 +19,9 @@ from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
 from ..updating.likelihood import Responses
 from ..updating.outcome import Models, as_dict, judged, models, rms
-from ..updating.prepare import prepare, renewed
+from ..updating.prepare import prepare
 from ..updating.question import Prepared, Question
+from ..updating.renewal import renewed
 from .case_model import DAMPING, markers, model_frf
 from .frf import REACH
 from .model import Model, is_case
@@ -59,8 +60,9 @@ def _answered(job: Run, case: Case, search: bool) -> dict[str, Any]:
     prepared = prepare(asked)
     found = diagnose(prepared.search, within(job.progress, 0.1, 0.8), search)
     if found.found is not None:
-        first = renewed(asked, prepared, found.found)
-        found = judged(prepared, replace(found, trials=(first, *found.trials[1:])))
+        first, note = renewed(asked, prepared, found.found)
+        found = replace(found, trials=(first, *found.trials[1:]), notes=(*found.notes, note))
+        found = judged(prepared, found)
     stages = models(asked, found)
     job.progress("writing the deck", 0.82)
     updated, lost = written(job, case, stages.final)

@@ -13,7 +13,6 @@ import scipy.sparse as sp
 
 from ..effects import catalogue
 from ..effects.effect import Effect
-from ..effects.material import OrthotropicMaterial
 from ..effects.mesh import jitter, mesh_error
 from ..effects.ordinary import PartScale, gain, ordinary, scatter
 from ..ema.identification import equalised, identify
@@ -23,7 +22,7 @@ from .calibration import fit
 from .frequencies import band_of, counted, frequencies, widened
 from .likelihood import LN10, Poles, Responses
 from .question import Prepared, Question
-from .search import Search, Trial
+from .search import Search
 from .workbench import Workbench, workbench
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
@@ -66,10 +65,10 @@ def _by_responses(question: Question) -> Prepared:
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
-    nuisance = _nuisance(bench, built, top)
+    nuisance = nuisances(bench, built, top)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
-    search = _search(question, bench, data[0], nuisance, top)
+    search = searched(question, bench, data[0], nuisance, top)
     swapped = (
         held_sensors if isinstance(question.held_sensors, tuple) else _swapped(search, held_sensors)
     )
@@ -170,14 +169,14 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
     ).over(bench.model)
-    nuisance = _nuisance(bench, built, top)
-    search = _search(question, bench, data, nuisance, top)
+    nuisance = nuisances(bench, built, top)
+    search = searched(question, bench, data, nuisance, top)
     what = f"the {int(held.sum())} highest of {len(held)} frequencies"
     notes = (*notes, *_mass_note(question))
     return Prepared(search, data, held, what, notes, found, ~held)
 
 
-def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:
+def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
         scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
@@ -187,13 +186,14 @@ def _nuisance(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     return [*out, jitter(built, top, mesh)]
 
 
-def _search(
+def searched(
     question: Question,
     bench: Workbench,
     data: Responses | Poles,
     nuisance: list[Effect],
     top: float,
 ) -> Search:
+    """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
     base = [*_ordinary(question, bench), *nuisance]
     weight = mass_properties(question.assembly)[0]
     sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
@@ -220,30 +220,3 @@ def _mass_note(question: Question) -> list[str]:
         ]
     w = question.weighing
     return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]
-
-
-def renewed(question: Question, prepared: Prepared, trial: Trial) -> Trial:
-    """A strong change of material fitted again on a structure that has it already.
-
-    Mesh error, jitter and the basis belong to the structure they were made for; where the material
-    is another one they are made anew, and the same parameters are fitted from where they were.
-    """
-    effect = trial.effect
-    if not isinstance(effect, OrthotropicMaterial):
-        return trial
-    x = trial.fit.of(effect)
-    changed = replace(question, assembly=effect.apply(question.assembly, x))
-    built = structure(changed.assembly)
-    data, old = prepared.search.data, prepared.search
-    top = old.setup.top
-    rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
-    bench = workbench(
-        changed.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
-        groups=64 if rows else 48,
-    )  # fmt: skip
-    extra = [e for e in old.nuisance if e.name == "gain"]
-    fresh = _search(
-        changed, bench, data.over(bench.model), [*_nuisance(bench, built, top), *extra], top
-    )
-    again = fresh.trial(effect.begun_at(x), x, fresh.mean())
-    return again

@@ -1,0 +1,67 @@
+"""The named effect fitted once more where the reduced model has left its ground."""
+
+from dataclasses import replace
+
+import scipy.sparse as sp
+
+from ..effects.material import OrthotropicMaterial
+from ..fem.assemble import structure
+from .accuracy import LIMIT, Accuracy, accuracy
+from .likelihood import Responses
+from .prepare import nuisances, searched
+from .question import Prepared, Question
+from .search import Search, Trial, fitted
+from .workbench import workbench
+
+
+def renewed(question: Question, prepared: Prepared, trial: Trial) -> tuple[Trial, str]:
+    """The trial on ground that bears it, and a sentence on how far the reduced model is off.
+
+    Mesh error, jitter and the basis belong to the structure they were made for. Where the material
+    is another one they are made anew; elsewhere the basis is widened by what it lacks, if it lacks
+    more than ``LIMIT``. The same parameters are then fitted from where they were.
+    """
+    search = prepared.search
+    if isinstance(trial.effect, OrthotropicMaterial):
+        search, trial = _on_new_structure(question, search, trial)
+    found = _accuracy(search, trial)
+    if found.serves():
+        return trial, _said(found)
+    model = found.renewed(trial.model)
+    data = trial.data.over(model)
+    fit = fitted(model, trial.fit.effects, data, search.weighing, trial.fit.x)
+    trial = Trial(trial.effect, fit, model)
+    return (
+        trial,
+        f"the basis was renewed, for {_said(found)}; now {_said(_accuracy(search, trial))}",
+    )
+
+
+def _accuracy(search: Search, trial: Trial) -> Accuracy:
+    return accuracy(search.bench, trial.model, trial.fit.effects, trial.fit.x, search.setup.top)
+
+
+def _said(found: Accuracy) -> str:
+    return (
+        f"the frequencies of the reduced model are {found.worst:.2%} off those of the full one at "
+        f"most; {LIMIT:.2%} still serve"
+    )
+
+
+def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Search, Trial]:
+    """A strong change of material fitted again on a structure that has it already."""
+    effect = trial.effect
+    assert isinstance(effect, OrthotropicMaterial)
+    x = trial.fit.of(effect)
+    changed = replace(question, assembly=effect.apply(question.assembly, x))
+    built, data, top = structure(changed.assembly), old.data, old.setup.top
+    rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
+    bench = workbench(
+        changed.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
+        groups=64 if rows else 48,
+    )  # fmt: skip
+    extra = [e for e in old.nuisance if e.name == "gain"]
+    fresh = searched(
+        changed, bench, data.over(bench.model), [*nuisances(bench, built, top), *extra], top
+    )
+    return fresh, fresh.trial(effect.begun_at(x), x, fresh.mean())
