@@ -21,6 +21,7 @@ from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
 THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
+BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end
 
 Progress = Callable[[str, float], None]
@@ -76,7 +77,7 @@ def diagnose(
     trials = []
     for k, (effect, start, base) in enumerate(tried):
         progress(f"trying {effect.name} {effect.text}", 0.3 + 0.4 * k / len(tried))
-        trials.append(search.trial(effect, start, base, ROUGH))
+        trials.append(_tried(search, null, effect, start, base))
     trials = _by_family(trials)
     progress("closing in on the place", 0.7)
     trials = _by_family([*trials[RUNNING:], *(_finished(search, t) for t in trials[:RUNNING])])
@@ -148,6 +149,21 @@ def _null_starts(search: Search) -> list[np.ndarray]:
         return [mean]
     stiff = np.array([p.name == "E" for e in search.base for p in e.parameters], dtype=float)
     return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
+
+
+def _tried(
+    search: Search, null: Trial, effect: Effect, start: np.ndarray, base: np.ndarray
+) -> Trial:
+    """A rough fit; begun anew from the null where it has not even come as far as that.
+
+    With the effect idle a hypothesis is the null: one that stays behind it by more than its price
+    has only stopped on the way.
+    """
+    trial = search.trial(effect, start, base, ROUGH)
+    if trial.S < null.S + BEHIND:
+        return trial
+    again = search.trial(effect, start, null.fit.x, ROUGH)
+    return again if again.S < trial.S else trial
 
 
 def _by_family(trials: list[Trial]) -> list[Trial]:
