@@ -5,7 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.updating.diagnosis import BEHIND, _tried
+from chladni.updating import diagnosis
+from chladni.updating.calibration import Status
+from chladni.updating.diagnosis import BEHIND, Trial, _finished, _tried
+from chladni.updating.likelihood import Responses
 
 NULL = SimpleNamespace(S=100.0, fit=SimpleNamespace(x=np.ones(2)))
 
@@ -34,3 +37,15 @@ def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
     search = Search(first, again)
     assert _tried(search, NULL, None, np.zeros(1), np.zeros(2)).S == end
     assert search.starts == starts
+
+
+@pytest.mark.parametrize("status", list(Status))
+@pytest.mark.parametrize("running", [True, False])
+def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running):
+    """In the running or not: a hypothesis is judged where it comes to rest."""
+    end = SimpleNamespace(S=1.0)
+    monkeypatch.setattr(diagnosis, "fitted", lambda *given: end)
+    left = SimpleNamespace(S=9.0, effects=(), x=np.zeros(1), status=status, data=None)
+    search = SimpleNamespace(data=object.__new__(Responses), weighing=None)
+    got = _finished(search, Trial(None, left, None), running)
+    assert got.S == (1.0 if running or status is Status.OUT_OF_STEPS else 9.0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.somewhere import Somewhere
+from .calibration import Status
 from .candidates import candidates, point_effect
 from .likelihood import Data, Poles, Responses
 from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
@@ -22,7 +23,7 @@ THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own nul
 THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
-RUNNING = 3  # families that are fitted to the end
+RUNNING = 3  # families that are fitted to the end, at rest or not
 
 Progress = Callable[[str, float], None]
 
@@ -80,7 +81,7 @@ def diagnose(
         trials.append(_tried(search, null, effect, start, base))
     trials = _by_family(trials)
     progress("closing in on the place", 0.7)
-    trials = _by_family([*trials[RUNNING:], *(_finished(search, t) for t in trials[:RUNNING])])
+    trials = _by_family([_finished(search, t, k < RUNNING) for k, t in enumerate(trials)])
     trials = _by_family([*trials, *(t for lead in trials[:RUNNING] for t in _closer(search, lead))])
     null = _restarted(search, null, trials)
     progress("verdict", 0.95)
@@ -175,9 +176,10 @@ def _by_family(trials: list[Trial]) -> list[Trial]:
     return sorted(best.values(), key=lambda t: t.S)
 
 
-def _finished(search: Search, trial: Trial) -> Trial:
-    """The same hypothesis fitted to the end, from where a rough fit left it."""
-    if not isinstance(search.data, Responses):
+def _finished(search: Search, trial: Trial, running: bool) -> Trial:
+    """A hypothesis in the running, or not yet at rest, fitted to the end from where it is."""
+    at_rest = trial.fit.status is not Status.OUT_OF_STEPS
+    if not isinstance(search.data, Responses) or (at_rest and not running):
         return trial
     fit = fitted(trial.model, trial.fit.effects, trial.data, search.weighing, trial.fit.x)
     return Trial(trial.effect, fit, trial.model) if fit.S < trial.S else trial
