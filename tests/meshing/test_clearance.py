@@ -7,6 +7,7 @@ from chladni.meshing.clearance import clearances, gaps
 from chladni.model.connections import spot_welds
 from chladni.model.mesher import grid
 from chladni.model.mesher_sheets import MAIN, Sheet
+from chladni.model.plates import folded_panel
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni.model.tailgate import of_sheets
 
@@ -102,3 +103,10 @@ def test_places_near_a_joint_are_not_free():
     distance = np.linalg.norm(assembly.points[found.rows, :2] - (0.1, 0.05), axis=1)
     assert not found.free[distance < 0.014].any()
     assert found.free[distance > 0.023].all()
+
+
+def test_a_fold_is_no_gap():
+    """Two parts that share the grids of a fold are held together there: no place is free."""
+    g = gaps(folded_panel(), "panel", "flanges")
+    assert len(g.rows)
+    assert not g.free.any()

@@ -148,8 +148,11 @@ def _clearance(job: Run, model: Model, modal: ModalModel | None, chosen: list[in
     from ..view import scene
 
     found = all_gaps(model.assembly, both_ways=True)
-    if not found:
-        raise FileError(f"{job.source} has no two parts of shells within {1e3 * _NEAR:g} mm")
+    if not any(g.free.any() for g in found):
+        raise FileError(
+            f"{job.source} has no two parts of shells within {1e3 * _NEAR:g} mm of each other but "
+            "where they are joined; leave out --clearance"
+        )
     pairs = sorted(
         (summary(model.assembly, g) for g in found if g.parts[0] < g.parts[1]),
         key=lambda pair: pair.least_free,

@@ -125,9 +125,11 @@ def _gaps(
     t, error = (
         v[rows] + (v[opposite] * weight).sum(axis=1) for v in (sheets.thickness, sheets.error)
     )
+    shared = assembly.points[np.intersect1d(a.nodes, b.nodes)]  # a fold holds two parts together
+    joints = np.concatenate([sheets.joints, shared])
     free = np.ones(len(rows), bool)
-    if len(sheets.joints):
-        free = cKDTree(sheets.joints).query(assembly.points[rows])[0] > away
+    if len(joints):
+        free = cKDTree(joints).query(assembly.points[rows])[0] > away
     return Gaps(
         names,
         rows,
