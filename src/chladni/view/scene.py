@@ -199,7 +199,7 @@ def sensors(
     ):
         _arrows(ax, camera, markers, colour, reach, name)
     if outputs or inputs:
-        ax.legend(loc="upper right", bbox_to_anchor=(1.0, -0.01), ncols=2, **paper.LEGEND)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=2, **paper.LEGEND)
     _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
@@ -224,7 +224,10 @@ def location(
     if point is not None:
         _circle(ax, camera, np.asarray(point), radius)
     if text:
-        ax.set_title(fill(text, 72), **paper.TITLE)
+        top = 0.0 if point is None else camera.project(np.asarray(point)[None])[0][1] + radius
+        low, high = camera.window[2], camera.window[3]
+        above = max(1.0, (top - low) / (high - low))  # clear of the circle
+        ax.set_title(fill(text, 72), y=above, **paper.TITLE)
     _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
