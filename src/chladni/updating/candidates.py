@@ -163,7 +163,10 @@ def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
 
 
 def _faults(search: Search, null: Trial, data: Responses) -> list[Candidate]:
-    """The three channels whose level or sign departs most from the calibrated model."""
+    """The two channels whose level or sign departs most from the calibrated model.
+
+    Each begins from that model and from the nominal one: a wrong channel bends the calibration.
+    """
     delta = data.deviation(null.fit.state)
     lines = data.use.any(axis=1)
     out = []
@@ -179,8 +182,9 @@ def _faults(search: Search, null: Trial, data: Responses) -> list[Candidate]:
         out.append((gain, i, -1 if flipped else 1, start))
     best = sorted(out, reverse=True)[:2]
     return [
-        (sensor_fault(search.labels[i], i, n, sign, start), np.array([start]), null.fit.x)
+        (sensor_fault(search.labels[i], i, n, sign, start), np.array([start]), base)
         for _, i, sign, start in best
+        for base in (null.fit.x, search.mean())
     ]
 
 

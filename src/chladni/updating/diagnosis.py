@@ -39,6 +39,7 @@ class Diagnosis:
     trials : best trial of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
+    written : the named effect as a deck can hold it, once the held-out data have been heard
     """
 
     nominal: Trial
@@ -47,6 +48,7 @@ class Diagnosis:
     trials: tuple[Trial, ...]
     verdict: str
     notes: tuple[str, ...] = ()
+    written: Trial | None = None
 
     @property
     def found(self) -> Trial | None:

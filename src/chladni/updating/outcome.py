@@ -17,7 +17,7 @@ from .diagnosis import Diagnosis, threshold, verdict
 from .likelihood import Poles, Responses
 from .question import Prepared, Question
 from .reduced import State, evaluate
-from .search import Search, Trial, deck_state
+from .search import Search, Trial, as_written
 
 FIRST = 8  # paired frequencies over which the rms is reported
 
@@ -36,9 +36,11 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     found = diagnosis.found
     nothing = diagnosis.verdict == "nothing missing"
     calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.plain)
-    keep = found is not None and found.effect.kind != "test"
-    final = applied(question.assembly, found) if keep and found is not None else calibrated
-    return Models(question.assembly, calibrated, final)
+    if found is None or found.effect.kind == "test":
+        return Models(question.assembly, calibrated, calibrated)
+    return Models(
+        question.assembly, calibrated, applied(question.assembly, diagnosis.written or found)
+    )
 
 
 def applied(assembly: Assembly, trial: Trial) -> Assembly:
@@ -93,16 +95,18 @@ VETO = 0.8  # held-out Q, over that of plain calibration, above which nothing is
 
 
 def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
-    """The verdict once the held-out data have been heard.
+    """The verdict once the held-out data have been heard, and the named effect as written.
 
-    An effect that fits but does not help on data the fit never saw is not named.
+    An effect that fits but does not help on data the fit never saw is not named. A fault of a
+    channel must only not harm: it may be small beside what else is left there.
     """
     if diagnosis.found is None:
         return diagnosis
-    held = scores(prepared, diagnosis)[1]
-    if not held.effect > VETO * held.calibrated:
-        return diagnosis
     lead = diagnosis.trials[0]
+    diagnosis = replace(diagnosis, written=as_written(lead, prepared.search.weighing))
+    held = scores(prepared, diagnosis)[1]
+    if not held.effect > (1.0 if lead.effect.kind == "test" else VETO) * held.calibrated:
+        return diagnosis
     note = (
         f"{lead.effect.name} gained {diagnosis.gain(lead):.0f} in -2 ln evidence but left the "
         f"held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, so it is not "
@@ -134,7 +138,7 @@ def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[T
     nominal = evaluate(null.model, search.base, search.mean(), False)
     final = plain.fit.state
     if diagnosis.found is not None:
-        final = evaluate(winner.model, winner.fit.effects, deck_state(winner), False)
+        final = (diagnosis.written or as_written(winner, search.weighing)).fit.state
     elif diagnosis.verdict == "nothing missing":
         final = nominal
     last = winner if diagnosis.found is not None else null
@@ -309,7 +313,7 @@ def as_dict(
     """``diagnosis.json`` but for the files."""
     fitted, held = scores(prepared, diagnosis)
     found = diagnosis.found
-    last = found or diagnosis.null
+    last, deck = found or diagnosis.null, diagnosis.written or found or diagnosis.plain
     every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
     rows = frequency_table(question, prepared, every, real_poles(prepared, last))
     weighing = question.weighing
@@ -328,9 +332,9 @@ def as_dict(
         },
         "calibrated": [
             {"where": e.text, **row}
-            for e in last.fit.effects
+            for e in deck.fit.effects
             if e.kind == "ordinary"
-            for row in e.reported(last.fit.of(e), last.fit.sd(e))
+            for row in e.reported(deck.fit.of(e), deck.fit.sd(e))
         ],
         "mass": {
             "weighed_kg": None if weighing is None else weighing.mass,

@@ -144,13 +144,21 @@ def _scale_prior(scale: float, median: float = 0.006) -> float:
     return float((np.log(scale / median) / SCALE_SD) ** 2)
 
 
-def deck_state(trial: Trial) -> np.ndarray:
-    """Parameters of a trial without scatter and jitter, which no deck can hold."""
-    x = trial.fit.x.copy()
-    at = 0
-    for e in trial.fit.effects:
-        n = len(e.parameters)
-        if e.name in NEVER_WRITTEN:
-            x[at : at + n] = [p.mean for p in e.parameters]
-        at += n
-    return x
+HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
+
+
+def as_written(trial: Trial, weighing: Weighing | None) -> Trial:
+    """The trial as a deck can hold it: without scatter and jitter, the effect held.
+
+    The ordinary parameters are fitted anew, for they were found beside a scatter that is not
+    there any more; calibration without the effect does the same.
+    """
+    x = trial.fit.of(trial.effect)
+    unknown = tuple(
+        replace(p, mean=float(v), sd=HELD) for p, v in zip(trial.effect.parameters, x, strict=True)
+    )
+    held = replace(trial.effect, parameters=unknown)
+    kept = [e for e in trial.fit.effects if e.name not in NEVER_WRITTEN]
+    start = np.concatenate([trial.fit.of(e) for e in kept])
+    effects = [held if e is trial.effect else e for e in kept]
+    return Trial(held, fit(trial.model, effects, trial.data, weighing, start), trial.model)

@@ -1,0 +1,37 @@
+"""A deck holds no scatter: what is written is the best without it, the effect as it was found."""
+
+import numpy as np
+import pytest
+
+from chladni.effects.ordinary import ordinary, scatter
+from chladni.effects.thickness import thickness_distribution
+from chladni.updating.calibration import fit
+from chladni.updating.reduced import evaluate
+from chladni.updating.search import Trial, as_written
+
+
+@pytest.fixture(scope="module")
+def trial(bench, responses):
+    effect = thickness_distribution(bench.sheet, 0, 1)
+    effects = [ordinary(bench.sheet, "E", [0]), scatter(bench.sheet, "t", 0.05), effect]
+    start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
+    data = responses.over(bench.model)
+    return Trial(effect, fit(bench.model, effects, data, None, start), bench.model)
+
+
+def test_scatter_is_gone_and_the_effect_stays(trial):
+    """E is all that moves."""
+    deck = as_written(trial, None)
+    assert [e.name for e in deck.fit.effects] == ["part-scale", "thickness-distribution"]
+    assert deck.fit.of(deck.effect) == pytest.approx(trial.fit.of(trial.effect), abs=5e-3)
+
+
+def test_is_the_best_without_scatter(trial):
+    """Never worse than leaving the scatter out of what was found."""
+    deck = as_written(trial, None)
+    left = evaluate(
+        trial.model, deck.fit.effects,
+        np.concatenate([trial.fit.of(trial.fit.effects[0]), trial.fit.of(trial.effect)]), False,
+    )  # fmt: skip
+    r, _ = trial.data.residual(left, False)
+    assert deck.fit.misfit <= r @ r + 1e-6
