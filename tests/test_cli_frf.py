@@ -113,11 +113,13 @@ def test_a_card_is_left_out_on_request_only(tmp_path):
 def test_what_modes_do_not_need_does_not_stop_them(tmp_path):
     """A load that cannot be understood, a reduction that is passed over and said to be."""
     deck, out = tmp_path / "two.bdf", tmp_path / "out"
-    more = "DLOAD,50,1.,1.,51\nTLOAD1,51,7,,,8\nASET1,1,1\nENDDATA"
+    more = "DLOAD,50,1.,1.,51\nTLOAD1,51,7,,,8\nASET1,1,1\nPELAST,9,3\nENDDATA"
     deck.write_text(TWO.replace("ENDDATA", more))
     done = call("modes", deck, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "ASET1 (static reduction) is left out" in (out / "report.html").read_text()
+    page = (out / "report.html").read_text()
+    assert "ASET1 (static reduction) is left out" in page
+    assert "PELAST (stiffness that follows the frequency) is left out" in page
     refused = call("frf", deck, "--out", tmp_path / "frf")
     assert refused.exit_code == 2
     assert "no RLOAD1 or RLOAD2 51" in refused.output

@@ -111,9 +111,9 @@ class DeckModels:
     def model(self, subcase: int | None = None) -> Model:
         """The model under the supports and equations of a subcase, or of the one for modes."""
         from ..meshing.nastran import assembly
-        from ..meshing.nastran.analysis import REDUCED, left_out
+        from ..meshing.nastran.analysis import STRUCTURAL, left_out
 
-        made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, REDUCED)
+        made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
         return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
 
 

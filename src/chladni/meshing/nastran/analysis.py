@@ -16,8 +16,13 @@ _LEFT_OUT = {
     "ACCEL1": "acceleration fields", "FORCE2": "forces along a cross product",
     "OMIT": "static reduction", "OMIT1": "static reduction", "ASET": "static reduction",
     "ASET1": "static reduction", "TABLED4": "power-series tables",
+    "PBUSHT": "stiffness and damping that follow the frequency",
+    "PELAST": "stiffness that follows the frequency",
+    "PDAMPT": "damping that follows the frequency",
 }  # fmt: skip
-REDUCED = ("OMIT", "OMIT1", "ASET", "ASET1")  # Guyan's: its frequencies are not the structure's
+STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the frequency
+    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT",
+)  # fmt: skip
 
 
 def analysis(deck: Deck, units: Units | None = None) -> Analysis:
