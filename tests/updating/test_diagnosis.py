@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.errors import ModelError
 from chladni.updating import diagnosis
 from chladni.updating.calibration import Status
 from chladni.updating.diagnosis import BEHIND, Trial, _finished, _tried
@@ -21,6 +22,8 @@ class Search:
 
     def trial(self, effect, start, base, steps):
         self.starts.append(float(base[0]))
+        if self.ends[float(base[0])] is None:
+            raise ModelError("an effect left negative stiffness")
         return SimpleNamespace(S=self.ends[float(base[0])])
 
 
@@ -31,11 +34,14 @@ class Search:
         (100.0 + BEHIND - 1, 0.0, [0.0], 100.0 + BEHIND - 1),  # behind by its price only
         (5000.0, 80.0, [0.0, 1.0], 80.0),  # stopped on the way
         (5000.0, 9000.0, [0.0, 1.0], 5000.0),  # the better of both
+        (None, 80.0, [0.0, 1.0], 80.0),  # the first start is no structure
+        (5000.0, None, [0.0, 1.0], 5000.0),
     ],
 )
 def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
     search = Search(first, again)
-    assert _tried(search, NULL, None, np.zeros(1), np.zeros(2)).S == end
+    found = _tried(search, NULL, None, np.zeros(1), np.zeros(2))
+    assert min(t.S for t in found) == end
     assert search.starts == starts
 
 

@@ -8,12 +8,14 @@
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.somewhere import Somewhere
+from ..errors import ModelError
 from .calibration import Status
 from .candidates import candidates, point_effect
 from .likelihood import Data, Poles, Responses
@@ -80,7 +82,7 @@ def diagnose(
     trials = []
     for k, (effect, start, base) in enumerate(tried):
         progress(f"trying {effect.name} {effect.text}", 0.3 + 0.4 * k / len(tried))
-        trials.append(_tried(search, null, effect, start, base))
+        trials += _tried(search, null, effect, start, base)
     trials = _by_family(trials)
     progress("closing in on the place", 0.7)
     trials = _by_family([_finished(search, t, k < RUNNING) for k, t in enumerate(trials)])
@@ -156,17 +158,19 @@ def _null_starts(search: Search) -> list[np.ndarray]:
 
 def _tried(
     search: Search, null: Trial, effect: Effect, start: np.ndarray, base: np.ndarray
-) -> Trial:
-    """A rough fit; begun anew from the null where it has not even come as far as that.
+) -> list[Trial]:
+    """Rough fits; the second begins at the null, where the first has not even come as far as that.
 
     With the effect idle a hypothesis is the null: one that stays behind it by more than its price
-    has only stopped on the way.
+    has only stopped on the way. A start that is no structure at all (negative stiffness) is none.
     """
-    trial = search.trial(effect, start, base, ROUGH)
-    if trial.S < null.S + BEHIND:
-        return trial
-    again = search.trial(effect, start, null.fit.x, ROUGH)
-    return again if again.S < trial.S else trial
+    out: list[Trial] = []
+    for x in (base, null.fit.x):
+        if out and out[0].S < null.S + BEHIND:
+            break
+        with suppress(ModelError):
+            out.append(search.trial(effect, start, x, ROUGH))
+    return out
 
 
 def _by_family(trials: list[Trial]) -> list[Trial]:
@@ -199,7 +203,10 @@ def _closer(search: Search, lead: Trial) -> list[Trial]:
             search, "M" if effect.matrix == "M" else "K", grids, grids.position(effect.nearest(x))
         )
         start = np.array([x[0], 0.0, 0.0])
-        trial = search.trial(new, start, _taken(search, lead, ("ordinary",)))
+        try:
+            trial = search.trial(new, start, _taken(search, lead, ("ordinary",)))
+        except ModelError:
+            break
         out.append(trial)
         if trial.S > lead.S - 1:
             break
@@ -220,6 +227,9 @@ def _taken(search: Search, lead: Trial, kinds: tuple[str, ...]) -> np.ndarray:
 
 def _restarted(search: Search, null: Trial, trials: list[Trial]) -> Trial:
     """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
-    starts = [_taken(search, lead, ("ordinary", "nuisance")) for lead in trials[:2]]
-    again = _base_trial(search, search.base, starts) if starts else null
-    return again if again.S < null.S else null
+    tries = [null]
+    for lead in trials[:2]:
+        with suppress(ModelError):
+            start = _taken(search, lead, ("ordinary", "nuisance"))
+            tries.append(_base_trial(search, search.base, [start]))
+    return min(tries, key=lambda t: t.S)
