@@ -56,6 +56,17 @@ def test_a_hole_takes_its_area_and_nothing_else(h, area):
     assert (up > 0).all()
 
 
+@pytest.mark.parametrize(("h", "rows"), [(0.012, 1), (0.0042, 9)])
+def test_a_narrow_strip_or_small_cells_take_a_hole(h, rows):
+    """One cell of 12 mm across, no inner node; neighbours of a node 1.2 radii away."""
+    whole = sheet(*grid(np.arange(0, 0.1001, h), h * np.arange(rows + 1)))
+    made, centre = bored(whole, np.array([0.05, h * rows / 2]), R, flat, space)
+    assert euler(made) == euler(whole) - 1
+    assert np.linalg.norm(centre - [0.05, h * rows / 2]) < h
+    with pytest.raises(ModelError, match="no room"):
+        bored(whole, np.array([0.05, 0.2]), R, flat, space)
+
+
 def test_a_hole_in_a_mesh_with_triangles():
     """Any node of a free mesh can be opened; what is left has the area less the polygon's."""
     border = np.array([(0, 0), (0.1, 0), (0.13, 0.05), (0.1, 0.1), (0, 0.1)], dtype=float)
@@ -76,7 +87,7 @@ def test_a_hole_in_a_mesh_with_triangles():
 
 def test_a_hole_wider_than_the_cells_is_refused():
     with pytest.raises(ModelError, match=r"no room for a hole of 7 mm near y 0.050 m"):
-        bored(lattice(0.004), np.array([0.05, 0.05]), R, flat, space)
+        bored(lattice(0.0036), np.array([0.05, 0.05]), R, flat, space)
 
 
 def loops(quads):

@@ -14,7 +14,11 @@ from .mesher_pairing import edges_of
 from .mesher_sheets import MAIN, Depth, Sheet
 
 _ROOM = 1.8  # radii that a hole's middle keeps from the sides of the cell it lies in
+_TIGHT = 1.45  # the same where nothing else can take it; the square's corners lie at 1.25
 _SPOKE = 1.4  # radii that the neighbours of an opened node are away at least
+_CLOSE = 1.1  # the same where nothing else can take it
+_LOOKED = 6  # cells and nodes that are looked at
+_FAR = 8.0  # radii from the place wanted beyond which a hole is another hole
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,9 @@ def bored(
         If neither a cell nor a node of the sheet near the place can take the hole.
     """
     options = [*_cells(sheet, place, radius), *_nodes(sheet, place, radius)]
+    options = options or _cells(sheet, place, radius, _TIGHT)
+    options = options or _nodes(sheet, place, radius, _CLOSE)
+    options = [o for o in options if np.linalg.norm(o.centre - place) < _FAR * radius]
     if not options:
         raise ModelError(
             f"{sheet.name}: no room for a hole of {2e3 * radius:g} mm near y {place[0]:.3f} m, "
@@ -60,34 +67,34 @@ def _only(sheet: Sheet, row: int) -> np.ndarray:
     return np.arange(len(sheet.quads)) == row
 
 
-def _cells(sheet: Sheet, place: np.ndarray, radius: float) -> list[_Choice]:
+def _cells(sheet: Sheet, place: np.ndarray, radius: float, room: float = _ROOM) -> list[_Choice]:
     """Cells near the place that can take the hole in their midst."""
     x = sheet.plan[sheet.quads][..., :2]
     whole = (sheet.zone == MAIN) & (sheet.quads[:, 2] != sheet.quads[:, 3])
-    near = np.argsort(np.linalg.norm(x.mean(axis=1) - place, axis=1), kind="stable")[:6]
+    near = np.argsort(np.linalg.norm(x.mean(axis=1) - place, axis=1), kind="stable")
     found = []
-    for row in near[whole[near]].tolist():
+    for row in near[whole[near]][:_LOOKED].tolist():
         u = (x[row, 1] + x[row, 2] - x[row, 0] - x[row, 3]) / 4
         v = (x[row, 2] + x[row, 3] - x[row, 0] - x[row, 1]) / 4
         middle = x[row].mean(axis=0)
         high = abs(u[0] * v[1] - u[1] * v[0]) / np.array([np.linalg.norm(v), np.linalg.norm(u)])
-        room = 1 - _ROOM * radius / high  # of the natural coordinates
-        if (room > 0).all():
-            at = np.clip(np.linalg.solve(np.column_stack([u, v]), place - middle), -room, room)
+        play = 1 - room * radius / high  # of the natural coordinates
+        if (play > 0).all():
+            at = np.clip(np.linalg.solve(np.column_stack([u, v]), place - middle), -play, play)
             found.append(_Choice(middle + at @ np.stack([u, v]), row, False))
     return found
 
 
-def _nodes(sheet: Sheet, place: np.ndarray, radius: float) -> list[_Choice]:
+def _nodes(sheet: Sheet, place: np.ndarray, radius: float, spoke: float = _SPOKE) -> list[_Choice]:
     """Inner nodes near the place whose neighbours are far enough away."""
     plan = sheet.plan[:, :2]
     sides, count = np.unique(edges_of(sheet.quads), axis=0, return_counts=True)
     rim = np.unique(np.r_[sides[count == 1].ravel(), sheet.quads[sheet.zone != MAIN].ravel()])
-    near = np.argsort(np.linalg.norm(plan - place, axis=1), kind="stable")[:6]
+    near = np.argsort(np.linalg.norm(plan - place, axis=1), kind="stable")
     found = []
-    for row in near[~np.isin(near, rim)].tolist():
+    for row in near[~np.isin(near, rim)][:_LOOKED].tolist():
         ends = sides[np.any(sides == row, axis=1)].sum(axis=1) - row
-        if np.linalg.norm(plan[ends] - plan[row], axis=1).min() > _SPOKE * radius:
+        if np.linalg.norm(plan[ends] - plan[row], axis=1).min() > spoke * radius:
             found.append(_Choice(plan[row], row, True))
     return found
 
