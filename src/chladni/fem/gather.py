@@ -136,13 +136,11 @@ def accumulate(
 
 
 def _csr(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csr_array:
-    """Without the zeros, where they are many."""
+    """Without the zeros; the index arrays are taken over."""
     n = len(indptr) - 1
-    if np.count_nonzero(data) < 0.95 * len(data):
-        kept = np.flatnonzero(data)
-        data, indices = data[kept], indices[kept]
-        indptr = np.searchsorted(kept, indptr).astype(np.int32)
-    return sp.csr_array((data, indices, indptr), shape=(n, n))
+    out = sp.csr_array((data, indices, indptr), shape=(n, n))
+    out.eliminate_zeros()
+    return out
 
 
 def blocks(matrices: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array:
