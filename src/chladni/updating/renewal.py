@@ -31,10 +31,8 @@ def renewed(question: Question, prepared: Prepared, trial: Trial) -> tuple[Trial
     data = trial.data.over(model)
     fit = fitted(model, trial.fit.effects, data, search.weighing, trial.fit.x)
     trial = Trial(trial.effect, fit, model)
-    return (
-        trial,
-        f"the basis was renewed, for {_said(found)}; now {_said(_accuracy(search, trial))}",
-    )
+    after = _accuracy(search, trial).worst
+    return trial, f"{_said(found)}; with what it lacked added to its basis, {after:.2%}"
 
 
 def _accuracy(search: Search, trial: Trial) -> Accuracy:
