@@ -234,6 +234,16 @@ def test_a_model_correlates_with_itself(case, tmp_path):
     assert {"correlation.json", "mac.png", "frequencies.png", "frf_fitted.png"} < names
 
 
+def test_frf_of_a_case_is_what_its_recording_holds(case, tmp_path):
+    """The recording was made of the same model: its lines, its labels, its values."""
+    done = call("frf", case, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    here, there = np.load(tmp_path / "out" / "frf.npz"), np.load(case / "frf.npz")
+    assert here["outputs"].tolist() == there["outputs"].tolist()
+    H, due = here["values"], there["values"]
+    np.testing.assert_allclose(H, due, atol=1e-4 * np.abs(due).max())
+
+
 def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     out = tmp_path / "out"
     done = call("identify", case, "--out", out)

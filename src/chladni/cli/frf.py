@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import typer
 
+from ..case import load_case
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, Quantity, residual_flexibility
@@ -19,6 +20,7 @@ from ..errors import FileError, LabelError
 from ..model.analysis import Analysis, Subcase
 from ..report.blocks import Picture, Table
 from ..report.words import number
+from .case_model import model_frf
 from .model import DeckModels, Model, is_case, load_deck, load_model
 from .run import Allow, Out, Run, Units, started
 
@@ -46,13 +48,18 @@ def run(
     allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Frequency responses between degrees of freedom; without --input those the deck asks for."""
+    """Frequency responses between degrees of freedom.
+
+    Without --input those the deck asks for, or of a case those its first recording holds.
+    """
     low, high = limits(band)
     if quantity not in UNIT:
         raise LabelError(f"no quantity {quantity!r}; there are {', '.join(UNIT)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
-        if not input:
+        if not input and is_case(source):
+            found = [of_case(job, source, damping)]
+        elif not input:
             found = of_deck(job, source, units, allow or [], output or [])
         else:
             model, frequency = load_model(source, units, allow or ()), np.linspace(low, high, lines)
@@ -153,6 +160,20 @@ def _from_base(
     )
 
 
+def of_case(job: Run, source: Path, damping: float) -> FRF:
+    """The model's responses on the lines, labels and quantity of a case's first recording."""
+    case = load_case(source)
+    if not case.frfs:
+        raise FileError(f"{source} holds no FRF; give --input and --output, as --input 12:+Z")
+    test = case.frfs[0]
+    test = test.sel(band=(max(float(test.frequency[0]), 1e-6), float(test.frequency[-1])))
+    model = Model(case.path, case.assembly)
+    ratio = case.damping or damping
+    job.notes.append(f"Lines and places are those of the recording; every mode has {ratio:.2g}.")
+    modal = _modes(job, model, float(test.frequency[-1]), ratio)
+    return model_frf(case, model, modal, test)
+
+
 def of_deck(
     job: Run, source: Path, units: str | None, allow: Sequence[str], outputs: Sequence[str]
 ) -> list[FRF]:
@@ -163,10 +184,8 @@ def of_deck(
     Raises
     ------
     FileError
-        If it is a case, or a deck that asks for no frequency response.
+        If the deck asks for no frequency response.
     """
-    if is_case(source):
-        raise FileError(f"{source}: a case needs --input and --output, as --input 12:+Z")
     models = load_deck(source, units, allow)
     asked = models.analysis
     cases = [c for c in asked.subcases if c.dload and c.frequency]
