@@ -7,7 +7,7 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, ShellSection
-from .effect import Effect, FieldChange, Parameter
+from .effect import WIDER, Effect, FieldChange, Parameter
 from .sheet import Sheet
 
 
@@ -41,7 +41,7 @@ class OrthotropicMaterial(Effect):
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
         """E1, E2, G12 and nu12."""
         rows = super().reported(x, sd)
-        nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * 2 * sd[3]))[3] for s in (-1, 0, 1)]
+        nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * WIDER * sd[3]))[3] for s in (-1, 0, 1)]
         last = {"name": "nu12", "value": nu[1], "unit": "-", "low": nu[0], "high": nu[2]}
         return [*rows[:3], last]
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ..model.assembly import Assembly
-from .effect import Effect, FieldChange, Parameter
+from .effect import WIDER, Effect, FieldChange, Parameter
 from .sheet import Sheet
 
 
@@ -63,7 +63,7 @@ class ThicknessDistribution(Effect):
         """The deepest thinning on the sheet and the radius R; the place stands in ``settled``."""
         rows = super().reported(x, sd)
         there = float(self._bump(x, self._deepest(x)[1][None])[0])
-        value, low, high = (there * thinning(x[0] + s * 1.96 * 2 * sd[0]) for s in (0, -1, 1))
+        value, low, high = (there * thinning(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
         return [{**rows[0], "value": value, "low": low, "high": high}, rows[1]]
 
     def settled(self, x: np.ndarray) -> dict[str, Any]:
