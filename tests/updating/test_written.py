@@ -1,11 +1,18 @@
 """A deck holds no scatter: what is written is the best without it, the effect as it was found."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary, scatter
 from chladni.effects.thickness import thickness_distribution
+from chladni.updating import outcome
 from chladni.updating.calibration import fit
+from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.outcome import Scores
 from chladni.updating.reduced import evaluate
 from chladni.updating.search import Trial, as_written
 
@@ -35,3 +42,16 @@ def test_is_the_best_without_scatter(trial):
     )  # fmt: skip
     r, _ = trial.data.residual(left, False)
     assert deck.fit.misfit <= r @ r + 1e-6
+
+
+def test_what_the_held_out_data_refuse_is_not_written(monkeypatch, trial):
+    """No name, and nothing of it in the deck that is reported."""
+    refused = Scores(1.0, 1.0, 2.0, 1.0)
+    monkeypatch.setattr(outcome, "scores", lambda prepared, diagnosis: (refused, refused))
+    null = Trial(Effect(), replace(trial.fit, S=trial.S + 1e6), trial.model)
+    found = Diagnosis(null, null, null, (trial,), "missing physics")
+    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
+    judged = outcome.judged(prepared, found)
+    assert judged.found is None
+    assert judged.written is None
+    assert "so it is not named" in judged.notes[-1]

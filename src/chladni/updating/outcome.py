@@ -113,7 +113,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         "named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
-    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note))
+    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note), written=None)
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
@@ -316,7 +316,7 @@ def as_dict(
     last, deck = found or diagnosis.null, diagnosis.written or found or diagnosis.plain
     every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
     rows = frequency_table(question, prepared, every, real_poles(prepared, last))
-    weighing = question.weighing
+    weighing, left = question.weighing, structured(prepared, diagnosis)
     what = prepared.what
     if last.effect.channels:
         what = f"channel {', '.join(last.effect.channels)} on the lines held out of {what}"
@@ -341,6 +341,6 @@ def as_dict(
             "model_kg": mass_properties(stages.final)[0],
         },
         "frequencies": rows,
-        "structured": structured(prepared, diagnosis),
-        "notes": [*prepared.notes, *diagnosis.notes, structured(prepared, diagnosis)["sentence"]],
+        "structured": left,
+        "notes": [*prepared.notes, *diagnosis.notes, left["sentence"]],
     }
