@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.effects.sheet import sheet
-from chladni.effects.thickness import sheets, surface, thickness_distribution
+from chladni.effects.thickness import surface, thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Shells
 from chladni.model.plates import folded_panel, plate
@@ -35,7 +35,7 @@ def test_sheets_that_share_no_grid_are_two():
     one = plate(0.4, 0.3, 8, 6, 1e-3)
     two = stacked(one, 1.5e-3)
     cloth = sheet(structure(two))
-    assert len(set(sheets(cloth).tolist())) == 2
+    assert len(set(cloth.connected.tolist())) == 2
     effect = thickness_distribution(cloth, 0, 2)
     shells = two.shells
     changed = effect.apply(two, np.array([1.0, -1.0, 0.0, 0.0])).shells.thickness

@@ -6,8 +6,11 @@ and the reduced model never goes back to elements.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from ..fem import shell
 from ..fem.assemble import Structure
@@ -43,6 +46,16 @@ class Sheet:
 
     def __len__(self) -> int:
         return len(self.area)
+
+    @cached_property
+    def connected(self) -> np.ndarray:
+        """Which connected sheet each group belongs to (g,): parts that share grids are one."""
+        assembly, parts = self.structure.assembly, self.part[self.group]
+        touch = sp.coo_array(
+            (np.ones(4 * len(parts)), (np.repeat(parts, 4), self.nodes.ravel())),
+            shape=(len(assembly.parts), len(assembly.points)),
+        ).tocsr()
+        return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
     def project(
         self, matrices: np.ndarray, left: np.ndarray, right: np.ndarray | None = None

@@ -4,8 +4,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
@@ -99,8 +97,7 @@ def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDi
     The unknown place is paid for by the spread of u and v; ``places`` counts the sheets tried.
     """
     part = int(sheet.part[group])
-    own = sheets(sheet)
-    inside = own == own[group]
+    inside = sheet.connected == sheet.connected[group]
     assembly = sheet.structure.assembly
     grids = np.unique(sheet.nodes[inside[sheet.group]])
     size = float(np.sqrt(sheet.area[sheet.part == part].sum()))
@@ -159,13 +156,3 @@ def surface(sheet: Sheet, group: int, size: float) -> Surface:
     ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
     bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
     return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
-
-
-def sheets(sheet: Sheet) -> np.ndarray:
-    """Which sheet each group belongs to (g,): parts that share grids are one."""
-    parts = sheet.part[sheet.group]
-    touch = sp.coo_array(
-        (np.ones(4 * len(parts)), (np.repeat(parts, 4), sheet.nodes.ravel())),
-        shape=(len(sheet.structure.assembly.parts), len(sheet.structure.assembly.points)),
-    ).tocsr()
-    return np.asarray(connected_components(touch @ touch.T, directed=False)[1][sheet.part])

@@ -8,7 +8,7 @@ from scipy.stats import norm, qmc
 from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.sensors import sensor_fault
-from ..effects.thickness import sheets, thickness_distribution
+from ..effects.thickness import thickness_distribution
 from ..errors import ModelError
 from .likelihood import LN10, Poles, Responses
 from .reduced import evaluate
@@ -141,7 +141,7 @@ RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
 def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Local thinning: its slope at every group and radius, the two best places per baseline."""
     sheet = search.bench.sheet
-    count = len(set(sheets(sheet).tolist()))
+    count = len(set(sheet.connected.tolist()))
     tried = [thickness_distribution(sheet, g, count) for g in range(len(sheet))]
     effects = [e for e in tried for _ in RADII]
     starts = [np.array([-2.0, np.log(radius), 0.0, 0.0]) for _ in tried for radius in RADII]
@@ -205,7 +205,7 @@ def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
 def _thin_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
     sheet = search.bench.sheet
     some = catalogue.spread(sheet.centre, 30)
-    count = len(set(sheets(sheet).tolist()))
+    count = len(set(sheet.connected.tolist()))
     effects: list[Effect] = [thickness_distribution(sheet, int(g), count) for g in some]
     return _best_of(search, bases, effects, sheet.centre[some])
 
