@@ -4,19 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
-from chladni.case import Places as CasePlaces
 from chladni.case import load_case
 from chladni.cli.model import load_model
+from chladni.cli.question import question
 from chladni.effects.effect import Effect, Parameter
 from chladni.ema.pretest import Linearised
 from chladni.errors import FileError
 from chladni.planning import Wishes, find_places
 from chladni.planning.plan import motion, mounts_at, seen_at, target_modes
 from chladni.planning.rattle import openings
-from chladni.updating.calibration import Weighing
 from chladni.updating.likelihood import Responses
 from chladni.updating.prepare import prepare
-from chladni.updating.question import Places, Prepared, Question
+from chladni.updating.question import Prepared
 from chladni.updating.reduced import State, evaluate
 
 from .questions import Question as Calibration
@@ -116,26 +115,6 @@ def _name(effect: Effect, parameter: Parameter) -> str:
 def _prepared(path: str) -> Prepared:
     """The case's first FRF, made ready for updating."""
     case = load_case(path)
-    frf = next((r.frf for r in case.recordings if r.frf is not None), None)
-    if frf is None:
+    if not case.frfs:
         raise FileError(f"{case.path}: no recording holds an FRF")
-    mass, everywhere = case.setup.mass, tuple(p.name for p in case.assembly.parts)
-    question = Question(
-        assembly=case.assembly,
-        outputs=_places(case.outputs),
-        inputs=_places(case.inputs),
-        frf=frf,
-        weighing=None if mass is None else Weighing(mass, case.setup.mass_sd),
-        hangers=case.setup.hangers,
-        band=case.band or (0.0, np.inf),
-        exclude=case.exclude,
-        held_sensors=case.held_sensors,
-        held_band=case.held_band,
-        gain_known=case.gain_known,
-        parameters=tuple((p.field, p.parts or everywhere) for p in case.parameters),
-    )
-    return prepare(question)
-
-
-def _places(p: CasePlaces) -> Places:
-    return Places(p.labels, p.grids, p.points, p.directions, p.sd)
+    return prepare(question(case))
