@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits
 
 from ..case import Case, load_case
 from ..case.repair import changes
-from ..dynamics.eigen import normal_modes
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
 from ..meshing.nastran import assembly, read_deck, write_deck
@@ -22,8 +21,8 @@ from ..updating.outcome import Models, as_dict, judged, models, rms
 from ..updating.prepare import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from .case_model import DAMPING, markers, model_frf
-from .frf import REACH
+from .case_model import DAMPING, markers
+from .frf import modelled
 from .model import Model, is_case
 from .question import question
 from .run import Out, Run, command_line, started
@@ -117,8 +116,9 @@ def shown(case: Case, prepared: Prepared, stages: Models) -> "Shown":
         if case.held_band is not None:
             high = max(high, case.held_band[1])
         test = case.frfs[0].sel(band=(max(low, 1e-6), high))
-        curves = {"test": test, "before": _response(case, stages.nominal, test)}
-        curves["after"] = _response(case, stages.final, test)
+        damping = case.damping or DAMPING
+        curves = {"test": test, "before": modelled(case, stages.nominal, test, damping)}
+        curves["after"] = modelled(case, stages.final, test, damping)
     held = [label for label, h in zip(case.outputs.labels, _held(prepared, case), strict=True) if h]
     return Shown(
         model.seen,
@@ -138,13 +138,6 @@ def _held(prepared: Prepared, case: Case) -> list[bool]:
     if not isinstance(data, Responses):
         return [False] * n
     return [not data.use[:, k].any() for k in range(n)]
-
-
-def _response(case: Case, made: Assembly, test: FRF) -> FRF:
-    model = Model(case.path, made)
-    top = REACH * float(test.frequency[-1])
-    modal = normal_modes(model.structure.system, band=top, points=model.places)
-    return model_frf(case, model, modal.with_damping(case.damping or DAMPING), test)
 
 
 def said(d: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import typer
 
-from ..case import load_case
+from ..case import Case, load_case
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, Quantity, residual_flexibility
@@ -18,6 +18,7 @@ from ..dynamics.modes import ModalModel
 from ..ema.tables_write import write_npz
 from ..errors import FileError, LabelError
 from ..model.analysis import Analysis, Subcase
+from ..model.assembly import Assembly
 from ..report.blocks import Picture, Table
 from ..report.words import number
 from .case_model import model_frf
@@ -167,11 +168,20 @@ def of_case(job: Run, source: Path, damping: float) -> FRF:
         raise FileError(f"{source} holds no FRF; give --input and --output, as --input 12:+Z")
     test = case.frfs[0]
     test = test.sel(band=(max(float(test.frequency[0]), 1e-6), float(test.frequency[-1])))
-    model = Model(case.path, case.assembly)
     ratio = case.damping or damping
     job.notes.append(f"Lines and places are those of the recording; every mode has {ratio:.2g}.")
-    modal = _modes(job, model, float(test.frequency[-1]), ratio)
-    return model_frf(case, model, modal, test)
+    job.progress("modes", 0.2)
+    return modelled(case, case.assembly, test, ratio)
+
+
+def modelled(case: Case, made: Assembly, test: FRF, damping: float) -> FRF:
+    """Responses of an assembly at the places of a case, on the lines of a recording."""
+    from ..dynamics.eigen import normal_modes
+
+    model = Model(case.path, made)
+    top = REACH * float(test.frequency[-1])
+    modal = normal_modes(model.structure.system, band=top, points=model.places)
+    return model_frf(case, model, modal.with_damping(damping), test)
 
 
 def of_deck(
