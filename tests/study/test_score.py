@@ -59,6 +59,21 @@ def test_a_faulty_sensor_is_right_on_its_own_channel_only(channel, right):
     assert row["right"] is right
 
 
+def test_intervals_are_held_against_the_truth_that_is_known():
+    """Thinning inside, radius outside; a parameter without a truth does not count."""
+    named = answer("thickness-distribution", point=[0.0, 0.0, 0.0])
+    named["effects"][0]["parameters"] = [
+        {"name": "thinning", "low": 0.1, "high": 0.3},
+        {"name": "R", "low": 0.1, "high": 0.2},
+        {"name": "other", "low": 0.0, "high": 1.0},
+    ]
+    sealed = truth("thickness-distribution", value=0.2, radius_m=0.09, point_m=[0, 0, 0])
+    row = scored(named, sealed)
+    assert row["covered"] == (1, 2)
+    assert summary([row]).endswith("; intervals hold the truth 1 of 2")
+    assert scored(named, {**sealed, "effect": "point-mass"})["covered"] == (0, 0)
+
+
 def test_confusion_counts_every_case_once():
     rows = [
         {"effect": e, "called": c}

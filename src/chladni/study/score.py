@@ -32,7 +32,21 @@ def scored(answer: Row, truth: Row) -> Row:
         "place_mm": place,
         "ratio": ratio,
         "gain": max(answer.get("gain", {"": 0.0}).values()),
+        "covered": _covered(effects[0], truth) if called == truth["effect"] else (0, 0),
     }
+
+
+def _covered(effect: Row, truth: Row) -> tuple[int, int]:
+    """How many intervals hold the truth, of how many whose truth is known."""
+    known = {name: truth.get("value") for name in ("M", "K", "thinning", "gain")}
+    known |= {name: truth.get(name) for name in ("E1", "E2", "G12")}
+    known["R"] = truth.get("radius_m")
+    held = [
+        p["low"] <= value <= p["high"]
+        for p in effect.get("parameters", [])
+        if (value := known.get(p["name"])) is not None
+    ]
+    return sum(held), len(held)
 
 
 def _right(called: str, effect: str) -> bool:
@@ -57,7 +71,7 @@ def confusion(rows: Sequence[Row]) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Rates by effect: right name, place within 60 mm, held-out Q at least halved."""
+    """Rates by effect: right name, place within 60 mm, held-out Q at least halved, intervals."""
     lines = []
     for n in sorted({r["effect"] for r in rows}):
         mine = [r for r in rows if r["effect"] == n]
@@ -74,5 +88,8 @@ def summary(rows: Sequence[Row]) -> str:
             half = sum(q <= 0.5 for q in ratios)
             text += f"; held-out Q halved {half} of {len(ratios)}"
             text += f", median x {np.median(ratios):.2f}"
+        inside, known = (sum(r.get("covered", (0, 0))[k] for r in mine) for k in (0, 1))
+        if known:
+            text += f"; intervals hold the truth {inside} of {known}"
         lines.append(text)
     return "\n".join(lines)
