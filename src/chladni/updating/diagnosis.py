@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.somewhere import Somewhere
+from ..effects.movable_attachment import Somewhere
 from ..errors import ModelError
-from .calibration import Status
 from .candidates import candidates, point_effect
+from .hypothesis_fit import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 from .likelihood import Data, Poles, Responses
-from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
+from .map_fit import Status
 
 THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
 THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
