@@ -16,10 +16,12 @@ from chladni.effects import orthotropic_material as material
 from chladni.effects import sensor_fault as sensors
 from chladni.effects import shell_groups as sheet
 from chladni.effects.effect import Effect
+from chladni.effects.freed import freed
 from chladni.effects.ordinary import gain, ordinary, scatter
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly
+from chladni.model.free_parameter import FreeParameter
 from chladni.model.refine import refined
 from chladni.updating.reduced_model import Reduced, evaluate
 from chladni.updating.reduced_problem import workbench
@@ -31,6 +33,7 @@ CHANNELS = 4
 NAMES = (
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
+    "freed",
 )  # fmt: skip
 
 
@@ -53,7 +56,9 @@ def bench():
 def cases(bench):
     cloth = bench.sheet
     corners = (1, 7, 57, 63)
-    setup = catalogue.Setup(corners, (7, 63), float(cloth.weight.sum()), TOP)
+    setup = catalogue.Setup(
+        tuple(((g, 1.0),) for g in corners), (7, 63), float(cloth.weight.sum()), TOP
+    )
     k = bench.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
     ortho = catalogue.grains(cloth)[0]
@@ -84,6 +89,8 @@ def cases(bench):
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
+    number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
+    found["freed"] = (freed(cloth, number), [0.2], [0])
     return {
         name: Case(e, np.array(x, float), np.array(idle, float), model_for(bench, e))
         for name, (e, x, idle) in found.items()

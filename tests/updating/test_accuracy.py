@@ -28,7 +28,9 @@ def changes(bench):
     """Effect and x of each kind of change."""
     cloth = bench.sheet
     sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
-    setup = catalogue.Setup(sensors, (), float(cloth.weight.sum()), TOP)
+    setup = catalogue.Setup(
+        tuple(((int(g), 1.0),) for g in sensors), (), float(cloth.weight.sum()), TOP
+    )
     k = bench.grids.position(int(bench.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0])
     return {

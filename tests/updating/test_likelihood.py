@@ -15,7 +15,7 @@ from chladni.updating.reduced_model import evaluate
 
 @pytest.fixture(scope="module")
 def effects(bench):
-    setup = Setup((1, 63), (7,), 1.41, 200.0)
+    setup = Setup((((1, 1.0),), ((63, 1.0),)), (7,), 1.41, 200.0)
     spot = bench.grids.position(26)
     return [
         ordinary(bench.sheet, "E", [0]), ordinary(bench.sheet, "t", [0]),

@@ -130,6 +130,10 @@ class KeyFile:
         section.only(known)
         return section
 
+    def given(self) -> tuple[tuple[str, str], ...]:
+        """(section, key) of every word of the file."""
+        return tuple((s.name, k) for many in self.tables.values() for s in many for k in s.values)
+
     def sections(self, name: str, known: Sequence[str]) -> list[Section]:
         """Every [[name]]."""
         found = self.tables.get(name, [])

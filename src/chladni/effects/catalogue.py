@@ -35,13 +35,13 @@ class Setup:
 
     Attributes
     ----------
-    sensors : grid ids of the outputs;  rows (n_out, n) their directions in the structure
+    sensors : of each output the grids it hangs on with their weights
     hangers : grid ids
     weight : mass of the structure [kg]
     top : highest frequency of interest [Hz]
     """
 
-    sensors: tuple[int, ...]
+    sensors: tuple[tuple[tuple[int, float], ...], ...]
     hangers: tuple[int, ...]
     weight: float
     top: float
@@ -159,12 +159,20 @@ def sensor_mass(sheet: Sheet, setup: Setup) -> list[Effect]:
     """One mass for all sensors; median 0.4 % of the structure's mass each, at least 2 g."""
     if not setup.sensors:
         return []
-    grids = tuple(sorted(set(setup.sensors)))
-    scale = max(2e-3, 0.06 * setup.weight / len(grids))
+    shares = tuple(dict.fromkeys(setup.sensors))
+    scale = max(2e-3, 0.06 * setup.weight / len(shares))
     m = points.strength("M", "kg", scale, 1.3, (-2.0, -1.0, 0.0))
-    text = f"at the {len(grids)} sensors"
-    rows = everywhere(sheet, grids)
-    return [points.SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3))]
+    text = f"at the {len(shares)} sensors"
+    grids = tuple(sorted({max(share, key=lambda pair: pair[1])[0] for share in shares}))
+    rows = sp.csr_array(sp.vstack([_carrying(sheet, share) for share in shares]))
+    return [
+        points.SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3), shares=shares)
+    ]
+
+
+def _carrying(sheet: Sheet, share: tuple[tuple[int, float], ...]) -> sp.csr_array:
+    """All three translations of a place that hangs on some grids (3, n)."""
+    return sp.csr_array(sum(w * everywhere(sheet, [grid]) for grid, w in share))
 
 
 def suspension(sheet: Sheet, setup: Setup, normals: Places) -> list[Effect]:

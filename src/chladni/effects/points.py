@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly, Masses, Scalars
+from ..model.assembly import Assembly, Scalars
+from ..model.point_masses import with_masses as with_masses
 from .effect import Effect, Parameter, PointTerm
 
 
@@ -52,6 +53,16 @@ class SensorMass(MassEffect):
     name = "sensor-mass"
     claim = "the accelerometers' mass is missing from the model"
 
+    shares: tuple[tuple[tuple[int, float], ...], ...] = ()  # (grid, weight) each sensor hangs on
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CONM2 at the grids, by their weights."""
+        m = self.parameters[0].value(x[0])
+        total: dict[int, float] = {}
+        for grid, weight in (pair for share in self.shares for pair in share):
+            total[grid] = total.get(grid, 0.0) + weight * m
+        return with_masses(assembly, tuple(total), np.array(list(total.values())))
+
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Nothing: the article is weighed without its sensors."""
         return 0.0, np.zeros(1)
@@ -73,22 +84,6 @@ class Suspension(AtPoints):
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)
-
-
-def with_masses(
-    assembly: Assembly, grids: tuple[int, ...], m: float, offset: np.ndarray | None = None
-) -> Assembly:
-    """The assembly with a mass m [kg] at each of these grids, ``offset`` (3,) from it [m]."""
-    old = assembly.masses
-    first = int(old.ids.max(initial=0)) + 1
-    x, y, z = np.zeros(3) if offset is None else offset
-    arm = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])  # motion of the mass
-    new = Masses(
-        np.append(old.ids, first + np.arange(len(grids))),
-        np.append(old.node, assembly.rows(list(grids))),
-        np.concatenate([old.matrix, np.tile(m * arm.T @ arm, (len(grids), 1, 1))]),
-    )
-    return replace(assembly, masses=new)
 
 
 def with_springs(

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from ..model.assembly import Assembly
 from .assemble import Structure
 
 NEAR = 12  # shells whose centres are nearest are looked at closely
@@ -115,3 +116,24 @@ def rows_of(
         located = locate(structure.assembly.points, shells, points[off])
         out[off] = rows_at(structure, located, directions[off])
     return sp.csr_array(out)
+
+
+Share = tuple[tuple[int, float], ...]  # (grid id, weight) of one place, the weights add up to 1
+
+
+def shares_of(assembly: Assembly, grids: np.ndarray, points: np.ndarray) -> list[Share]:
+    """What each place hangs on: its grid, or the corners of the nearest shell by their weights.
+
+    Parameters
+    ----------
+    grids : (k,) int        id, 0 where a place is no grid
+    points : (k, 3)         [m], used where there is no grid
+    """
+    out: list[Share] = [((int(grid), 1.0),) for grid in grids]
+    off = np.flatnonzero(grids <= 0)
+    if len(off):
+        found = locate(assembly.points, assembly.shells.nodes, points[off])
+        for k, nodes, weights in zip(off, found.nodes, found.weights, strict=True):
+            pairs = zip(assembly.ids[nodes].tolist(), weights.tolist(), strict=True)
+            out[k] = tuple((grid, w) for grid, w in pairs if w > 0)
+    return out

@@ -83,7 +83,8 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
         *catalogue.suspension(bench.sheet, setup, bench.grids),
     ]
     out: list[Candidate] = []
-    for effect in effects:
+    free = {e.text for e in search.base}
+    for effect in (e for e in effects if e.text not in free):
         base, starts = bases[-1], effect.starts()
         several = 1
         if isinstance(search.data, Poles) and len(effect.parameters) > 2:

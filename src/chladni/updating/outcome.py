@@ -210,7 +210,7 @@ def frequency_table(
     top = 2.0 * float(test.max())
     rows: list[dict[str, float | None]] = [{"test_hz": float(f)} for f in test]
     for name, made in stages:
-        built = structure(made)
+        built = structure(question.tested(made))
         modes = _flexible(normal_modes(built.system, band=top), 0.02 * float(test.min()))
         at, value = _paired(question, prepared, built, modes, test, shapes, real)
         for k in range(len(test)):
@@ -331,7 +331,7 @@ def as_dict(
             "threshold": threshold(last.data),
         },
         "calibrated": [
-            {"where": e.text, **row}
+            {"where": e.text, "called": getattr(e, "called", "") or row["name"], **row}
             for e in deck.fit.effects
             if e.kind == "ordinary"
             for row in e.reported(deck.fit.of(e), deck.fit.sd(e))

@@ -11,13 +11,18 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.reduction import attachments
 from ..effects import catalogue
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
-from ..effects.ordinary import PartScale, gain, ordinary, scatter
+from ..effects.freed import defaults_without_shells, freed, freed_effect
+from ..effects.ordinary import gain, scatter
+from ..effects.shell_components import COMPONENTS
 from ..ema.identification import equalised, identify
+from ..errors import FileError
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
+from ..model.free_parameter import FreeParameter
 from .hypothesis_fit import Search
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
@@ -51,11 +56,10 @@ def _by_responses(question: Question) -> Prepared:
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
-    built = structure(question.assembly)
+    built = structure(question.tested(question.assembly))
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    bench = workbench(
-        question.assembly, top, sp.csr_array(sp.vstack([rows_o, rows_i])), built=built
-    )
+    bench = workbench(built.assembly, top, sp.csr_array(sp.vstack([rows_o, rows_i])), built=built)
+    bench = carrying(bench, freed_by(question, bench, top))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     data = []
@@ -156,8 +160,9 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
-    built = structure(question.assembly)
-    bench = workbench(question.assembly, top, built=built, groups=48)
+    built = structure(question.tested(question.assembly))
+    bench = workbench(built.assembly, top, built=built, groups=48)
+    bench = carrying(bench, freed_by(question, bench, top))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -194,23 +199,71 @@ def searched(
     top: float,
 ) -> Search:
     """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
-    base = [*_ordinary(question, bench), *nuisance]
-    weight = mass_properties(question.assembly)[0]
-    sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
-    setup = catalogue.Setup(sensors, question.hangers, weight, top)
+    base = [*freed_by(question, bench, top), *nuisance]
     return Search(
-        bench, data, question.weighing, tuple(base), tuple(nuisance), setup, question.outputs.labels
-    )
+        bench, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
+        setup_of(question, top), question.outputs.labels,
+    )  # fmt: skip
 
 
-def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
-    """The parameters the user frees, or E and rho of every material and t of every part."""
-    chosen = [
-        ordinary(bench.sheet, name, [question.assembly.part(p) for p in parts])
-        for name, parts in question.parameters
-        if name in ("E", "rho", "t")
-    ]
-    return chosen or catalogue.defaults(bench.sheet)
+def setup_of(question: Question, top: float) -> catalogue.Setup:
+    """What the effects may know of the test."""
+    weight = mass_properties(question.assembly)[0]
+    sensors = question.outputs.shares(question.assembly)
+    return catalogue.Setup(sensors, question.hangers, weight, top)
+
+
+def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
+    """What the user frees, or E and rho of every material and t of every part of shells.
+
+    Without shells, E and rho of every material of solids and beams.
+    """
+    if question.parameters:
+        return [_freed(question, bench, top, p) for p in question.parameters]
+    if len(bench.sheet):
+        return list(catalogue.defaults(bench.sheet))
+    return [freed(bench.sheet, p) for p in defaults_without_shells(question.assembly)]
+
+
+def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -> Effect:
+    """One number, or an effect whose place is known."""
+    setup = setup_of(question, top)
+    if p.field == "orthotropic-material":
+        found = [
+            e for e in catalogue.grains(bench.sheet) if set(e.parts) <= set(_names(question, p))
+        ]
+    elif p.field == "sensor-mass":
+        found = catalogue.sensor_mass(bench.sheet, setup)
+    elif p.field == "suspension":
+        found = catalogue.suspension(bench.sheet, setup, bench.grids)[:1]
+    else:
+        return freed(bench.sheet, p)
+    if len(found) != 1:
+        raise FileError(f"{p.field} cannot be freed: {_LACKS[p.field]}")
+    return freed_effect(found[0], p.name)
+
+
+_LACKS = {
+    "orthotropic-material": "name parts of one isotropic material, all that have it",
+    "sensor-mass": "the recording has no sensors on the structure",
+    "suspension": "the case names no [test] hangers",
+}
+
+
+def _names(question: Question, p: FreeParameter) -> list[str]:
+    return [question.assembly.parts[k].name for k in p.positions]
+
+
+def carrying(bench: Workbench, effects: Sequence[Effect]) -> Workbench:
+    """The workbench over a basis that carries what is free in every fit."""
+    model = bench.model
+    for effect in effects:
+        x = np.array([p.mean for p in effect.parameters])
+        for term in effect.terms(x):
+            model = model.extended(attachments(bench.factor, term.rows))
+        if any(change.field in COMPONENTS for change in effect.fields(x)):
+            model = model.with_components()
+    return bench if model is bench.model else replace(bench, model=model)
 
 
 def _mass_note(question: Question) -> list[str]:

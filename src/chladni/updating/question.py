@@ -1,6 +1,6 @@
 """What a diagnosis is asked: a structure, what was measured on it and where (SI, Hz)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,8 +8,10 @@ import scipy.sparse as sp
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
 from ..fem.assemble import Structure
-from ..fem.locate import rows_of
+from ..fem.locate import Share, rows_of, shares_of
 from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..model.point_masses import with_masses
 from .hypothesis_fit import Search
 from .likelihood import Poles, Responses
 from .map_fit import Weighing
@@ -38,6 +40,11 @@ class Places:
         """Rows over the free dofs of the structure (k, n)."""
         return rows_of(built, self.grids, self.points, self.directions)
 
+    def shares(self, assembly: Assembly) -> tuple[Share, ...]:
+        """Grids each place hangs on with their weights; the motion of the base has none."""
+        real = np.flatnonzero(~np.isnan(self.points[:, 0]))
+        return tuple(shares_of(assembly, self.grids[real], self.points[real]))
+
     def around(self, built: Structure) -> sp.csr_array:
         """Rows at each place and four more, two standard deviations away in the sheet."""
         rows = [self.rows(built)]
@@ -57,6 +64,7 @@ class Places:
 class Question:
     """Everything a diagnosis is asked with (SI, Hz).
 
+    ``assembly`` is the article, as the deck has it; what was measured is ``tested`` of it.
     ``held_sensors`` and ``held_band`` are never fitted; None: chosen here.
     """
 
@@ -73,7 +81,22 @@ class Question:
     held_sensors: tuple[str, ...] | int | None = None
     held_band: tuple[float, float] | None = None
     gain_known: bool = True
-    parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()  # (field, parts) the user frees
+    parameters: tuple[FreeParameter, ...] = ()  # what the user frees; none: a default set
+    carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
+
+    def tested(self, assembly: Assembly) -> Assembly:
+        """An article with the sensors of known mass on it, as it was measured."""
+        if not self.carried:
+            return assembly
+        grids, m = zip(*self.carried, strict=True)
+        return with_masses(assembly, grids, np.array(m))
+
+    @property
+    def weighed_with_sensors(self) -> Weighing | None:
+        """The weighing of the article and what the sensors add to it, as the model has them."""
+        if self.weighing is None:
+            return None
+        return replace(self.weighing, mass=self.weighing.mass + sum(m for _, m in self.carried))
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,10 +52,10 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     assert isinstance(effect, OrthotropicMaterial)
     x = trial.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
-    built, data, top = structure(changed.assembly), old.data, old.setup.top
+    built, data, top = structure(changed.tested(changed.assembly)), old.data, old.setup.top
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     bench = workbench(
-        changed.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
+        built.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
         groups=64 if rows else 48,
     )  # fmt: skip
     extra = [e for e in old.nuisance if e.name == "gain"]

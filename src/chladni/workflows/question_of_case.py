@@ -42,10 +42,8 @@ def question(case: Case) -> Question:
         held_sensors=case.held_sensors,
         held_band=case.held_band,
         gain_known=case.gain_known,
-        parameters=tuple(
-            (p.field, p.parts or tuple(part.name for part in case.assembly.parts))
-            for p in case.parameters
-        ),
+        parameters=case.parameters,
+        carried=case.carried,
     )
     if frfs:
         return replace(asked, frf=frfs[0])
