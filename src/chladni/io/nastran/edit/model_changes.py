@@ -9,17 +9,18 @@ import numpy as np
 
 from ....errors import ModelError
 from ....model.assembly import Assembly, Shells
-from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, ShellSection
+from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import UNITS, Units
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
+from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, laminates, thickness, masses, springs to ground that differ.
+    """Edits of the deck: materials, laminates, thickness, joints and masses that differ.
 
     Raises
     ------
@@ -32,6 +33,7 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     out += _materials(deck, before, after, units, free)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
+    out += joint_changes(deck, before, after)
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
         out.append(Add(cards, "put in by the diagnosis"))
@@ -72,9 +74,23 @@ def _materials(
                 continue
             new = next(free)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
-            out += [SetField("PSHELL", after.parts[k].id, _MID[name], new) for k, name in at]
+            out += [_of_material(deck, after.parts[k], name, new) for k, name in at]
     grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
     return out + (_axes(deck, before, after) if grain else [])
+
+
+def _of_material(deck: Deck, part: Part, name: str, material: int) -> Change:
+    """The property card of a part names another material."""
+    if name in _MID:
+        return SetField("PSHELL", part.id, _MID[name], material)
+    kinds = ("PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
+    for kind in kinds:
+        if part.id in _ids(deck, kind):
+            return SetField(kind, part.id, "MID", material)
+    raise ModelError(
+        f"part {part.name} shares a material with others and none of {', '.join(kinds)} names it, "
+        "so it cannot have one of its own"
+    )
 
 
 def _equal(a: Material, b: Material) -> bool:
