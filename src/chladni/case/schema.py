@@ -107,22 +107,21 @@ SCHEMA = (
         "Bound: the value stays below high times the deck's.", "1.25", _FIT),
 )  # fmt: skip
 
-_SENSORS = ("identify", *_FRF)
 COLUMNS = (
     Key("sensors.csv", "label", "text", "", "needed",
-        "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _SENSORS),
+        "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _FRF),
     Key("sensors.csv", "grid", "whole number", "", "the node of the label",
-        "Grid of the deck it sits at.", "412", _SENSORS),
+        "Grid of the deck it sits at.", "412", _FRF),
     Key("sensors.csv", "x", "number", "m", "", "Place, basic frame, in place of a grid.", "0.25",
-        _SENSORS),
-    Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _SENSORS),
-    Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _SENSORS),
+        _FRF),
+    Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _FRF),
+    Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _FRF),
     Key("sensors.csv", "direction", "+X -X +Y -Y +Z -Z n", "", "the direction of the label",
-        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _SENSORS),
-    Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _SENSORS),
-    Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _SENSORS),
-    Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _SENSORS),
-    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _SENSORS,
+        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _FRF),
+    Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _FRF),
+    Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _FRF),
+    Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _FRF),
+    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _FRF,
         ("output", "input")),
     Key("sensors.csv", "mass", "number", "kg", "0",
         "Mass on the article while it is measured. It is in the model before anything is asked and "

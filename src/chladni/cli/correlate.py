@@ -68,12 +68,12 @@ def opened(source: Path) -> tuple[Case, Model]:
     if source.exists() and not is_case(source):
         raise FileError(f"{source} is no case; give a folder with case.toml")
     case = load_case(source)
-    return case, Model(source, case.assembly)
+    return case, Model(source, case.tested(case.assembly))
 
 
 def correlated(job: Run, case: Case, model: Model) -> Correlation:
     """Identify the first recording, pair its modes with the model's, score the responses."""
-    job.notes.extend(case.notes)
+    job.notes.extend(case.said("correlate"))
     test = case.frfs[0] if case.frfs else None
     top = _top(case, test)
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.1)

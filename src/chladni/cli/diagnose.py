@@ -68,7 +68,7 @@ def _answered(job: Run, case: Case, search: bool) -> dict[str, Any]:
     if updated is not None:
         stages = Models(stages.nominal, stages.calibrated, assembly(read_deck(updated), case.units))
     d = as_dict(asked, prepared, found, stages)
-    d["notes"] += lost
+    d["notes"] += [*lost, *case.said("diagnose" if search else "calibrate")]
     name = None if updated is None else updated.name
     d["files"] = {"deck": name, "report": "report.html", "diagnosis": "diagnosis.json"}
     d["frequency_rms_percent"] = {
@@ -99,7 +99,7 @@ def page(
     progress("pictures", 0.0)
     drawn = figures(job.folder, d, shown(case, prepared, stages))
     write_page(
-        job.folder, d, drawn, [*d["notes"], *case.notes], command=command_line(),
+        job.folder, d, drawn, d["notes"], command=command_line(),
         title=f"Diagnosis – {case.path.parent.name}",
     )  # fmt: skip
     job.say(said(d))

@@ -62,7 +62,9 @@ def run(
         elif not input:
             found = of_deck(job, source, units, allow or [], output or [])
         else:
-            model, frequency = load_model(source, units, allow or ()), np.linspace(low, high, lines)
+            model = load_model(source, units, allow or ())
+            job.notes += model.notes
+            frequency = np.linspace(low, high, lines)
             found = [response(job, model, _asked(output), input, frequency, damping)]
         for k, one in enumerate(found):
             if one.quantity != "transmissibility":
@@ -168,6 +170,7 @@ def of_case(job: Run, source: Path, damping: float) -> FRF:
     test = case.frfs[0]
     test = test.sel(band=(max(float(test.frequency[0]), 1e-6), float(test.frequency[-1])))
     ratio = case.damping or damping
+    job.notes.extend(case.said("frf"))
     job.notes.append(f"Lines and places are those of the recording; every mode has {ratio:.2g}.")
     job.progress("modes", 0.2)
     return modelled(case, case.assembly, test, ratio)
@@ -177,7 +180,7 @@ def modelled(case: Case, made: Assembly, test: FRF, damping: float) -> FRF:
     """Responses of an assembly at the places of a case, on the lines of a recording."""
     from ..dynamics.eigen import normal_modes
 
-    model = Model(case.path, made)
+    model = Model(case.path, case.tested(made))
     top = REACH * float(test.frequency[-1])
     modal = normal_modes(model.structure.system, band=top, points=model.places)
     return model_frf(case, model, modal.with_damping(damping), test)

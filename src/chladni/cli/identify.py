@@ -1,5 +1,7 @@
 """``chladni identify``: modes of a recording."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,6 +15,7 @@ from ..errors import AccuracyError, FileError
 from ..io.tables.write_tables import write_poles
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
+from ..updating.test_frequencies import counted
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings
 from .frf import limits
@@ -36,18 +39,47 @@ def run(
     """Poles with their spread, damping and residues; a stabilisation diagram and the fit."""
     limit = limits(band) if band else None
     with started("identify", source, out) as job:
-        held = [r for r in load_recordings(source, quantity or None) if r.frf is not None]
+        read, lines = _read(job, source, quantity or None)
+        held = [r for r in read if r.frf is not None]
         if not held:
-            raise FileError(f"{source} holds no frequency responses to identify from")
-        if limit is None and is_case(source):
-            from ..case import load_case
-
-            limit = load_case(source).band
-        found = [_one(job, k, r, limit, averages, len(held)) for k, r in enumerate(held)]
+            raise FileError(f"{source} holds no frequency responses to identify from{_has(read)}")
+        limit = lines.band if limit is None else limit
+        found = [
+            _one(job, k, r, limit, averages, len(held), lines.exclude) for k, r in enumerate(held)
+        ]
         job.json("identified.json", {"recordings": found})
         job.lead = "; ".join(_sentence(entry) for entry in found)
         job.say(job.lead)
     return _trusted(found)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Band and gaps [Hz] in which a case wants its recordings identified."""
+
+    band: tuple[float, float] | None = None
+    exclude: tuple[tuple[float, float], ...] = ()
+
+
+def _read(job: Run, source: Path, quantity: str | None) -> tuple[Sequence[Recording], Lines]:
+    """The recordings of a file or a case, and the lines the case wants."""
+    if not is_case(source):
+        return load_recordings(source, quantity), Lines()
+    from ..case import load_case
+
+    case = load_case(source)
+    job.notes += case.said("identify")
+    one = ("test", "use") in case.given
+    return case.recordings[: 1 if one else None], Lines(case.band, case.exclude)
+
+
+def _has(read: Sequence[Recording]) -> str:
+    """What the recordings hold instead."""
+    kinds = dict.fromkeys(f.kind for r in read for f in r.functions)
+    said = [f"records of kind {', '.join(kinds)}"] if kinds else []
+    said += ["a table of poles"] * any(r.poles is not None for r in read)
+    said += ["mode shapes"] * any(r.shapes is not None for r in read)
+    return f"; it holds {' and '.join(said)}" if said else ""
 
 
 def _one(
@@ -57,15 +89,16 @@ def _one(
     band: tuple[float, float] | None,
     averages: int,
     total: int,
+    exclude: Sequence[tuple[float, float]] = (),
 ) -> dict[str, Any]:
     job.progress(f"poles of {recording.name}", k / total)
     frf = recording.frf
     assert frf is not None
-    whole = identify(frf, band, averages=averages)
+    whole = identify(frf, band, averages=averages, use=counted(frf, exclude))
     modal = whole.sel((whole.frequency >= whole.band[0]) & (whole.frequency <= whole.band[1]))
     stem = "" if total == 1 else f"_{k + 1}"
     write_poles(job.keep(f"poles{stem}.csv", f"poles of {recording.name}"), _poles(modal))
-    job.notes.extend(recording.notes)
+    job.notes.extend(note for note in recording.notes if note not in job.notes)
     if frf.variance is None and frf.coherence is None:
         job.notes.append(
             f"{recording.name} holds neither variance nor coherence, so its noise was taken from "

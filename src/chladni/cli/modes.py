@@ -64,8 +64,8 @@ def summary(model: Model, modal: ModalModel) -> dict[str, Any]:
     return {
         "frequency_hz": modal.frequency,
         "generalized_mass": np.einsum("nr,nr->r", phi, system.M @ phi),
-        "mass_kg": mass,
-        "centre_of_gravity_m": centre,
+        "mass_kg" if model.unit else "mass_in_deck_units": mass,
+        "centre_of_gravity_m" if model.unit else "centre_of_gravity_in_deck_units": centre,
         "rigid": rigid_modes(modal),
         "parts": {
             part.name: {"id": part.id, "strain_energy": energy[k]}
@@ -94,12 +94,14 @@ def _pictures(job: Run, model: Model, modal: ModalModel) -> None:
 
 def _page(job: Run, result: dict[str, Any], kg: str, m: str) -> None:
     f, parts = result["frequency_hz"], result["parts"]
+    whole = next(result[k] for k in result if k.startswith("mass_"))
     job.lead = (
         f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
-        f"its mass is {number(result['mass_kg'])} {kg}."
+        f"its mass is {number(whole)} {kg}."
     )
-    centre = ", ".join(number(x) for x in result["centre_of_gravity_m"])
-    mass = f"{number(result['mass_kg'], 6)} {kg}"
+    place = next(result[k] for k in result if k.startswith("centre_of_gravity_"))
+    centre = ", ".join(number(x) for x in place)
+    mass = f"{number(whole, 6)} {kg}"
     facts = [("Mass", mass), ("Centre of gravity", f"({centre}) {m}")]
     rows = [
         (str(k + 1), number(f[k], 6), *(_share(p["strain_energy"][k]) for p in parts.values()))

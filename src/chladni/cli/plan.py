@@ -56,7 +56,8 @@ def run(
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units)
+        model = load_model(source, units, command="plan")
+        job.notes += model.notes
         stage = within(job.progress, 0.1, 0.8)
         built = model.structure
         found = plan(model.assembly, wishes, built=built, unit=model.unit, progress=stage)

@@ -75,9 +75,13 @@ class Model:
 
 
 def load_model(
-    source: Path, units: str | None = None, allow: Sequence[str] = (), subcase: int | None = None
+    source: Path,
+    units: str | None = None,
+    allow: Sequence[str] = (),
+    subcase: int | None = None,
+    command: str = "modes",
 ) -> Model:
-    """The model of a bare deck, or of a case (folder or case.toml).
+    """The model of a bare deck, or of a case (folder or case.toml), for a command.
 
     Raises
     ------
@@ -89,7 +93,8 @@ def load_model(
     if is_case(source):
         from ..case import load_case
 
-        return Model(source, load_case(source).assembly)
+        case = load_case(source)
+        return Model(source, case.assembly, notes=tuple(case.said(command)))
     return load_deck(source, units, allow).model(subcase)
 
 
