@@ -23,7 +23,7 @@ from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
 from ..units import UNITS, Units
 from .free_parameters import free_parameter
-from .recordings import compared_first, notes_of
+from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
 from .sensor_places import ROLES, Places, carried, grid_row, labels, places, unrecorded
 from .toml_sections import KeyFile, Section, read_keys
@@ -177,7 +177,8 @@ def _recordings(test: Section) -> tuple[Recording, ...]:
     quantity = test.text("quantity", among=get_args(Quantity))
     read: list[Recording] = []
     for name in test.list("recordings", str) or []:
-        read += read_recordings(_file(test, "recordings", name), quantity)
+        found = read_recordings(_file(test, "recordings", name), quantity)
+        read += [without_dead_channels(r) for r in found]
     ranked = compared_first(test, read)
     held = [r for r in ranked if r.frf is not None]
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)

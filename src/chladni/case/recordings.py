@@ -34,6 +34,19 @@ def compared_first(test: Section, read: Sequence[Recording]) -> tuple[Recording,
     return (first, *rest)
 
 
+def without_dead_channels(r: Recording) -> Recording:
+    """The recording without outputs that are zero throughout, and a note that names them."""
+    if r.frf is None:
+        return r
+    pairs = [(o, bool(r.frf.values[:, k].any())) for k, o in enumerate(r.frf.outputs)]
+    if all(lives for _, lives in pairs):
+        return r
+    dead = ", ".join(o for o, lives in pairs if not lives)
+    note = f"{r.name}: {dead} is zero throughout and left out"
+    return replace(r, frf=r.frf.sel(outputs=[o for o, lives in pairs if lives]),
+                   notes=(*r.notes, note))  # fmt: skip
+
+
 def _names(r: Recording) -> list[str]:
     """All a recording may be called by."""
     level = "" if r.level is None else f"{r.level:g}"

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..report.figures import Shown
 
 _BANDS = 6
+RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +76,12 @@ def correlated(job: Run, case: Case, model: Model) -> Correlation:
     """Identify the first recording, pair its modes with the model's, score the responses."""
     job.notes.extend(case.said("correlate"))
     test = case.frfs[0] if case.frfs else None
+    if test is None and not any(r.poles is not None for r in case.recordings):
+        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
     top = _top(case, test)
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.1)
     modal = _modes(model, REACH * top).with_damping(case.damping or DAMPING)
-    inside = ~rigid_modes(modal) & (modal.frequency <= 1.3 * top)
+    inside = ~rigid_modes(modal) & (modal.frequency > RIGID * top) & (modal.frequency <= 1.3 * top)
     near = modal.sel(np.flatnonzero(inside))
     if test is None:
         return _by_poles(case, near)
@@ -121,6 +124,8 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
 
 def _shapes(found: Identified) -> np.ndarray:
     """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
+    if not found.order:
+        return np.zeros((len(found.outputs), 0))
     size = np.linalg.norm(found.residues, axis=1)
     best = size.argmax(axis=1)
     return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)
@@ -202,7 +207,7 @@ def _shown(case: Case, model: Model, found: Correlation) -> "Shown":
         f = found.model.frequency
         test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
         curves = {"test": test, "model": found.model}
-    if found.mac is not None:
+    if found.mac is not None and found.mac.size:
         mac_of = (found.mac.T, found.f_test, found.f_model)
     return Shown(
         model.seen,

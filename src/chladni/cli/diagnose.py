@@ -9,13 +9,14 @@ from threadpoolctl import threadpool_limits
 
 from ..case import Case, load_case
 from ..dynamics.frf import FRF
-from ..errors import FileError, LabelError, ModelError
+from ..errors import AccuracyError, FileError, LabelError, ModelError
 from ..io.nastran import assembly, read_deck, write_deck
 from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
+from ..updating.least_data import withheld
 from ..updating.likelihood import Responses
 from ..updating.outcome import Models, as_dict, judged, models, rms
 from ..updating.preparation import prepare
@@ -37,7 +38,9 @@ def run(
 ) -> None:
     """Name the missing physics, write the updated deck, diagnosis.json and a page."""
     with started("diagnose", source, out) as job:
-        answer(job, opened(source))
+        d = answer(job, opened(source))
+    if d["too_little"]:
+        raise AccuracyError(f"nothing is named: {d['too_little']} (see the notes of the page)")
 
 
 def opened(source: Path) -> Case:
@@ -55,9 +58,16 @@ def answer(job: Run, case: Case, search: bool = True) -> dict[str, Any]:
 
 def _answered(job: Run, case: Case, search: bool) -> dict[str, Any]:
     job.progress("identifying the recording", 0.02)
+    if search and not len(case.assembly.shells):
+        raise FileError(
+            f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
+            "calibrate and correlate take any deck"
+        )
     asked = question(case)
     prepared = prepare(asked)
     found = diagnose(prepared.search, within(job.progress, 0.1, 0.8), search)
+    if search:
+        found = withheld(prepared, found)
     if found.found is not None:
         first, note = renewed(asked, prepared, found.found)
         found = replace(found, trials=(first, *found.trials[1:]), notes=(*found.notes, note))

@@ -13,7 +13,7 @@ import typer
 from ..case import Case, load_case
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, UNIT, Quantity, residual_flexibility
+from ..dynamics.frf import FRF, UNIT, Quantity, residual_flexibility, residual_shift
 from ..dynamics.modes import ModalModel
 from ..errors import FileError, LabelError
 from ..io.tables.write_tables import write_npz
@@ -109,7 +109,8 @@ def response(
     s = model.structure
     pick, load = (model.directions(labels).T.toarray() for labels in (outputs, inputs))
     modal = _modes(job, model, frequency[-1], damping)
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    shift = residual_shift(modal, frequency[-1])
+    rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
@@ -151,7 +152,8 @@ def _from_base(
     dofs, s = np.array([(point, c) for point, c, _ in ends]), model.structure
     load = s.T.T @ inertia_load(model.assembly, -np.eye(3)[:, axis - 1 : axis])
     modal, pick = _modes(job, model, frequency[-1], damping), s.rows(dofs).T.toarray()
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    shift = residual_shift(modal, frequency[-1])
+    rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
     found = base_response(s, modal, axis, frequency, dofs, residual=rest)
     signs = sign * np.array([c for _, _, c in ends])
     return replace(

@@ -189,7 +189,12 @@ def _sentence(entry: dict[str, Any]) -> str:
 
 def _trusted(found: list[dict[str, Any]]) -> int:
     """Exit code: poles that leave far more than noise are written, but said to be weak."""
-    weak = [e["name"] for e in found if not e["firm"].any() or e["chi"] > _TRUST]
+    if none := [e["name"] for e in found if not e["firm"].any()]:
+        raise AccuracyError(
+            f"{', '.join(none)}: no mode stands out of the recording; widen the band (--band) or "
+            "give --averages"
+        )
+    weak = [e["name"] for e in found if e["chi"] > _TRUST]
     if weak:
         raise AccuracyError(
             f"{', '.join(weak)}: the poles leave {max(e['chi'] for e in found):.3g} times the "

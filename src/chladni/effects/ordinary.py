@@ -132,7 +132,7 @@ def scatter(sheet: Sheet, quantity: str, sd: float, length: float = 0.3, most: i
     """
     columns = []
     parts = np.unique(sheet.part)
-    each = max(3, round(most / np.sqrt(len(parts))))
+    each = max(3, round(most / np.sqrt(max(1, len(parts)))))
     for p in parts:
         inside = np.flatnonzero(sheet.part == p)
         if len(inside) > 2:

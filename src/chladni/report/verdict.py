@@ -68,6 +68,8 @@ def sentence(d: Mapping[str, Any]) -> str:
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
         return "Model and recording agree within what repeats and dispersion allow."
+    if d.get("too_little"):
+        return f"Nothing is named: {d['too_little']}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."

@@ -42,6 +42,7 @@ class Diagnosis:
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
+    one_of : what the data cannot tell apart, where they are too few to name anything
     """
 
     nominal: Trial
@@ -51,6 +52,7 @@ class Diagnosis:
     verdict: str
     notes: tuple[str, ...] = ()
     written: Trial | None = None
+    one_of: tuple[str, ...] = ()
 
     @property
     def found(self) -> Trial | None:

@@ -15,6 +15,7 @@ from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from .diagnosis import Diagnosis, threshold, verdict
 from .hypothesis_fit import Search, Trial, as_written
+from .leaning import leaning
 from .likelihood import Poles, Responses
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
@@ -59,14 +60,11 @@ class Scores:
     effect: float
     floor: float
 
-    def as_dict(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, float | None]:
         """The keys of diagnosis.json."""
-        return {
-            "Q_nominal": self.nominal,
-            "Q_calibrated": self.calibrated,
-            "Q_with_effect": self.effect,
-            "Q_floor": self.floor,
-        }
+        values = (self.nominal, self.calibrated, self.effect, self.floor)
+        names = ("Q_nominal", "Q_calibrated", "Q_with_effect", "Q_floor")
+        return {n: v if np.isfinite(v) else None for n, v in zip(names, values, strict=True)}
 
 
 def scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[Scores, Scores]:
@@ -253,12 +251,15 @@ def _paired(
         pairs = pair(modes.frequency, test, mac(phi, shapes))
         at[pairs.test], value[pairs.test] = pairs.model, pairs.mac
         return at, value
-    assert isinstance(prepared.score, Poles)
+    if not isinstance(prepared.score, Poles):  # too few outputs for shapes
+        pairs = pair(modes.frequency, test)
+        at[pairs.test] = pairs.model
+        return at, value
     eye = np.eye(len(modes.frequency))
     score = prepared.score
     lam = (2 * np.pi * modes.frequency) ** 2
     state = State(lam, eye, np.zeros(0), np.zeros(0), 0.0, np.zeros(0), None, None)
-    if score.outputs is not None:
+    if score.outputs is not None and score.inputs is not None:
         a, b = (rows @ modes.shapes for rows in (score.outputs, score.inputs))  # type: ignore[operator]
         score = Poles(**{**vars(score), "a": a, "b": b})
     _, mode = score.forced(state, np.ones(n, bool) if real is None else real)
@@ -280,6 +281,9 @@ def structured(prepared: Prepared, diagnosis: Diagnosis) -> dict[str, Any]:
     if isinstance(prepared.score, Poles):
         real = real_poles(prepared, diagnosis.found or diagnosis.null)
         assert real is not None
+        if not real.any():
+            said = "no pole of the test has a partner in the model"
+            return {"is": False, "left": None, "known": None, "sentence": said}
         left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * np.log(10)
         known = 100 * float(np.median(prepared.score.sd[real]))
         text = f"{left:.2g} % rms of the frequencies, which are known to {known:.1g} %"
@@ -342,5 +346,7 @@ def as_dict(
         },
         "frequencies": rows,
         "structured": left,
-        "notes": [*prepared.notes, *diagnosis.notes, left["sentence"]],
+        "one_of": [list(diagnosis.one_of)] if diagnosis.one_of else [],
+        "too_little": prepared.too_little if diagnosis.one_of else "",
+        "notes": [*prepared.notes, *diagnosis.notes, *leaning(deck.fit), left["sentence"]],
     }

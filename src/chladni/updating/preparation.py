@@ -24,11 +24,12 @@ from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..model.free_parameter import FreeParameter
 from .hypothesis_fit import Search
+from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
-from .test_frequencies import band_of, counted, frequencies, widened
+from .test_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
@@ -86,9 +87,8 @@ def _by_responses(question: Question) -> Prepared:
     outside = (f >= held_band[0]) & (f <= held_band[1])
     held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
-    what = (
-        f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
-    )
+    band = f"band {held_band[0]:g}-{held_band[1]:g} Hz"
+    what = f"{len(names)} sensors ({', '.join(names[:8])}), {band}" if names else band
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
@@ -98,7 +98,14 @@ def _by_responses(question: Question) -> Prepared:
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     notes += _mass_note(question)
-    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found)
+    seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
+    if not seen.any():
+        raise FileError(
+            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
+            "nothing to fit a model to"
+        )
+    few = too_little(int(seen.sum()), int(data[0].use.any(axis=0).sum()))
+    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found, few)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
@@ -176,9 +183,10 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     ).over(bench.model)
     nuisance = nuisances(bench, built, top)
     search = searched(question, bench, data, nuisance, top)
-    what = f"the {int(held.sum())} highest of {len(held)} frequencies"
+    what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
-    return Prepared(search, data, held, what, notes, found, ~held)
+    few = too_little(len(frequency), 0)
+    return Prepared(search, data, held, what, notes, found, few, ~held)
 
 
 def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:

@@ -118,4 +118,5 @@ class Prepared:
     what: str
     notes: tuple[str, ...]
     identified: Identified | None = None
+    too_little: str = ""  # why the data cannot bear a name
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes

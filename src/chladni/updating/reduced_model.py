@@ -194,12 +194,16 @@ def evaluate(
     return State(lam, phi, dK, dM, weight, dweight, offset, doffset)
 
 
+FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
+
+
 def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     try:
         lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
     except (sl.LinAlgError, ValueError) as error:
         raise ModelError(f"an effect left no positive mass: {error}") from error
-    if lam[0] < -1e-6 * lam[len(lam) // 2]:
+    flexible = lam[lam > FLEXIBLE * lam[-1]]
+    if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
         raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
     return lam, phi
 
@@ -246,13 +250,13 @@ def _shells(
         for name, stack in stacks.items():
             component = logs[name] if name else 0.0
             w = np.exp(logs["E"] + power * logs["t"] + component)
-            flat = stack.reshape(len(w), -1)
+            flat = stack.reshape(len(w), r * r)
             K += w @ flat
             if gradient:
                 slope = slopes["E"] + power * slopes["t"] + (slopes[name] if name else 0.0)
                 dK += _weighted(w[:, None] * slope, flat)
     w = np.exp(logs["rho"] + logs["t"])
-    flat = model.mass.reshape(len(w), -1)
+    flat = model.mass.reshape(len(w), r * r)
     M += w @ flat
     if gradient:
         dM += _weighted(w[:, None] * (slopes["rho"] + slopes["t"]), flat)

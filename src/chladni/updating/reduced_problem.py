@@ -14,6 +14,7 @@ from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
 
+FEWEST = 12  # modes of a basis whose structure has no flexible one below that: six, and six rigid
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
@@ -68,6 +69,9 @@ def workbench(
     built = structure(assembly) if built is None else built
     modes = normal_modes(built.system, band=REACH * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
+    if not len(flexible):  # stiffer than all that was measured
+        modes = normal_modes(built.system, min(FEWEST, len(built.system.dofs)))
+        flexible = modes.frequency[modes.frequency > 0.02 * top]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
     factor = shifted(built.system, hertz)
     blocks = [modes.shapes]

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from ..case import Case, Places
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, residual_flexibility
+from ..dynamics.frf import FRF, residual_flexibility, residual_shift
 from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure
@@ -40,7 +40,9 @@ def model_frf(case: Case, model: Model, modal: ModalModel, test: FRF) -> FRF:
     s, f = model.structure, test.frequency
     pick = rows(case.outputs, s).T.toarray()
     load, carried = _drives(case, s)
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    rest = residual_flexibility(
+        s.system, modal, pick, load, points=model.places, shift=residual_shift(modal, f[-1])
+    )
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)

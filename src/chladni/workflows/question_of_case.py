@@ -23,7 +23,7 @@ def question(case: Case) -> Question:
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
         raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
-    if case.inputs.base.any():
+    if frfs and case.inputs.base.any():
         raise FileError(
             f"{case.path}: diagnosis of a structure moved at its supports is not built yet; "
             "give responses to a force"
@@ -52,4 +52,7 @@ def question(case: Case) -> Question:
 
 
 def _sites(places: Places) -> Sites:
-    return Sites(places.labels, places.grids, places.points, places.directions, places.sd)
+    """The places on the structure; the motion of the base has none."""
+    on = np.flatnonzero(~places.base)
+    labels = tuple(places.labels[k] for k in on)
+    return Sites(labels, places.grids[on], places.points[on], places.directions[on], places.sd[on])
