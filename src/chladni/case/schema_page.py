@@ -1,5 +1,6 @@
 """``docs/case.md``, written from the table of the words a case may hold."""
 
+import sys
 from collections.abc import Sequence
 
 from .schema import COLUMNS, COMMANDS, SCHEMA, Key, sections
@@ -86,3 +87,7 @@ _FILES = """\
 
 Time histories, spectra and mode shapes are named in the notes and not used.
 """
+
+
+if __name__ == "__main__":  # python -m chladni.case.schema_page > docs/case.md
+    sys.stdout.write(page())

@@ -69,6 +69,7 @@ def places(
     known = {**table, **{label: _spoken(label, test, made, nodes, axes) for label in spoken}}
     rows = [_place(test, known[label], made) for label in labels]
     notes += _nodes_said(made, spoken, nodes, axes)
+    notes += _off_said(made, role, [r[3].place for r in rows if r[3].place is not None])
     return Places(
         labels=tuple(labels),
         grids=np.array([r[0] for r in rows], dtype=np.int64),
@@ -107,6 +108,22 @@ def _spoken(
     if not len(at) and id in nodes:
         return Sensor(label, None, nodes[id], way)
     return Sensor(label, id, direction=way)
+
+
+def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
+    """A sentence where places were moved to get onto the structure."""
+    if not given:
+        return []
+    if len(made.shells):
+        from ..fem.locate import locate
+
+        off = float(locate(made.points, made.shells.nodes, np.array(given)).distance.max())
+    else:
+        off = max(float(np.linalg.norm(made.points - x, axis=1).min()) for x in given)
+    if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
+        return []
+    what = "nearest points of the shells" if len(made.shells) else "nearest grids"
+    return [f"places of {role}s are up to {1e3 * off:.3g} mm off the mesh: the {what} count"]
 
 
 def _nodes_said(

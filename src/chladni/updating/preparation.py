@@ -39,13 +39,16 @@ POSITION_UNCERTAIN = 5e-3  # [m]
 
 def prepare(question: Question) -> Prepared:
     """Identify, decide how to compare, choose what is held out, build the workbench."""
-    uncertain = bool(
-        max(question.outputs.sd.max(initial=0), question.inputs.sd.max(initial=0))
-        > POSITION_UNCERTAIN
-    )
+    uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain)
     return _by_responses(question)
+
+
+def _place_sd(question: Question) -> float:
+    """Of the least known place of a sensor or shaker [m]."""
+    places = (question.outputs, question.inputs)
+    return max(float(p.sd.max(initial=0.0)) for p in places)
 
 
 def _by_responses(question: Question) -> Prepared:
@@ -97,6 +100,11 @@ def _by_responses(question: Question) -> Prepared:
     ]
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
+    if (sd := _place_sd(question)) > 0:
+        notes.append(
+            f"places are known to {1e3 * sd:.3g} mm at worst and count as exact; above "
+            f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
+        )
     notes += _mass_note(question)
     seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
     if not seen.any():
