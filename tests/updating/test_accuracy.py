@@ -26,20 +26,20 @@ def bench():
 @pytest.fixture(scope="module")
 def changes(bench):
     """Effect and x of each kind of change."""
-    cloth = bench.sheet
+    groups = bench.groups
     sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
-    setup = catalogue.Setup(sensors, (), float(cloth.weight.sum()), TOP)
+    setup = catalogue.Setup(sensors, (), float(groups.weight.sum()), TOP)
     k = bench.grids.position(int(bench.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0])
     return {
-        "thickness": (ordinary(cloth, "t", [0]), np.array([0.2])),
-        "thinner": (ordinary(cloth, "t", [1]), np.array([-0.2])),
-        "stiffer": (ordinary(cloth, "E", [0]), np.array([0.5])),
-        "thinning": (thickness_distribution(cloth, 0, 1), start),
-        "mass": (catalogue.point_mass(cloth, setup, bench.grids, k, 1), np.array([1.0, 0.2, 0.1])),
-        "masses": (catalogue.sensor_mass(cloth, setup)[0], np.array([0.5])),
+        "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
+        "thinner": (ordinary(groups, "t", [1]), np.array([-0.2])),
+        "stiffer": (ordinary(groups, "E", [0]), np.array([0.5])),
+        "thinning": (thickness_distribution(groups, 0, 1), start),
+        "mass": (catalogue.point_mass(groups, setup, bench.grids, k, 1), np.array([1.0, 0.2, 0.1])),
+        "masses": (catalogue.sensor_mass(groups, setup)[0], np.array([0.5])),
         "spring": (
-            catalogue.extra_support(cloth, setup, bench.grids, k, 1), np.array([2.0, 0.1, 0.2]),
+            catalogue.extra_support(groups, setup, bench.grids, k, 1), np.array([2.0, 0.1, 0.2]),
         ),
     }  # fmt: skip
 

@@ -13,7 +13,7 @@ from .effect import Effect
 from .movable_attachment import NEIGHBOURS, ExtraSupport, Patch, PointMass, moved
 from .ordinary import PartScale, ordinary
 from .orthotropic_material import orthotropic
-from .shell_groups import Sheet
+from .shell_groups import ShellGroups
 
 NAMES = (
     "orthotropic-material",
@@ -73,9 +73,9 @@ class Places:
         )
 
 
-def places(sheet: Sheet) -> Places:
+def places(groups: ShellGroups) -> Places:
     """All grids of shells."""
-    assembly = sheet.structure.assembly
+    assembly = groups.structure.assembly
     shells = assembly.shells
     X = assembly.points[shells.nodes]
     n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
@@ -86,7 +86,7 @@ def places(sheet: Sheet) -> Places:
     length = np.linalg.norm(total, axis=1)
     at = np.flatnonzero(length > 0)
     normal = total[at] / length[at, None]
-    rows = sheet.structure.along(assembly.ids[at], normal)
+    rows = groups.structure.along(assembly.ids[at], normal)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)
     return Places(
         assembly.ids[at[moving]], normal[moving], assembly.points[at[moving]], rows[moving]
@@ -105,33 +105,35 @@ def spread(point: np.ndarray, most: int) -> np.ndarray:
     return np.array(chosen)
 
 
-def everywhere(sheet: Sheet, grids: Sequence[int]) -> sp.csr_array:
+def everywhere(groups: ShellGroups, grids: Sequence[int]) -> sp.csr_array:
     """Rows of all three translations of each grid (3k, n)."""
     ids = np.repeat(np.asarray(grids), 3)
-    return sheet.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
+    return groups.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
 
 
-def point_mass(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+def point_mass(groups: ShellGroups, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
     """A mass near one grid; median 3 % of the structure's."""
     m = points.strength("M", "kg", 0.03 * setup.weight, 1.2, (-1.5, -0.5, 0.5))
-    area = patch(sheet, spots, k, np.eye(3))
-    return PointMass(moved(m), places=tried, patch=area, **_there(sheet, spots, k))
+    area = patch(groups, spots, k, np.eye(3))
+    return PointMass(moved(m), trials_factor=tried, patch=area, **_there(groups, spots, k))
 
 
-def extra_support(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+def extra_support(groups: ShellGroups, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
     """A spring to ground along the normal near one grid."""
     K = points.strength("K", "N/m", stiffness_scale(setup), 2.0, (-2.0, 0.0, 2.0))
     n = spots.normal[k]
-    area = patch(sheet, spots, k, n[None])
-    return ExtraSupport(moved(K), places=tried, patch=area, direction=n, **_there(sheet, spots, k))
+    area = patch(groups, spots, k, n[None])
+    return ExtraSupport(
+        moved(K), trials_factor=tried, patch=area, direction=n, **_there(groups, spots, k)
+    )
 
 
-def _there(sheet: Sheet, spots: Places, k: int) -> dict[str, Any]:
+def _there(groups: ShellGroups, spots: Places, k: int) -> dict[str, Any]:
     grid = int(spots.grids[k])
     return {"text": f"at grid {grid}", "grids": (grid,), "point": _tuple(spots.point[k])}
 
 
-def patch(sheet: Sheet, spots: Places, k: int, directions: np.ndarray) -> Patch:
+def patch(groups: ShellGroups, spots: Places, k: int, directions: np.ndarray) -> Patch:
     """The grids round one of the places that lie in the same face of the sheet."""
     d = spots.point - spots.point[k]
     facing = np.abs(spots.normal @ spots.normal[k]) > FACING
@@ -144,7 +146,7 @@ def patch(sheet: Sheet, spots: Places, k: int, directions: np.ndarray) -> Patch:
     plane = np.stack([e1, np.cross(n, e1)])
     size = float(np.sort(distance)[1:5].mean())
     rows = tuple(
-        sheet.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
+        groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
         for axis in directions
     )
     return Patch(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
@@ -155,7 +157,7 @@ def stiffness_scale(setup: Setup) -> float:
     return 0.1 * setup.weight * (2 * np.pi * setup.top / 3) ** 2
 
 
-def sensor_mass(sheet: Sheet, setup: Setup) -> list[Effect]:
+def sensor_mass(groups: ShellGroups, setup: Setup) -> list[Effect]:
     """One mass for all sensors; median 0.4 % of the structure's mass each, at least 2 g."""
     if not setup.sensors:
         return []
@@ -163,11 +165,11 @@ def sensor_mass(sheet: Sheet, setup: Setup) -> list[Effect]:
     scale = max(2e-3, 0.06 * setup.weight / len(grids))
     m = points.strength("M", "kg", scale, 1.3, (-2.0, -1.0, 0.0))
     text = f"at the {len(grids)} sensors"
-    rows = everywhere(sheet, grids)
+    rows = everywhere(groups, grids)
     return [points.SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3))]
 
 
-def suspension(sheet: Sheet, setup: Setup, normals: Places) -> list[Effect]:
+def suspension(groups: ShellGroups, setup: Setup, normals: Places) -> list[Effect]:
     """Springs at the hangers, along the surface normal or along every direction."""
     if not setup.hangers:
         return []
@@ -176,33 +178,33 @@ def suspension(sheet: Sheet, setup: Setup, normals: Places) -> list[Effect]:
     normal = np.array([where.get(int(g), np.array([0.0, 0.0, 1.0])) for g in hangers])
     k = points.strength("K", "N/m", 0.1 * stiffness_scale(setup), 2.0, (-3.0, -1.5, 0.0, 1.5))
     text = f"at hangers {', '.join(map(str, hangers))}"
-    along = sheet.structure.along(np.array(hangers), normal)
+    along = groups.structure.along(np.array(hangers), normal)
     n = len(hangers)
     return [
         points.Suspension((k,), text, grids=hangers, rows=along, directions=normal),
         points.Suspension(
-            (k,), text + ", every direction", grids=tuple(np.repeat(hangers, 3)), places=2,
-            rows=everywhere(sheet, hangers), directions=np.tile(np.eye(3), (n, 1)),
+            (k,), text + ", every direction", grids=tuple(np.repeat(hangers, 3)), trials_factor=2,
+            rows=everywhere(groups, hangers), directions=np.tile(np.eye(3), (n, 1)),
         ),
     ]  # fmt: skip
 
 
-def grains(sheet: Sheet) -> list[Effect]:
+def grains(groups: ShellGroups) -> list[Effect]:
     """Orthotropy of every isotropic material, axis 1 along each in-plane principal direction."""
-    parts = sheet.structure.assembly.parts
-    used = sorted(set(sheet.part.tolist()))
+    parts = groups.structure.assembly.parts
+    used = sorted(set(groups.part.tolist()))
     by_material: dict[object, list[int]] = {}
     for k in used:
         if (material := isotropic(parts[k])) is not None:
             by_material.setdefault(material, []).append(k)
     out: list[Effect] = []
     for positions in by_material.values():
-        inside = np.isin(sheet.part, positions)
-        X = sheet.centre[inside] - np.average(
-            sheet.centre[inside], axis=0, weights=sheet.area[inside]
+        inside = np.isin(groups.part, positions)
+        X = groups.centre[inside] - np.average(
+            groups.centre[inside], axis=0, weights=groups.area[inside]
         )
         directions = np.linalg.svd(X, full_matrices=False)[2][:1] if len(X) > 2 else np.eye(3)[:1]
-        out += [orthotropic(sheet, tuple(positions), _nearest_axis(d)) for d in directions]
+        out += [orthotropic(groups, tuple(positions), _nearest_axis(d)) for d in directions]
     return out
 
 
@@ -220,18 +222,18 @@ def _nearest_axis(direction: np.ndarray) -> np.ndarray:
     return np.eye(3)[k] if abs(direction[k]) > 0.98 else direction
 
 
-def defaults(sheet: Sheet) -> list[PartScale]:
+def defaults(groups: ShellGroups) -> list[PartScale]:
     """E and rho of every material and t of every shell part: what a user may calibrate anyway."""
-    parts = sheet.structure.assembly.parts
-    used = sorted(set(sheet.part.tolist()))
+    parts = groups.structure.assembly.parts
+    used = sorted(set(groups.part.tolist()))
     by_material: dict[int, list[int]] = {}
     for k in used:
         section = parts[k].section
         if isinstance(section, ShellSection):
             material = section.membrane or section.bending
             by_material.setdefault(id(material) if material is None else material.id, []).append(k)
-    out = [ordinary(sheet, q, ks) for ks in by_material.values() for q in ("E", "rho")]
-    return out + [ordinary(sheet, "t", [k]) for k in used]
+    out = [ordinary(groups, q, ks) for ks in by_material.values() for q in ("E", "rho")]
+    return out + [ordinary(groups, "t", [k]) for k in used]
 
 
 def _tuple(point: np.ndarray) -> tuple[float, float, float]:

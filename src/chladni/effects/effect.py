@@ -109,7 +109,7 @@ class Effect:
     text : where it acts, in words
     parts, grids : names of parts and ids of grids it concerns
     point : (3,) or None  its place in the basic frame [m]
-    places : how many places were tried before this one (look-elsewhere)
+    trials_factor : how many places were tried, this one among them (look-elsewhere)
     replaces : names of ordinary parameters it makes superfluous
     """
 
@@ -123,12 +123,12 @@ class Effect:
     grids: tuple[int, ...] = ()
     point: tuple[float, float, float] | None = None
     radius: float | None = None
-    places: int = 1
+    trials_factor: int = 1
     replaces: tuple[str, ...] = ()
     channels: tuple[str, ...] = field(default=())
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Sheet fields it multiplies."""
+        """ShellGroups fields it multiplies."""
         return ()
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
@@ -163,7 +163,7 @@ class Effect:
             out.append(row)
         return out
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """Where it is once it has been fitted."""
         return self.where()
 

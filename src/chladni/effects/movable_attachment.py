@@ -62,7 +62,7 @@ class Patch:
 
 
 @dataclass(frozen=True, eq=False)
-class Somewhere(Effect):
+class MovableAttachment(Effect):
     """x = (ln strength, place along both axes of the patch in units of its size)."""
 
     patch: Patch | None = None
@@ -92,10 +92,10 @@ class Somewhere(Effect):
         return np.asarray(self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """The strength; the place stands in ``settled``."""
+        """The strength; the place stands in ``location``."""
         return super().reported(x, sd)[:1]
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """The place a fit moved it to."""
         assert self.patch is not None
         point, grid = [float(v) for v in self.at(x)], self.nearest(x)
@@ -111,7 +111,7 @@ class Somewhere(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class PointMass(Somewhere):
+class PointMass(MovableAttachment):
     """A mass sits at a place the model does not know of."""
 
     name = "point-mass"
@@ -131,7 +131,7 @@ class PointMass(Somewhere):
 
 
 @dataclass(frozen=True, eq=False)
-class ExtraSupport(Somewhere):
+class ExtraSupport(MovableAttachment):
     """A spring to ground at an unknown place."""
 
     name = "extra-support"

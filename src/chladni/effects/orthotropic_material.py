@@ -8,7 +8,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
-from .shell_groups import Sheet
+from .shell_groups import ShellGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,11 @@ class OrthotropicMaterial(Effect):
     positions: tuple[int, ...] = ()
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    begun: np.ndarray | None = None  # x that the structure's own material has already
+    reference: np.ndarray | None = None  # x that the structure's own material has already
 
-    def begun_at(self, x: np.ndarray) -> Self:
+    def with_reference_state(self, x: np.ndarray) -> Self:
         """The same effect on a structure that has the material of x."""
-        return replace(self, begun=x.copy())
+        return replace(self, reference=x.copy())
 
     def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
         """(E1, E2, G12 [Pa], nu12) with nu12 = nu_m sqrt(E1/E2), nu_m the geometric mean."""
@@ -55,7 +55,10 @@ class OrthotropicMaterial(Effect):
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Ln factors of the four components of the plane stiffness."""
-        logs, h = self._logs(x) - (0.0 if self.begun is None else self._logs(self.begun)), 1e-6
+        logs, h = (
+            self._logs(x) - (0.0 if self.reference is None else self._logs(self.reference)),
+            1e-6,
+        )
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
         )
@@ -99,9 +102,11 @@ def _replaced(
 GRID = (-0.8, -0.3, 0.0, 0.3, 0.8)  # ln E1/E, ln E2/E where searches begin
 
 
-def orthotropic(sheet: Sheet, positions: tuple[int, ...], axis: np.ndarray) -> OrthotropicMaterial:
+def orthotropic(
+    groups: ShellGroups, positions: tuple[int, ...], axis: np.ndarray
+) -> OrthotropicMaterial:
     """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame."""
-    parts = sheet.structure.assembly.parts
+    parts = groups.structure.assembly.parts
     section = parts[positions[0]].section
     material = section.membrane or section.bending if isinstance(section, ShellSection) else None
     if not isinstance(material, Isotropic):
@@ -123,6 +128,6 @@ def orthotropic(sheet: Sheet, positions: tuple[int, ...], axis: np.ndarray) -> O
         E=material.E,
         nu=material.nu,
         positions=positions,
-        inside=np.isin(sheet.part, positions).astype(float),
+        inside=np.isin(groups.part, positions).astype(float),
         axis=np.asarray(axis, float),
     )

@@ -40,6 +40,6 @@ def sensor_fault(label: str, channel: int, n_outputs: int, sign: int, start: flo
     text = f"channel {label}" + (", sign reversed" if sign < 0 else "")
     unknown = Parameter("gain", "-", 0.0, 0.7, step=0.7, starts=(start,))
     return SensorFault(
-        (unknown,), text, channels=(label,), places=2 * n_outputs,
+        (unknown,), text, channels=(label,), trials_factor=2 * n_outputs,
         channel=channel, n_outputs=n_outputs, sign=sign,
     )  # fmt: skip

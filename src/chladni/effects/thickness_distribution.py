@@ -7,7 +7,7 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
-from .shell_groups import Sheet
+from .shell_groups import ShellGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,13 @@ class ThicknessDistribution(Effect):
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """The deepest thinning on the sheet and the radius R; the place stands in ``settled``."""
+        """The deepest thinning on the sheet and the radius R; the place stands in ``location``."""
         rows = super().reported(x, sd)
         there = float(self._bump(x, self._deepest(x)[1][None])[0])
         value, low, high = (there * thinning(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
         return [{**rows[0], "value": value, "low": low, "high": high}, rows[1]]
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """The place a fit moved it to: where the sheet is thinnest."""
         grid, deepest = self._deepest(x)
         point = [float(v) for v in deepest]
@@ -91,16 +91,18 @@ def thinning(x: float) -> float:
     return float(0.6 / (1 + np.exp(-x)))
 
 
-def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDistribution:
+def thickness_distribution(
+    groups: ShellGroups, group: int, trials_factor: int
+) -> ThicknessDistribution:
     """A thinning of the sheet that one group of shells belongs to, searched from that group on.
 
-    The unknown place is paid for by the spread of u and v; ``places`` counts the sheets tried.
+    The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets tried.
     """
-    part = int(sheet.part[group])
-    inside = sheet.connected == sheet.connected[group]
-    assembly = sheet.structure.assembly
-    grids = np.unique(sheet.nodes[inside[sheet.group]])
-    size = float(np.sqrt(sheet.area[sheet.part == part].sum()))
+    part = int(groups.part[group])
+    inside = groups.connected == groups.connected[group]
+    assembly = groups.structure.assembly
+    grids = np.unique(groups.nodes[inside[groups.group]])
+    size = float(np.sqrt(groups.area[groups.part == part].sum()))
     name = assembly.parts[part].name
     unknown = (
         Parameter("thinning", "-", -1.6, 1.2, kind="linear", step=0.8, starts=(-1.0,)),
@@ -109,9 +111,9 @@ def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDi
         Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(0.0,)),
     )
     return ThicknessDistribution(
-        unknown, f"on {name}", (name,), places=places,
-        shells=inside[sheet.group], inside=inside.astype(float), centre=sheet.centre,
-        surface=surface(sheet, group, size), size=size, variance=sheet.area / 12,
+        unknown, f"on {name}", (name,), trials_factor=trials_factor,
+        shells=inside[groups.group], inside=inside.astype(float), centre=groups.centre,
+        surface=surface(groups, group, size), size=size, variance=groups.area / 12,
         points=assembly.points[grids], ids=assembly.ids[grids],
     )  # fmt: skip
 
@@ -143,11 +145,11 @@ def _quadric(u: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def surface(sheet: Sheet, group: int, size: float) -> Surface:
+def surface(groups: ShellGroups, group: int, size: float) -> Surface:
     """The quadric through the corners of the part's shells, near ones counting most."""
-    assembly = sheet.structure.assembly
-    own = np.unique(sheet.nodes[sheet.part[sheet.group] == sheet.part[group]])
-    X, c = assembly.points[own], sheet.centre[group]
+    assembly = groups.structure.assembly
+    own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
+    X, c = assembly.points[own], groups.centre[group]
     w = np.exp(-((X - c) ** 2).sum(axis=1) / (2 * (0.25 * size) ** 2))
     middle = np.average(X, axis=0, weights=w)
     axes = np.linalg.svd((X - middle) * np.sqrt(w)[:, None], full_matrices=False)[2]

@@ -78,9 +78,9 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Effects without an unknown place: the best start of each."""
     bench, setup = search.bench, search.setup
     effects = [
-        *catalogue.grains(bench.sheet),
-        *catalogue.sensor_mass(bench.sheet, setup),
-        *catalogue.suspension(bench.sheet, setup, bench.grids),
+        *catalogue.grains(bench.groups),
+        *catalogue.sensor_mass(bench.groups, setup),
+        *catalogue.suspension(bench.groups, setup, bench.grids),
     ]
     out: list[Candidate] = []
     for effect in effects:
@@ -118,9 +118,9 @@ def _points(search: Search, bases: list[Baseline], data: Responses) -> list[Cand
 
 def point_effect(search: Search, matrix: str, spots: catalogue.Places, k: int) -> Effect:
     """A mass ("M") or a spring to ground ("K") near one of the places."""
-    sheet, setup, tried = search.bench.sheet, search.setup, len(search.bench.candidates)
+    groups, setup, tried = search.bench.groups, search.setup, len(search.bench.candidates)
     make = catalogue.point_mass if matrix == "M" else catalogue.extra_support
-    return make(sheet, setup, spots, k, tried)
+    return make(groups, setup, spots, k, tried)
 
 
 def _distinct(score: np.ndarray, point: np.ndarray, taken: list[int], wanted: int) -> list[int]:
@@ -140,15 +140,15 @@ RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
 
 def _thin(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Local thinning: its slope at every group and radius, the two best places per baseline."""
-    sheet = search.bench.sheet
-    count = len(set(sheet.connected.tolist()))
-    tried = [thickness_distribution(sheet, g, count) for g in range(len(sheet))]
+    groups = search.bench.groups
+    count = len(set(groups.connected.tolist()))
+    tried = [thickness_distribution(groups, g, count) for g in range(len(groups))]
     effects = [e for e in tried for _ in RADII]
     starts = [np.array([-2.0, np.log(radius), 0.0, 0.0]) for _ in tried for radius in RADII]
     bumps = np.stack([e.fields(x)[0].value for e, x in zip(effects, starts, strict=True)], axis=1)
     out: list[Candidate] = []
     taken: list[int] = []
-    where = np.repeat(sheet.centre, len(RADII), axis=0)
+    where = np.repeat(groups.centre, len(RADII), axis=0)
     for base in bases:
         slopes = thickness_slopes(base, search.bench.model, search.data)
         amount, score = direction_scores(base, slopes @ bumps)
@@ -203,11 +203,11 @@ def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
 
 
 def _thin_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
-    sheet = search.bench.sheet
-    some = catalogue.spread(sheet.centre, 30)
-    count = len(set(sheet.connected.tolist()))
-    effects: list[Effect] = [thickness_distribution(sheet, int(g), count) for g in some]
-    return _best_of(search, bases, effects, sheet.centre[some])
+    groups = search.bench.groups
+    some = catalogue.spread(groups.centre, 30)
+    count = len(set(groups.connected.tolist()))
+    effects: list[Effect] = [thickness_distribution(groups, int(g), count) for g in some]
+    return _best_of(search, bases, effects, groups.centre[some])
 
 
 def _best_of(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.movable_attachment import Somewhere
+from ..effects.movable_attachment import MovableAttachment
 from ..errors import ModelError
 from .candidates import candidates, point_effect
 from .hypothesis_fit import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
@@ -197,7 +197,7 @@ def _closer(search: Search, lead: Trial) -> list[Trial]:
     grids = search.bench.grids
     for _ in range(3):
         effect, x = lead.effect, lead.fit.of(lead.effect)
-        if not isinstance(effect, Somewhere) or np.abs(x[1:]).max() < 0.75:
+        if not isinstance(effect, MovableAttachment) or np.abs(x[1:]).max() < 0.75:
             break
         new = point_effect(
             search, "M" if effect.matrix == "M" else "K", grids, grids.position(effect.nearest(x))

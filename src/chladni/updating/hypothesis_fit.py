@@ -7,7 +7,7 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.effect import Effect
-from ..effects.movable_attachment import Somewhere
+from ..effects.movable_attachment import MovableAttachment
 from .likelihood import Data, Poles, Responses
 from .map_fit import Fit, Weighing, fit
 from .reduced_model import Reduced, State, evaluate
@@ -63,7 +63,7 @@ class Search:
     ) -> Trial:
         """Fit one effect together with the base, from these starts."""
         model = self.bench.model
-        if isinstance(effect, Somewhere):
+        if isinstance(effect, MovableAttachment):
             model = self.bench.with_attachments(effect.carried())
         else:
             for term in effect.terms(start):

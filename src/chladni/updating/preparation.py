@@ -179,7 +179,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
 def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
-        scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
+        scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
@@ -206,11 +206,11 @@ def searched(
 def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
     """The parameters the user frees, or E and rho of every material and t of every part."""
     chosen = [
-        ordinary(bench.sheet, name, [question.assembly.part(p) for p in parts])
+        ordinary(bench.groups, name, [question.assembly.part(p) for p in parts])
         for name, parts in question.parameters
         if name in ("E", "rho", "t")
     ]
-    return chosen or catalogue.defaults(bench.sheet)
+    return chosen or catalogue.defaults(bench.groups)
 
 
 def _mass_note(question: Question) -> list[str]:

@@ -1,4 +1,4 @@
-"""A structure made ready for trying hypotheses: sheet, basis, factor, places."""
+"""A structure made ready for trying hypotheses: groups of shells, basis, factor, places."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.catalogue import Places, places, spread
-from ..effects.shell_groups import Sheet, sheet
+from ..effects.shell_groups import ShellGroups, shell_groups
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
@@ -30,7 +30,7 @@ class Workbench:
     """
 
     structure: Structure
-    sheet: Sheet
+    groups: ShellGroups
     model: Reduced
     frequency: np.ndarray
     factor: Factor
@@ -76,9 +76,9 @@ def workbench(
     if extra is not None:
         blocks.append(extra)
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
-    cloth = sheet(built, groups)
-    grids = places(cloth)
+    shells = shell_groups(built, groups)
+    grids = places(shells)
     chosen = grids.only(spread(grids.point, most))
     return Workbench(
-        built, cloth, reduce(cloth, basis), modes.frequency, factor, hertz, grids, chosen
+        built, shells, reduce(shells, basis), modes.frequency, factor, hertz, grids, chosen
     )

@@ -62,4 +62,4 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     fresh = searched(
         changed, bench, data.over(bench.model), [*nuisances(bench, built, top), *extra], top
     )
-    return fresh, fresh.trial(effect.begun_at(x), x, fresh.mean())
+    return fresh, fresh.trial(effect.with_reference_state(x), x, fresh.mean())

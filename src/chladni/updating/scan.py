@@ -113,7 +113,7 @@ class _Probe(Effect):
 
 def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
     """∂r/∂ln t of every group, the row of the scales included (n, n_groups)."""
-    n = len(model.sheet)
+    n = len(model.groups)
     probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
     _, J = data.residual(state, True)
