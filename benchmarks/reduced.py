@@ -20,7 +20,8 @@ import numpy as np
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import count
 from chladni.effects.ordinary import ordinary
-from chladni.effects.points import MassEffect, Suspension, strength
+from chladni.effects.points import MassEffect, strength
+from chladni.effects.suspension import Suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy

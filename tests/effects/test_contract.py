@@ -9,13 +9,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects import catalogue, movable_attachment, points
 from chladni.effects import discretisation as mesh
-from chladni.effects import orthotropic_material as material
 from chladni.effects import sensor_fault as sensors
 from chladni.effects.effect import Effect
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import gain, ordinary, scatter
+from chladni.effects.orthotropic_material import material_axes
+from chladni.effects.point_mass import PointMass
+from chladni.effects.sensor_mass import sensor_mass
 from chladni.effects.shell_groups import shell_groups
+from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly
@@ -52,10 +56,11 @@ def bench():
 def cases(bench):
     groups = bench.groups
     corners = (1, 7, 57, 63)
-    setup = catalogue.Setup(corners, (7, 63), float(groups.weight.sum()), TOP)
+    setup = Setup(corners, (7, 63), float(groups.weight.sum()), TOP)
+    where = Surroundings(groups, bench.grids, bench.candidates, setup)
     k = bench.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
-    ortho = catalogue.grains(groups)[0]
+    ortho = material_axes(where)[0]
     over = mesh.mesh_error(bench.structure, TOP)
     own = mesh.jitter(bench.structure, TOP, over)
     waves = scatter(groups, "t", 0.03)
@@ -68,14 +73,10 @@ def cases(bench):
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
         "gain": (gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
-        "point-mass": (
-            catalogue.point_mass(groups, setup, bench.grids, k, 9), [0.2, 0.1, -0.1], [-20, 0, 0],
-        ),
-        "extra-support": (
-            catalogue.extra_support(groups, setup, bench.grids, k, 9), [-1, 0, 0], [-20, 0, 0],
-        ),
-        "sensor-mass": (catalogue.sensor_mass(groups, setup)[0], [-0.5], [-20]),
-        "suspension": (catalogue.suspension(groups, setup, bench.grids)[1], [-0.7], [-20]),
+        "point-mass": (PointMass.near(where, k), [0.2, 0.1, -0.1], [-20, 0, 0]),
+        "extra-support": (ExtraSupport.near(where, k), [-1, 0, 0], [-20, 0, 0]),
+        "sensor-mass": (sensor_mass(where)[0], [-0.5], [-20]),
+        "suspension": (suspension(where)[1], [-0.7], [-20]),
         "thickness-distribution": (
             thickness_distribution(groups, 0, 9), local, [-40, *local[1:]],
         ),
@@ -84,20 +85,11 @@ def cases(bench):
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
     return {
-        name: Case(e, np.array(x, float), np.array(idle, float), model_for(bench, e))
+        name: Case(
+            e, np.array(x, float), np.array(idle, float), bench.model_for(e, np.array(x, float))
+        )
         for name, (e, x, idle) in found.items()
     }
-
-
-def model_for(bench, effect: Effect) -> Reduced:
-    """A model whose basis carries the effect's rows, with the components it needs."""
-    if isinstance(effect, material.OrthotropicMaterial):
-        return bench.model.with_components()
-    if isinstance(effect, movable_attachment.MovableAttachment):
-        return bench.with_attachments(effect.carried())
-    if isinstance(effect, points.AtPoints):
-        return bench.with_attachments(effect.rows)
-    return bench.model
 
 
 @pytest.fixture(params=NAMES)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.catalogue import Setup, extra_support, point_mass
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import gain, ordinary
+from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
+from chladni.effects.surroundings import Setup, Surroundings
 from chladni.updating.likelihood import Poles
 from chladni.updating.reduced_model import evaluate
 
@@ -16,11 +18,11 @@ from chladni.updating.reduced_model import evaluate
 @pytest.fixture(scope="module")
 def effects(bench):
     setup = Setup((1, 63), (7,), 1.41, 200.0)
+    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup)
     spot = bench.grids.position(26)
     return [
         ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "t", [0]),
-        point_mass(bench.groups, setup, bench.grids, spot, 1),
-        extra_support(bench.groups, setup, bench.grids, spot + 12, 1),
+        PointMass.near(where, spot), ExtraSupport.near(where, spot + 12),
         gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
     ]  # fmt: skip
 

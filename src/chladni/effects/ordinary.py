@@ -63,6 +63,20 @@ def ordinary(
     )  # fmt: skip
 
 
+def defaults(groups: ShellGroups) -> list[PartScale]:
+    """E and rho of every material and t of every shell part: what a user may calibrate anyway."""
+    parts = groups.structure.assembly.parts
+    used = sorted(set(groups.part.tolist()))
+    by_material: dict[int, list[int]] = {}
+    for k in used:
+        section = parts[k].section
+        if isinstance(section, ShellSection):
+            material = section.membrane or section.bending
+            by_material.setdefault(id(material) if material is None else material.id, []).append(k)
+    out = [ordinary(groups, q, ks) for ks in by_material.values() for q in ("E", "rho")]
+    return out + [ordinary(groups, "t", [k]) for k in used]
+
+
 def value(part: Part, quantity: str) -> float:
     """E [Pa], rho [kg/m³] or t [m] of a shell part; E of an orthotropic sheet is sqrt(E1 E2)."""
     section = part.section
@@ -114,6 +128,7 @@ class Scatter(Effect):
     name = "scatter"
     claim = "thickness and modulus vary smoothly within a part"
     kind = "nuisance"
+    writable = False
 
     quantity: str = "t"
     functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n_groups, n), sd in

@@ -1,4 +1,4 @@
-"""The sheet's material: a grain, a rolling direction."""
+"""A sheet stiffer along one axis than across it: rolling, fibres, growth rings."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -6,9 +6,11 @@ from typing import Any, Self
 import numpy as np
 
 from ..model.assembly import Assembly
-from ..model.properties import Isotropic, Orthotropic, ShellSection
+from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
+from .family import Article, Family
 from .shell_groups import ShellGroups
+from .surroundings import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +22,7 @@ class OrthotropicMaterial(Effect):
 
     name = "orthotropic-material"
     claim = "the sheet is stiffer along one direction than across it"
+    remakes_structure = True
 
     E: float = 0.0
     nu: float = 0.3
@@ -131,3 +134,60 @@ def orthotropic(
         inside=np.isin(groups.part, positions).astype(float),
         axis=np.asarray(axis, float),
     )
+
+
+def material_axes(where: Surroundings) -> list[OrthotropicMaterial]:
+    """Orthotropy of every isotropic material, axis 1 along the longest extent of its parts."""
+    groups = where.groups
+    parts = groups.structure.assembly.parts
+    by_material: dict[object, list[int]] = {}
+    for k in sorted(set(groups.part.tolist())):
+        if (material := isotropic(parts[k])) is not None:
+            by_material.setdefault(material, []).append(k)
+    return [
+        orthotropic(groups, tuple(positions), _longest(groups, np.isin(groups.part, positions)))
+        for positions in by_material.values()
+    ]
+
+
+def isotropic(part: Part) -> Isotropic | None:
+    """The isotropic sheet material of a part, if that is what it has."""
+    if not isinstance(part.section, ShellSection):
+        return None
+    material = part.section.bending or part.section.membrane
+    return material if isinstance(material, Isotropic) else None
+
+
+def _longest(groups: ShellGroups, inside: np.ndarray) -> np.ndarray:
+    """First principal direction of some groups (3,), or the coordinate axis it all but is."""
+    centre, area = groups.centre[inside], groups.area[inside]
+    if len(centre) < 3:
+        return np.eye(3)[0]
+    X = centre - np.average(centre, axis=0, weights=area)
+    direction = np.linalg.svd(X, full_matrices=False)[2][0]
+    k = int(np.argmax(np.abs(direction)))
+    return np.eye(3)[k] if abs(direction[k]) > 0.98 else direction
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """E1/E2 off one by 6 to 35 %, G12 by up to 16 %, axis 1 along x, in all parts."""
+    old = isotropic(article.assembly.parts[0])
+    assert old is not None
+    ratio = float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.3))
+    E1, E2 = old.E * np.exp(ratio / 2), old.E * np.exp(-ratio / 2)
+    G = old.shear_modulus
+    G12 = G * float(np.exp(rng.uniform(-0.15, 0.15)))
+    new = Orthotropic(E1, E2, old.nu * np.sqrt(E1 / E2), G12, G, G, old.rho)
+    made = article.assembly
+    made = made.with_parts(tuple(p.with_section(membrane=new, bending=new) for p in made.parts))
+    axis = np.broadcast_to([1.0, 0, 0], made.shells.axis.shape)
+    moduli = {"E1": E1, "E2": E2, "G12": G12}
+    return replace(
+        article, assembly=replace(made, shells=replace(made.shells, axis=axis)),
+        truth={**moduli, "parameters": moduli},
+    )  # fmt: skip
+
+
+FAMILY = Family(
+    OrthotropicMaterial, conceal, placed=material_axes, cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3")
+)

@@ -7,7 +7,10 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
+from .family import Article, Family
+from .search_context import Candidate, SearchContext, best_places, distinct
 from .shell_groups import ShellGroups
+from .surroundings import farthest_point_sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +99,7 @@ def thickness_distribution(
 ) -> ThicknessDistribution:
     """A thinning of the sheet that one group of shells belongs to, searched from that group on.
 
-    The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets tried.
+    The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
     """
     part = int(groups.part[group])
     inside = groups.connected == groups.connected[group]
@@ -158,3 +161,58 @@ def surface(groups: ShellGroups, group: int, size: float) -> Surface:
     ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
     bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
     return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
+
+
+RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
+TRIED = 30  # groups that are evaluated one by one where only natural frequencies are known
+LEAST = 0.05  # of the scanned thinning: less of it, or a thickening, is no thinning
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """Local thinning: its slope at every group and radius, the two best places per baseline."""
+    groups = context.where.groups
+    sheets = len(set(groups.connected.tolist()))
+    if context.scan is None:
+        some = farthest_point_sample(groups.centre, TRIED)
+        tried = [thickness_distribution(groups, int(g), sheets) for g in some]
+        return best_places(context, tried, groups.centre[some])
+    tried = [thickness_distribution(groups, g, sheets) for g in range(len(groups))]
+    effects = [e for e in tried for _ in RADII]
+    starts = [np.array([-2.0, np.log(radius), 0.0, 0.0]) for _ in tried for radius in RADII]
+    bumps = np.stack([e.fields(x)[0].value for e, x in zip(effects, starts, strict=True)], axis=1)
+    centre = np.repeat(groups.centre, len(RADII), axis=0)
+    out: list[Candidate] = []
+    taken: list[int] = []
+    for about, base in enumerate(context.bases):
+        amount, score = context.scan.thickness_scores(about, bumps)
+        score = np.where(amount > LEAST, score, np.inf)
+        for k in distinct(score, centre, taken, 2):
+            if np.isfinite(score[k]):
+                taken.append(k)
+                out.append(Candidate(effects[k], _scaled(starts[k], amount[k]), base))
+    return out
+
+
+def _scaled(start: np.ndarray, amount: float) -> np.ndarray:
+    """A start whose depth is ``amount`` times that of the one scanned, from 2 to 40 %."""
+    alpha = np.clip(amount * thinning(start[0]), 0.02, 0.4)
+    return np.array([np.log(alpha / (0.6 - alpha)), *start[1:]])
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """8 to 25 % thinner round a grid of the first part, with R of 40 to 90 mm."""
+    made = article.assembly
+    first = made.shells.nodes[made.shells.part == 0]
+    centre = made.points[rng.choice(np.unique(first))]
+    alpha, R = float(rng.uniform(0.08, 0.25)), float(rng.uniform(0.04, 0.09))
+    q = np.exp(-((made.points - centre) ** 2).sum(axis=1) / (2 * R**2))
+    t = made.shells.thickness * (1 - alpha * q)[made.shells.nodes]
+    truth = {
+        "point_m": centre.tolist(), "value": alpha, "radius_m": R,
+        "parameters": {"thinning": alpha, "R": R},
+    }  # fmt: skip
+    thinned = replace(made, shells=replace(made.shells, thickness=t))
+    return replace(article, assembly=thinned, truth=truth)
+
+
+FAMILY = Family(ThicknessDistribution, conceal, candidates=candidates, cards=("CQUAD4", "CTRIA3"))

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..effects import catalogue
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
-from ..effects.ordinary import PartScale, gain, ordinary, scatter
+from ..effects.ordinary import PartScale, defaults, gain, ordinary, scatter
+from ..effects.surroundings import Setup
 from ..ema.identification import equalised, identify
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
@@ -197,7 +197,7 @@ def searched(
     base = [*_ordinary(question, bench), *nuisance]
     weight = mass_properties(question.assembly)[0]
     sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
-    setup = catalogue.Setup(sensors, question.hangers, weight, top)
+    setup = Setup(sensors, question.hangers, weight, top)
     return Search(
         bench, data, question.weighing, tuple(base), tuple(nuisance), setup, question.outputs.labels
     )
@@ -210,7 +210,7 @@ def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
         for name, parts in question.parameters
         if name in ("E", "rho", "t")
     ]
-    return chosen or catalogue.defaults(bench.groups)
+    return chosen or defaults(bench.groups)
 
 
 def _mass_note(question: Question) -> list[str]:

@@ -96,6 +96,11 @@ class Reduced:
             return {"": (self.groups.linear, self.groups.cubic)}
         return component_matrices(self.groups.structure.assembly)
 
+    def split_for(self, effect: Effect, x: np.ndarray) -> Self:
+        """The same model, split into components where the effect changes one of them."""
+        split = any(change.field in COMPONENTS for change in effect.fields(x))
+        return self.with_components() if split and "" in self.linear else self
+
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
         pieces = component_matrices(self.groups.structure.assembly)
