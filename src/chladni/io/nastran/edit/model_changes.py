@@ -14,12 +14,13 @@ from ....units import UNITS, Units
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
 from .laminate_changes import laminate_changes, laminated
+from .split_properties import bending_changes, split_changes, with_new_properties
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, laminates, thickness, masses, springs to ground that differ.
+    """Edits of the deck: materials, properties, thickness, masses, springs to ground that differ.
 
     Raises
     ------
@@ -28,10 +29,12 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     """
     units = units or UNITS["SI"]
     out: list[Change] = []
+    before, after, split = with_new_properties(deck, before, after)
     free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
     out += _materials(deck, before, after, units, free)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
+    out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
         out.append(Add(cards, "put in by the diagnosis"))
