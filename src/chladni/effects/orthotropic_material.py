@@ -58,10 +58,8 @@ class OrthotropicMaterial(Effect):
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Ln factors of the four components of the plane stiffness."""
-        logs, h = (
-            self._logs(x) - (0.0 if self.reference is None else self._logs(self.reference)),
-            1e-6,
-        )
+        has = 0.0 if self.reference is None else self._logs(self.reference)
+        logs, h = self._logs(x) - has, 1e-6
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
         )
