@@ -23,9 +23,9 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "dynamics": GROUND | {"sparse"},
     "ema": GROUND | {"dynamics"},
     "fem": GROUND | {"model", "geometry", "sparse", "dynamics"},
-    "io": GROUND | {"model", "dynamics", "ema"},
+    "io": GROUND | {"model", "geometry", "dynamics", "ema"},
     "bench": GROUND | {"dynamics", "ema"},
-    "effects": GROUND | {"model", "dynamics", "fem", "ema"},
+    "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
 MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
 MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io"}

@@ -19,8 +19,8 @@ from chladni.effects.effect import Effect
 from chladni.effects.ordinary import gain, ordinary, scatter
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
+from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
-from chladni.model.refine import refined
 from chladni.updating.reduced_model import Reduced, evaluate
 from chladni.updating.reduced_problem import workbench
 from chladni_specimens.plates import plate

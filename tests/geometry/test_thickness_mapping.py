@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chladni.errors import AccuracyError, ModelError
+from chladni.geometry.formed_mesh import FormedMesh
 from chladni.geometry.thickness_alignment import Alignment, align, moved, rigid
 from chladni.geometry.thickness_mapping import map_thickness, shell_area, shell_mass
 from chladni.geometry.thickness_prior import learn, predict, with_predicted
-from chladni.model.formed_mesh import FormedMesh
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.mesher.flat_regions import grid
 from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet

@@ -15,12 +15,13 @@ import numpy as np
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, TestSetup
 from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import UNITS, Units
-from .sensor_places import Places, grid_row, places
+from .sensor_places import grid_row, places
 from .toml_sections import KeyFile, Section, read_keys
 
 FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
@@ -57,7 +58,7 @@ class Case:
     damping : float           fraction of critical the model is given, where nothing else says
     recordings : tuple        one per file, article and level; FRFs share labels and quantity
     setup : TestSetup         sensors as the user describes them, hangers, weighed mass
-    outputs, inputs : Places  of the FRFs' dofs, in the FRFs' order
+    outputs, inputs : MeasuredDofs  of the FRFs' dofs, in the FRFs' order
     band : (low, high) or None   to fit [Hz]; None: all
     exclude : bands left out [Hz]
     held_sensors : int, labels or None   None: chosen automatically
@@ -74,8 +75,8 @@ class Case:
     damping: float | None
     recordings: tuple[Recording, ...]
     setup: TestSetup
-    outputs: Places
-    inputs: Places
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
     band: tuple[float, float] | None = None
     exclude: tuple[tuple[float, float], ...] = ()
     held_sensors: int | tuple[str, ...] | None = None

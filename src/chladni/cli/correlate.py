@@ -17,7 +17,7 @@ from ..ema.mode_pairing import Pairs, pair
 from ..errors import ChladniError, FileError
 from ..report.blocks import Block, Facts, Picture, Table
 from ..report.words import number, percent
-from ..workflows.case_model import DAMPING, markers, model_frf, rows
+from ..workflows.case_model import DAMPING, markers, model_frf
 from ..workflows.loaded_model import Model, is_case
 from .frf import REACH
 from .identify import firm
@@ -85,7 +85,7 @@ def correlated(job: Run, case: Case, model: Model) -> Correlation:
     job.progress("modes of the test", 0.4)
     found = identify(test, case.band, use=case.lines(test.frequency))
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
-    phi = rows(case.outputs, model.structure) @ near.shapes
+    phi = case.outputs.rows(model.structure) @ near.shapes
     psi = _shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)

@@ -19,9 +19,9 @@ from chladni_specimens.tailgate.tailgate import Specimen, tailgate_specimen
 
 from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
+from ..geometry.formed_mesh import FormedMesh
 from ..geometry.thickness_mapping import Mapped
 from ..model.assembly import Assembly
-from ..model.formed_mesh import FormedMesh
 from ..output import write_text
 from ..report.blocks import Facts, Picture
 from ..report.words import number
@@ -30,7 +30,7 @@ from ..workflows.loaded_model import on_faces
 from .run import Out, Run, started
 
 if TYPE_CHECKING:
-    from ..planning import Places
+    from ..planning import SensorCandidates
 
 
 def run(
@@ -68,12 +68,12 @@ def run(
 
 def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
     from ..geometry.mesh_quality import check_mesh
-    from ..planning import find_places
+    from ..planning import find_sensor_candidates
     from ..view import scene
     from ..view.surface import surface
 
     made = specimen.assembly
-    places, check = find_places(made), check_mesh(made)
+    places, check = find_sensor_candidates(made), check_mesh(made)
     joints = Counter(j.kind for j in specimen.joints)
     write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
     after = mapped.assembly if mapped else made
@@ -192,7 +192,7 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
         raise ModelError(f"a setting has the wrong kind of value: {error}") from error
 
 
-def _candidates(places: "Places") -> str:
+def _candidates(places: "SensorCandidates") -> str:
     rows = (
         f"{g}:n,{f'{g},,,' if is_grid else ',{:.7g},{:.7g},{:.7g}'.format(*x)},"
         f"{n[0]:.6f},{n[1]:.6f},{n[2]:.6f},output"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ..geometry.facets import point_normals, tangents
 from ..model.properties import Isotropic, Part, ShellSection
 from . import points
 from .effect import Effect
@@ -76,33 +77,14 @@ class Places:
 def places(sheet: Sheet) -> Places:
     """All grids of shells."""
     assembly = sheet.structure.assembly
-    shells = assembly.shells
-    X = assembly.points[shells.nodes]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    n = np.where(shells.triangle[:, None], np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]), n)
-    total = np.zeros_like(assembly.points)
-    for corner in range(4):
-        np.add.at(total, shells.nodes[:, corner], n)
-    length = np.linalg.norm(total, axis=1)
-    at = np.flatnonzero(length > 0)
-    normal = total[at] / length[at, None]
+    normal = point_normals(assembly.points, assembly.shells.nodes)
+    at = np.flatnonzero(normal.any(axis=1))
+    normal = normal[at]
     rows = sheet.structure.along(assembly.ids[at], normal)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)
     return Places(
         assembly.ids[at[moving]], normal[moving], assembly.points[at[moving]], rows[moving]
     )
-
-
-def spread(point: np.ndarray, most: int) -> np.ndarray:
-    """Positions of at most ``most`` points, each the farthest from those before it."""
-    if len(point) <= most:
-        return np.arange(len(point))
-    chosen = [int(np.argmin(((point - point.mean(axis=0)) ** 2).sum(axis=1)))]
-    far = ((point - point[chosen[0]]) ** 2).sum(axis=1)
-    for _ in range(most - 1):
-        chosen.append(int(np.argmax(far)))
-        far = np.minimum(far, ((point - point[chosen[-1]]) ** 2).sum(axis=1))
-    return np.array(chosen)
 
 
 def everywhere(sheet: Sheet, grids: Sequence[int]) -> sp.csr_array:
@@ -139,9 +121,7 @@ def patch(sheet: Sheet, spots: Places, k: int, directions: np.ndarray) -> Patch:
     near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
     near = near[np.isfinite(distance[near])]
     n = spots.normal[k]
-    e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
-    e1 /= np.linalg.norm(e1)
-    plane = np.stack([e1, np.cross(n, e1)])
+    plane = np.stack(tangents(n))
     size = float(np.sort(distance)[1:5].mean())
     rows = tuple(
         sheet.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))

@@ -10,6 +10,7 @@ from ..effects.effect import Effect
 from ..effects.sensor_fault import sensor_fault
 from ..effects.thickness_distribution import thickness_distribution
 from ..errors import ModelError
+from ..geometry.sampling import farthest_point_sample
 from .hypothesis_fit import Search, Trial
 from .likelihood import LN10, Poles, Responses
 from .reduced_model import evaluate
@@ -191,7 +192,7 @@ def _faults(search: Search, null: Trial, data: Responses) -> list[Candidate]:
 def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Masses and springs where only poles are known: a coarse spread of places, each evaluated."""
     spots = search.bench.candidates
-    some = catalogue.spread(spots.point, 40)
+    some = farthest_point_sample(spots.point, 40)
     out: list[Candidate] = []
     for matrix in "MK":
         grids = search.bench.grids
@@ -204,7 +205,7 @@ def _points_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
 
 def _thin_by_trial(search: Search, bases: list[Baseline]) -> list[Candidate]:
     sheet = search.bench.sheet
-    some = catalogue.spread(sheet.centre, 30)
+    some = farthest_point_sample(sheet.centre, 30)
     count = len(set(sheet.connected.tolist()))
     effects: list[Effect] = [thickness_distribution(sheet, int(g), count) for g in some]
     return _best_of(search, bases, effects, sheet.centre[some])

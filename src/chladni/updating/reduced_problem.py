@@ -7,9 +7,10 @@ import scipy.sparse as sp
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
-from ..effects.catalogue import Places, places, spread
+from ..effects.catalogue import Places, places
 from ..effects.shell_groups import Sheet, sheet
 from ..fem.assemble import Structure, structure
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
@@ -78,7 +79,7 @@ def workbench(
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
     cloth = sheet(built, groups)
     grids = places(cloth)
-    chosen = grids.only(spread(grids.point, most))
+    chosen = grids.only(farthest_point_sample(grids.point, most))
     return Workbench(
         built, cloth, reduce(cloth, basis), modes.frequency, factor, hertz, grids, chosen
     )

@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
-from chladni.geometry.nearest import Sheet, Surface, tangents
+from chladni.geometry.facets import tangents
+from chladni.geometry.nearest import Sheet, ShellSurface
 from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
 from chladni.model.properties import BeamSection, Isotropic
 
@@ -39,7 +40,7 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
     return sides[count == 1]
 
 
-def rim(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
+def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
     """Rows of the points round a hole: its rim, else free edges within `radius`, else a shell's.
 
     A hole is a closed free edge no wider than four radii whose middle is within two radii. Where a
@@ -94,7 +95,7 @@ def screw(
     The bar weighs little over the millimetre between two sheets; head and nut make up the rest.
     """
     place = np.asarray(place, dtype=float)
-    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     feet = [s.feet(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
@@ -177,7 +178,7 @@ def tied_hole(
 ) -> Joined:
     """The rims of an empty hole in all its sheets on one RBE2, which reality does not have."""
     place = np.asarray(place, dtype=float)
-    surfaces = [Surface.of(assembly, s) for s in sheets]
+    surfaces = [ShellSurface.of(assembly, s) for s in sheets]
     feet = [s.feet(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
@@ -211,7 +212,7 @@ def grip(
     places, directions : (k, 3)   [m], unit vectors
     stiffness : (k,)              [N/m]
     """
-    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     ends, far = [], np.zeros(len(places))
     for surface in surfaces:
         feet = surface.feet(places)
@@ -269,7 +270,7 @@ def hem(
     grip_stiffness : stiffness against sliding along the edge per length [N/m²]; 0: the soft
         string alone, as the thesis models it
     """
-    inner = Surface.of(assembly, sheets[0])
+    inner = ShellSurface.of(assembly, sheets[0])
     edge = followed(np.asarray(edge, dtype=float), pitch)
     line = _inboard(inner, edge, inset)
     assembly, joints = adhesive_bead(
@@ -290,7 +291,7 @@ def hem(
     return assembly, joints + grips
 
 
-def _inboard(surface: Surface, edge: np.ndarray, inset: float) -> np.ndarray:
+def _inboard(surface: ShellSurface, edge: np.ndarray, inset: float) -> np.ndarray:
     """The edge moved into the sheet along its surface, on the side where the sheet is."""
     tangent, _ = along_line(edge, 1.0)
     side = np.cross(surface.feet(edge).normal, tangent)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from chladni.model.formed_mesh import FormedMesh
+from chladni.geometry.formed_mesh import FormedMesh
 
 from .graded import graded, loops
 from .pressed_sheets import MAIN, Depth, Sheet

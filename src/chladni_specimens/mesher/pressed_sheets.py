@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import components
+from chladni.geometry.facets import cell_areas
 
 from .flat_regions import strip
 from .quads_from_triangles import split_folded
@@ -42,11 +43,8 @@ class Sheet:
 
     @property
     def area(self) -> np.ndarray:
-        """A = |d1 x d2| / 2 of every cell (m,) [m²]."""
-        x = self.points[self.quads]
-        return np.asarray(
-            np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1) / 2
-        )
+        """Area of every cell (m,) [m²]."""
+        return cell_areas(self.points, self.quads)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.errors import ModelError
-from chladni.geometry.nearest import Surface
+from chladni.geometry.nearest import ShellSurface
 from chladni.model.assembly import Assembly
 
 from ..joints.bolts import along_line, grip, screw, tied_hole
@@ -51,9 +51,9 @@ class Frame:
     sheets: dict[str, Sheet]
     rows: dict[str, np.ndarray]
 
-    def surface(self, name: str, zone: int = MAIN) -> Surface:
+    def surface(self, name: str, zone: int = MAIN) -> ShellSurface:
         """The shells of one zone of a sheet."""
-        found = Surface.of(self.assembly, self.rows[name][self.sheets[name].zone == zone])
+        found = ShellSurface.of(self.assembly, self.rows[name][self.sheets[name].zone == zone])
         return replace(found, name=name)
 
 
