@@ -14,7 +14,7 @@ from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.joints.bolts import accelerometers, grip, hem, screw, tied_hole
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.tailgate import of_sheets
 
 STEEL = Isotropic(210e9, 0.3, 7850.0)
@@ -24,7 +24,7 @@ GAP = 0.0015
 def sheet(name, x, y, z):
     plan, quads = grid(x, y)
     points = np.column_stack([plan, np.full(len(plan), z)])
-    return Sheet(name, points, points, quads, np.full(len(quads), MAIN))
+    return PressedSheet(name, points, points, quads, np.full(len(quads), MAIN))
 
 
 def pair(h=0.010, gap=GAP, length=0.2, width=0.06):

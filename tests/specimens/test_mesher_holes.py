@@ -8,7 +8,7 @@ from chladni.geometry.cells import edges_of
 from chladni.geometry.nearest import ShellSurface
 from chladni_specimens.joints.bolts import free_edges, rim
 from chladni_specimens.mesher.flat_regions import fill, grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.mesher.round_holes import bored
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate_specimen
@@ -26,7 +26,7 @@ def space(plan):
 
 def sheet(points, quads):
     plan = np.column_stack([points, 0 * points[:, 0]])
-    return Sheet("sheet", plan, space(plan), quads, np.full(len(quads), MAIN))
+    return PressedSheet("sheet", plan, space(plan), quads, np.full(len(quads), MAIN))
 
 
 def lattice(h):

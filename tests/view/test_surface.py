@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.specimens.test_calculix import WELDS, coupon
 
 from chladni.errors import ShapeError
-from chladni.geometry.skin import skin
+from chladni.geometry.solid_faces import skin
 from chladni.model.assembly import Assembly, Solids
 from chladni.view.camera import best_view, needed_views, visible
 from chladni.view.surface import Surface, surface

@@ -13,7 +13,7 @@ from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
 from ..ema.identification import Identified, identify
-from ..ema.mode_pairing import Pairs, pair
+from ..ema.mode_pairing import ModePairs, pair
 from ..errors import ChladniError, FileError
 from ..report.blocks import Block, Facts, Picture, Table
 from ..report.words import number, percent
@@ -37,7 +37,7 @@ class Correlation:
     f_test: np.ndarray
     f_model: np.ndarray
     mac: np.ndarray | None  # (model, test)
-    pairs: Pairs
+    pairs: ModePairs
     comac: np.ndarray | None
     quality: Quality | None
     model: FRF | None

@@ -25,7 +25,7 @@ class ThicknessDistribution(Effect):
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # groups of the sheet
     centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the groups
-    surface: "Surface" = field(default_factory=lambda: Surface())
+    surface: "Quadric" = field(default_factory=lambda: Quadric())
     size: float = 1.0
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
@@ -117,7 +117,7 @@ def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDi
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Quadric:
     """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
 
     ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
@@ -143,7 +143,7 @@ def _quadric(u: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def surface(sheet: Sheet, group: int, size: float) -> Surface:
+def surface(sheet: Sheet, group: int, size: float) -> Quadric:
     """The quadric through the corners of the part's shells, near ones counting most."""
     assembly = sheet.structure.assembly
     own = np.unique(sheet.nodes[sheet.part[sheet.group] == sheet.part[group]])
@@ -155,4 +155,4 @@ def surface(sheet: Sheet, group: int, size: float) -> Surface:
     A = _quadric(u) * np.sqrt(w)[:, None]
     ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
     bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
-    return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
+    return Quadric(c, axes[:2], axes[2], bend, 0.5 * size)

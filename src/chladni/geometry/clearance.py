@@ -197,12 +197,6 @@ def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
     return np.where(np.isfinite(least), least, np.nan)
 
 
-def clearances(assembly: Assembly, within: float = 0.010) -> tuple[PairClearance, ...]:
-    """All pairs of parts that come within a distance of each other, nearest first."""
-    found = [summary(assembly, g) for g in all_gaps(assembly, within=within)]
-    return tuple(sorted(found, key=lambda pair: pair.least_free))
-
-
 def summary(assembly: Assembly, g: Gaps) -> PairClearance:
     """What there is to say about a pair."""
     free = np.flatnonzero(g.free)

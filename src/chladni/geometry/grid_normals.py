@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import LabelError
 from ..model.assembly import Assembly
 from .facets import point_normals
-from .skin import skin
+from .solid_faces import skin
 
 
 def grid_normals(assembly: Assembly, rows: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ NEAR = 12  # quads around a place whose triangles are tried first
 BLOCK = 200_000  # quads tried at a time, so that far places need little memory
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
 
-Sheet = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
+ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class ShellSurface:
         return cls.over("the structure", assembly.points, assembly.shells.nodes)
 
     @classmethod
-    def of(cls, assembly: Assembly, sheet: Sheet) -> Self:
+    def of(cls, assembly: Assembly, sheet: ShellChoice) -> Self:
         """The shells of a part, or the shells with these rows."""
         if isinstance(sheet, str | int):
             part = assembly.part(sheet)

@@ -11,7 +11,7 @@ from ..arrays import readonly
 from ..errors import ModelError, ShapeError
 from ..geometry.cells import directed_edges
 from ..geometry.facets import cell_normals, vector_areas
-from ..geometry.skin import skin
+from ..geometry.solid_faces import skin
 from ..model.assembly import Assembly, Average
 
 

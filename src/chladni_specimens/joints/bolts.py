@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
 from chladni.geometry.facets import tangents
-from chladni.geometry.nearest import Sheet, ShellSurface
+from chladni.geometry.nearest import ShellChoice, ShellSurface
 from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
 from chladni.model.properties import BeamSection, Isotropic
 
@@ -82,7 +82,7 @@ def _spider(id_: int, centre: int, rows: np.ndarray) -> RigidBody:
 def screw(
     assembly: Assembly,
     place: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     diameter: float = 0.006,
     mass: float = 0.012,
@@ -171,7 +171,7 @@ def accelerometers(assembly: Assembly, ids: Sequence[int], mass: float = 0.005) 
 def tied_hole(
     assembly: Assembly,
     place: np.ndarray,
-    sheets: Sequence[Sheet],
+    sheets: Sequence[ShellChoice],
     *,
     radius: float = 0.006,
     reach: float = REACH,
@@ -199,7 +199,7 @@ def grip(
     places: np.ndarray,
     directions: np.ndarray,
     stiffness: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     reach: float = REACH,
 ) -> Joined:
@@ -250,7 +250,7 @@ def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndar
 def hem(
     assembly: Assembly,
     edge: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     inset: float = 0.0075,
     width: float = 0.010,

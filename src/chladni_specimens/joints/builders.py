@@ -12,7 +12,7 @@ import numpy as np
 
 from chladni.errors import ModelError
 from chladni.geometry.facets import tangents
-from chladni.geometry.nearest import Feet, Sheet, ShellSurface, nearest_parts
+from chladni.geometry.nearest import Feet, ShellChoice, ShellSurface, nearest_parts
 from chladni.model.assembly import Assembly, Average, Solids
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
 
@@ -242,7 +242,7 @@ def _centred(
 def spot_welds(
     assembly: Assembly,
     places: np.ndarray,
-    sheets: tuple[Sheet, Sheet] | None = None,
+    sheets: tuple[ShellChoice, ShellChoice] | None = None,
     *,
     side: float = 0.005,
     height: float | None = None,
@@ -283,7 +283,7 @@ def spot_welds(
     return assembly, tuple(report)
 
 
-def _key(pair: tuple[Sheet, Sheet]) -> tuple:
+def _key(pair: tuple[ShellChoice, ShellChoice]) -> tuple:
     return tuple(s if isinstance(s, str | int) else tuple(np.asarray(s).tolist()) for s in pair)
 
 
@@ -298,7 +298,7 @@ def _nuggets(start: np.ndarray, axis: np.ndarray, height: np.ndarray, side: floa
 def adhesive_bead(
     assembly: Assembly,
     line: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     width: float = 0.010,
     height: float | None = None,
