@@ -22,7 +22,7 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import UNITS, Units
 from .sensor_places import grid_row, places
-from .toml_sections import KeyFile, Section, read_keys
+from .toml_sections import KeyFile, TomlSection, read_keys
 
 FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
 EFFECTS = (
@@ -141,7 +141,7 @@ def load_case(path: str | Path) -> Case:
     )
 
 
-def _file(section: Section, key: str, name: str) -> Path:
+def _file(section: TomlSection, key: str, name: str) -> Path:
     """A file the case names, beside it."""
     path = section.file.parent / name
     if not path.is_file():
@@ -152,7 +152,7 @@ def _file(section: Section, key: str, name: str) -> Path:
     return path
 
 
-def _recordings(test: Section) -> tuple[Recording, ...]:
+def _recordings(test: TomlSection) -> tuple[Recording, ...]:
     """All recordings, the FRFs with the labels of the first in its order."""
     quantity = test.text("quantity", among=get_args(Quantity))
     read: list[Recording] = []
@@ -162,7 +162,7 @@ def _recordings(test: Section) -> tuple[Recording, ...]:
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in read)
 
 
-def _like(first: Recording, other: Recording, test: Section) -> Recording:
+def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
     """The recording with the labels of the first, in its order."""
     a, b = first.frf, other.frf
     assert a is not None
@@ -181,7 +181,7 @@ def _like(first: Recording, other: Recording, test: Section) -> Recording:
     return replace(other, frf=b.sel(a.outputs, a.inputs))
 
 
-def _setup(test: Section, made: Assembly) -> TestSetup:
+def _setup(test: TomlSection, made: Assembly) -> TestSetup:
     """Sensors, hangers and weighing as the user gives them."""
     name = test.text("sensors")
     sensors = read_sensors(_file(test, "sensors", name)) if name else ()
@@ -210,7 +210,7 @@ def _bands(
 
 
 def _inside(
-    section: Section,
+    section: TomlSection,
     key: str,
     band: tuple[float, float],
     recordings: Sequence[Recording],
@@ -261,7 +261,7 @@ def _held(
 _PARAMETER = ("name", "parts", "field")
 
 
-def _parameter(section: Section, made: Assembly) -> FreeParameter:
+def _parameter(section: TomlSection, made: Assembly) -> FreeParameter:
     """A parameter the user frees."""
     what = section.text("field", due=True, among=(*FIELDS, *EFFECTS)) or ""
     parts: list[str] = []

@@ -11,13 +11,13 @@ from ..geometry.grid_normals import grid_normals
 from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
-from .toml_sections import Section
+from .toml_sections import TomlSection
 
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
 
 
 def places(
-    test: Section, setup: TestSetup, made: Assembly, labels: Sequence[str], role: Role
+    test: TomlSection, setup: TestSetup, made: Assembly, labels: Sequence[str], role: Role
 ) -> MeasuredDofs:
     """Every label of the recording on the structure."""
     known = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
@@ -32,7 +32,7 @@ def places(
     )
 
 
-def _spoken(label: str, test: Section) -> Sensor:
+def _spoken(label: str, test: TomlSection) -> Sensor:
     """What a label says by itself: node and direction."""
     where = test.at("recordings")
     node = label.partition(":")[0].strip()
@@ -43,7 +43,7 @@ def _spoken(label: str, test: Section) -> Sensor:
 
 
 def _place(
-    test: Section, given: Sensor | None, label: str, made: Assembly
+    test: TomlSection, given: Sensor | None, label: str, made: Assembly
 ) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
     """(grid or 0, place, direction, sensor) of one dof; None given: what the label says.
 
