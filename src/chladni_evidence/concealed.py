@@ -16,8 +16,8 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.effects import registry
 from chladni.effects.family import Article
-from chladni.effects.surroundings import farthest_point_sample
 from chladni.fem.assemble import Structure, structure
+from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.nastran import write_assembly
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
@@ -123,9 +123,8 @@ def _layout(
     """Grids of sensors, shaker and hangers, on the faces that look up."""
     X = deck.points
     used = np.unique(deck.shells.nodes[deck.shells.part == 0])
-    chosen = used[
-        farthest_point_sample(X[used] + 0.01 * rng.normal(size=(len(used), 3)), specimen.sensors)
-    ]
+    shaken = X[used] + 0.01 * rng.normal(size=(len(used), 3))
+    chosen = used[farthest_point_sample(shaken, specimen.sensors)]
     low = np.quantile(X[used], 0.12, axis=0), np.quantile(X[used], 0.3, axis=0)
     corner = [k for k in used if np.all((X[k, :2] > low[0][:2]) & (X[k, :2] < low[1][:2]))]
     edge = used[np.argsort(X[used, 1])[-max(4, len(used) // 15) :]]

@@ -22,8 +22,8 @@ from chladni.effects.surroundings import Setup, Surroundings
 from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
+from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
-from chladni.model.refine import refined
 from chladni.updating.reduced_model import Reduced, evaluate
 from chladni.updating.reduced_problem import workbench
 from chladni_specimens.plates import plate

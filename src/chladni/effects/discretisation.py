@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..fem.assemble import Structure, structure
-from ..model.refine import refined
+from ..geometry.refine import refined
 from .effect import Effect, Parameter, PointTerm
 
 MOST = 40_000  # dofs of a structure that is still refined

@@ -12,9 +12,11 @@ from typing import Any, Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..geometry.facets import tangents
+from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, Parameter, PointTerm
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import Surroundings, farthest_point_sample
+from .surroundings import Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
@@ -148,9 +150,7 @@ def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
     near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
     near = near[np.isfinite(distance[near])]
     n = spots.normal[k]
-    e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
-    e1 /= np.linalg.norm(e1)
-    plane = np.stack([e1, np.cross(n, e1)])
+    plane = np.stack(tangents(n))
     size = float(np.sort(distance)[1:5].mean())
     rows = tuple(
         where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..geometry.facets import point_normals
 from .shell_groups import ShellGroups
 
 
@@ -67,33 +68,14 @@ class ShellGrids:
 def shell_grids(groups: ShellGroups) -> ShellGrids:
     """All grids of shells that can move along the normal there."""
     assembly = groups.structure.assembly
-    shells = assembly.shells
-    X = assembly.points[shells.nodes]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    n = np.where(shells.triangle[:, None], np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]), n)
-    total = np.zeros_like(assembly.points)
-    for corner in range(4):
-        np.add.at(total, shells.nodes[:, corner], n)
-    length = np.linalg.norm(total, axis=1)
-    at = np.flatnonzero(length > 0)
-    normal = total[at] / length[at, None]
+    normal = point_normals(assembly.points, assembly.shells.nodes)
+    at = np.flatnonzero(normal.any(axis=1))
+    normal = normal[at]
     rows = groups.structure.along(assembly.ids[at], normal)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)
     return ShellGrids(
         assembly.ids[at[moving]], normal[moving], assembly.points[at[moving]], rows[moving]
     )
-
-
-def farthest_point_sample(point: np.ndarray, most: int) -> np.ndarray:
-    """Positions of at most ``most`` points, each the farthest from those before it."""
-    if len(point) <= most:
-        return np.arange(len(point))
-    chosen = [int(np.argmin(((point - point.mean(axis=0)) ** 2).sum(axis=1)))]
-    far = ((point - point[chosen[0]]) ** 2).sum(axis=1)
-    for _ in range(most - 1):
-        chosen.append(int(np.argmax(far)))
-        far = np.minimum(far, ((point - point[chosen[-1]]) ** 2).sum(axis=1))
-    return np.array(chosen)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .shell_groups import ShellGroups
-from .surroundings import farthest_point_sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class ThicknessDistribution(Effect):
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # groups of the sheet
     centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the groups
-    surface: "Surface" = field(default_factory=lambda: Surface())
+    surface: "Quadric" = field(default_factory=lambda: Quadric())
     size: float = 1.0
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
@@ -122,7 +122,7 @@ def thickness_distribution(
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Quadric:
     """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
 
     ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
@@ -148,7 +148,7 @@ def _quadric(u: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def surface(groups: ShellGroups, group: int, size: float) -> Surface:
+def surface(groups: ShellGroups, group: int, size: float) -> Quadric:
     """The quadric through the corners of the part's shells, near ones counting most."""
     assembly = groups.structure.assembly
     own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
@@ -160,7 +160,7 @@ def surface(groups: ShellGroups, group: int, size: float) -> Surface:
     A = _quadric(u) * np.sqrt(w)[:, None]
     ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
     bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
-    return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
+    return Quadric(c, axes[:2], axes[2], bend, 0.5 * size)
 
 
 RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area

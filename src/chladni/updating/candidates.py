@@ -21,12 +21,12 @@ WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 def candidates(search: Search, null: Trial) -> list[Candidate]:
     """The most promising of every family, scanned about the nominal and the calibrated model."""
-    context = Context(search, null)
+    context = UpdatingContext(search, null)
     return [candidate for family in families() for candidate in family.proposed(context)]
 
 
 @dataclass(frozen=True, eq=False)
-class Context:
+class UpdatingContext:
     """A search as families of effects see it (:class:`..effects.search_context.SearchContext`)."""
 
     search: Search
@@ -96,7 +96,7 @@ class Context:
 class Scan:
     """Scores of many changes at once (:class:`..effects.search_context.ResponseScan`)."""
 
-    context: Context
+    context: UpdatingContext
     data: Responses
 
     @cached_property

@@ -9,8 +9,9 @@ from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import Effect
 from ..effects.shell_groups import ShellGroups, shell_groups
-from ..effects.surroundings import ShellGrids, farthest_point_sample, shell_grids
+from ..effects.surroundings import ShellGrids, shell_grids
 from ..fem.assemble import Structure, structure
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
