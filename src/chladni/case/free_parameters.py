@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 
+from ..effects.registry import families
 from ..errors import FileError, LabelError
 from ..io.nastran import Deck
 from ..model.assembly import Assembly
@@ -17,8 +18,8 @@ from ..model.properties import (
     ShellSection,
     SolidSection,
 )
-from .schema import ALIASES, FIELDS, FREEABLE, PLACED, PLANNED, SEARCHED
-from .toml_sections import Section
+from .schema import ALIASES, FIELDS, PLANNED
+from .toml_sections import TomlSection
 
 _CARD = re.compile(r"^\s*([A-Z]+[0-9]?)\s+(\d{1,8})\s*$")
 _LUMPS = {"PBUSH": "bushes", "PELAS": "springs", "CELAS2": "springs", "CONM2": "masses"}
@@ -26,7 +27,7 @@ _OF_LUMPS = {"springs": "K", "bushes": "K", "masses": "M"}
 _WORDS = {"springs": "a spring", "bushes": "a bush", "masses": "a mass"}
 
 
-def free_parameter(section: Section, made: Assembly, deck: Deck) -> FreeParameter:
+def free_parameter(section: TomlSection, made: Assembly, deck: Deck) -> FreeParameter:
     """One [[parameter]], resolved.
 
     Raises
@@ -39,7 +40,7 @@ def free_parameter(section: Section, made: Assembly, deck: Deck) -> FreeParamete
     low = section.number("low", low=1e-6, high=0.999)
     high = section.number("high", low=1.001, high=1e6)
     name = section.text("name") or what
-    if what in PLACED:
+    if what in _placed_names():
         return _placed(section, made, what, name)
     field = ALIASES.get(what, what)
     given, positions, lumps = _members(section, made, deck)
@@ -59,23 +60,29 @@ def free_parameter(section: Section, made: Assembly, deck: Deck) -> FreeParamete
     )  # fmt: skip
 
 
-def _field(section: Section) -> str:
+def _field(section: TomlSection) -> str:
     """The field, or why it cannot be freed."""
     what = section.text("field", due=True) or ""
-    if what in SEARCHED:
+    freeable = (*FIELDS, *ALIASES, *_placed_names())
+    if what in {f.name for f in families() if f.placed is None}:
         raise FileError(
             f"{section.at('field')} = {what!r} has an unknown place, so calibration cannot free "
-            f"it; diagnose looks for it; what can be freed are {', '.join(FREEABLE)}"
+            f"it; diagnose looks for it; what can be freed are {', '.join(freeable)}"
         )
     if what in PLANNED:
         raise FileError(
             f"{section.at('field')} = {what!r} is an effect no model stands behind yet; what can "
-            f"be freed are {', '.join(FREEABLE)}"
+            f"be freed are {', '.join(freeable)}"
         )
-    return section.text("field", among=FREEABLE) or ""
+    return section.text("field", among=freeable) or ""
 
 
-def _placed(section: Section, made: Assembly, what: str, name: str) -> FreeParameter:
+def _placed_names() -> tuple[str, ...]:
+    """Effects of which deck and test tell where they act, those of installed packages too."""
+    return tuple(f.name for f in families() if f.placed is not None)
+
+
+def _placed(section: TomlSection, made: Assembly, what: str, name: str) -> FreeParameter:
     """An effect freed as it is, of the parts named."""
     for key in ("sd", "low", "high"):
         if key in section:
@@ -99,7 +106,7 @@ def _placed(section: Section, made: Assembly, what: str, name: str) -> FreeParam
 
 
 def _members(
-    section: Section, made: Assembly, deck: Deck | None
+    section: TomlSection, made: Assembly, deck: Deck | None
 ) -> tuple[list[str], list[int], dict[str, list[int]]]:
     """(names as given, positions of parts, rows of lumps by family)."""
     given: list[str] = []
@@ -125,7 +132,7 @@ def _names_a_part(made: Assembly, name: str) -> bool:
     return any(name == p.name for p in made.parts)
 
 
-def _position(section: Section, made: Assembly, name: object) -> int:
+def _position(section: TomlSection, made: Assembly, name: object) -> int:
     if isinstance(name, bool) or not isinstance(name, str | int):
         raise FileError(f"{section.at('parts')} holds {name!r}; write names of parts in quotes")
     try:
@@ -140,7 +147,7 @@ def _position(section: Section, made: Assembly, name: object) -> int:
 
 
 def _lumps(
-    section: Section, made: Assembly, deck: Deck, kind: str, id: int
+    section: TomlSection, made: Assembly, deck: Deck, kind: str, id: int
 ) -> tuple[str, list[int]]:
     """(family, rows) of the springs, bushes or masses a card stands for."""
     where = section.at("parts")
@@ -169,7 +176,7 @@ def _elements(deck: Deck, kind: str, id: int) -> list[int]:
 
 
 def _all_that_have(
-    section: Section, made: Assembly, field: str, what: str
+    section: TomlSection, made: Assembly, field: str, what: str
 ) -> tuple[list[int], dict[str, list[int]]]:
     """Every part, spring, bush or mass that has the field."""
     if what == "adhesive-stiffness":
@@ -192,7 +199,7 @@ def _all_that_have(
     return positions, lumps
 
 
-def _serves(section: Section, part: Part, field: str) -> None:
+def _serves(section: TomlSection, part: Part, field: str) -> None:
     """Refuse a field the part has not."""
     if field not in fields_of(part):
         have = ", ".join(fields_of(part)) or "nothing that can be freed"

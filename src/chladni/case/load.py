@@ -15,6 +15,7 @@ import numpy as np
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, TestSetup
 from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
@@ -25,8 +26,8 @@ from ..units import UNITS, Units
 from .free_parameters import free_parameter
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
-from .sensor_places import ROLES, Places, carried, grid_row, labels, places, unrecorded
-from .toml_sections import KeyFile, Section, read_keys
+from .sensor_places import ROLES, carried, grid_row, labels, places, unrecorded
+from .toml_sections import KeyFile, TomlSection, read_keys
 
 _MASS_SD = 0.002  # of the mass, where the user gives none
 
@@ -42,7 +43,7 @@ class Case:
     damping : float           fraction of critical the model is given, where nothing else says
     recordings : tuple        one per file, article and level; FRFs share labels and quantity
     setup : TestSetup         sensors as the user describes them, hangers, weighed mass
-    outputs, inputs : Places  of the FRFs' dofs, in the FRFs' order
+    outputs, inputs : MeasuredDofs  of the FRFs' dofs, in the FRFs' order
     band : (low, high) or None   to fit [Hz]; None: all
     exclude : bands left out [Hz]
     held_sensors : int, labels or None   None: chosen automatically
@@ -61,8 +62,8 @@ class Case:
     damping: float | None
     recordings: tuple[Recording, ...]
     setup: TestSetup
-    outputs: Places
-    inputs: Places
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
     band: tuple[float, float] | None = None
     exclude: tuple[tuple[float, float], ...] = ()
     held_sensors: int | tuple[str, ...] | None = None
@@ -161,7 +162,7 @@ def load_case(path: str | Path) -> Case:
     )
 
 
-def _file(section: Section, key: str, name: str) -> Path:
+def _file(section: TomlSection, key: str, name: str) -> Path:
     """A file the case names, beside it."""
     path = section.file.parent / name
     if not path.is_file():
@@ -172,7 +173,7 @@ def _file(section: Section, key: str, name: str) -> Path:
     return path
 
 
-def _recordings(test: Section) -> tuple[Recording, ...]:
+def _recordings(test: TomlSection) -> tuple[Recording, ...]:
     """All recordings, the FRFs with the labels of the first in its order."""
     quantity = test.text("quantity", among=get_args(Quantity))
     read: list[Recording] = []
@@ -184,7 +185,7 @@ def _recordings(test: Section) -> tuple[Recording, ...]:
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
 
 
-def _like(first: Recording, other: Recording, test: Section) -> Recording:
+def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
     """The recording with the labels of the first, in its order."""
     a, b = first.frf, other.frf
     assert a is not None
@@ -203,7 +204,7 @@ def _like(first: Recording, other: Recording, test: Section) -> Recording:
     return replace(other, frf=b.sel(a.outputs, a.inputs))
 
 
-def _setup(test: Section, made: Assembly) -> TestSetup:
+def _setup(test: TomlSection, made: Assembly) -> TestSetup:
     """Sensors, hangers and weighing as the user gives them."""
     name = test.text("sensors")
     sensors = read_sensors(_file(test, "sensors", name)) if name else ()
@@ -223,7 +224,9 @@ def _setup(test: Section, made: Assembly) -> TestSetup:
     )
 
 
-def _base_and_quantity(test: Section, recordings: Sequence[Recording], inputs: Places) -> None:
+def _base_and_quantity(
+    test: TomlSection, recordings: Sequence[Recording], inputs: MeasuredDofs
+) -> None:
     """Refuse a moving base that is no transmissibility, and the other way round."""
     frf = recordings[0].frf if recordings else None
     if frf is None:
@@ -254,7 +257,7 @@ def _bands(
 
 
 def _inside(
-    section: Section,
+    section: TomlSection,
     key: str,
     band: tuple[float, float],
     recordings: Sequence[Recording],

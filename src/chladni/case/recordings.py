@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.frf import FRF
-from ..ema.setup import Poles, Recording
+from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from .toml_sections import Section
+from .toml_sections import TomlSection
 
 
-def compared_first(test: Section, read: Sequence[Recording]) -> tuple[Recording, ...]:
+def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings with the one that is compared in front.
 
     That is the one ``use`` names; else the first with FRFs, else the first with poles.
@@ -55,10 +55,10 @@ def _names(r: Recording) -> list[str]:
     return [n for n in dict.fromkeys(names) if n]
 
 
-def _state_first(poles: Poles, state: str) -> Poles:
+def _state_first(poles: PoleTable, state: str) -> PoleTable:
     """The poles with those of one state in front."""
     order = np.argsort([s != state for s in poles.state], kind="stable")
-    return Poles(
+    return PoleTable(
         poles.frequency[order],
         poles.frequency_sd[order],
         poles.damping[order],

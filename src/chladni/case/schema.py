@@ -46,7 +46,6 @@ ALIASES = {  # effects that are an ordinary number by another name
     "adhesive-stiffness": "E",
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
-SEARCHED = ("point-mass", "extra-support", "thickness-distribution", "sensor-fault")
 PLANNED = (  # names of the public contract that no model stands behind yet
     *("stiffness-patch", "membrane-prestress", "viscoelastic-joint", "hem-contact"),
     *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),

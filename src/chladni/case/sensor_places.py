@@ -1,47 +1,23 @@
 """Where the dofs of recordings are on the structure: grids, places on shells, the base."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..ema.setup import Recording, Role, Sensor, TestSetup
 from ..errors import LabelError
+from ..fem.locate import shares_of
+from ..fem.measured_dofs import MeasuredDofs
+from ..geometry.grid_normals import grid_normals
+from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
-from .toml_sections import Section
+from .toml_sections import TomlSection
 
 ROLES: tuple[Role, ...] = ("output", "input")
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
 _OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
 _ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
-
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Where dofs of the recordings are on the structure.
-
-    Attributes
-    ----------
-    labels : (k,) text
-    grids : (k,) int       id, 0 where the place is no grid
-    points : (k, 3)        [m], basic frame; nan for the motion of the base
-    directions : (k, 3)    unit vectors, basic frame
-    sd : (k,)              uncertainty of the place [m]
-    mass : (k,)            of the sensor [kg]
-    """
-
-    labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    sd: np.ndarray
-    mass: np.ndarray
-
-    @property
-    def base(self) -> np.ndarray:
-        """True where the dof is the enforced motion of the supports (k,)."""
-        return np.isnan(self.points[:, 0])
 
 
 def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tuple[str, ...]:
@@ -53,14 +29,14 @@ def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tup
 
 
 def places(
-    test: Section,
+    test: TomlSection,
     setup: TestSetup,
     made: Assembly,
     labels: Sequence[str],
     role: Role,
     recorded: Sequence[Recording],
     notes: list[str],
-) -> Places:
+) -> MeasuredDofs:
     """Every label on the structure, by the table of sensors or by what the recording says of it."""
     table = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
     nodes = {n: x for r in recorded for n, x in r.nodes.items()}
@@ -70,7 +46,7 @@ def places(
     rows = [_place(test, known[label], made) for label in labels]
     notes += _nodes_said(made, spoken, nodes, axes)
     notes += _off_said(made, role, [r[3].place for r in rows if r[3].place is not None])
-    return Places(
+    return MeasuredDofs(
         labels=tuple(labels),
         grids=np.array([r[0] for r in rows], dtype=np.int64),
         points=np.array([r[1] for r in rows]).reshape(-1, 3),
@@ -82,7 +58,7 @@ def places(
 
 def _spoken(
     label: str,
-    test: Section,
+    test: TomlSection,
     made: Assembly,
     nodes: Mapping[int, np.ndarray],
     axes: Mapping[int, np.ndarray],
@@ -115,9 +91,7 @@ def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
     if not given:
         return []
     if len(made.shells):
-        from ..fem.locate import locate
-
-        off = float(locate(made.points, made.shells.nodes, np.array(given)).distance.max())
+        off = float(ShellSurface.whole(made).feet(np.array(given)).distance.max())
     else:
         off = max(float(np.linalg.norm(made.points - x, axis=1).min()) for x in given)
     if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
@@ -157,7 +131,7 @@ def _nodes_said(
     return out
 
 
-def unrecorded(setup: TestSetup, outputs: Places, inputs: Places) -> list[str]:
+def unrecorded(setup: TestSetup, outputs: MeasuredDofs, inputs: MeasuredDofs) -> list[str]:
     """A sentence on rows of the table of sensors that no recording has."""
     rows = [s.label for s in setup.outputs if s.label not in outputs.labels]
     rows += [s.label for s in setup.inputs if s.label not in inputs.labels]
@@ -166,13 +140,11 @@ def unrecorded(setup: TestSetup, outputs: Places, inputs: Places) -> list[str]:
     return [f"{len(rows)} rows of the table of sensors are in no recording: {', '.join(rows[:6])}"]
 
 
-def carried(made: Assembly, *places: Places) -> tuple[tuple[int, float], ...]:
+def carried(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], ...]:
     """(grid, kg) of the devices of known mass; rows of one place and role are one device.
 
     On a shell the mass hangs on the corners by their weights.
     """
-    from ..fem.locate import shares_of
-
     out: dict[int, float] = {}
     for at in places:
         heavy = np.flatnonzero((at.mass > 0) & ~at.base)
@@ -189,7 +161,7 @@ def _same_place(points: np.ndarray, before: np.ndarray, k: int) -> bool:
 
 
 def _place(
-    test: Section, sensor: Sensor, made: Assembly
+    test: TomlSection, sensor: Sensor, made: Assembly
 ) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
     """(grid or 0, place, direction, sensor) of one dof."""
     where = f"{test.at('recordings')}: label {sensor.label!r}"
@@ -222,9 +194,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
             int(made.ids[row]),
         )
     else:
-        from ..fem.locate import locate
-
-        found = locate(made.points, made.shells.nodes, place[None])
+        found = ShellSurface.whole(made).feet(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(
@@ -238,14 +208,11 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
 
 
 def _normal(made: Assembly, row: int, where: str) -> np.ndarray:
-    """Unit normal of the shells around a grid, all counted on the side of the first."""
-    around = made.shells.nodes[(made.shells.nodes == row).any(axis=1)]
-    if len(around) == 0:
+    """Unit normal of the surface at a grid (3,)."""
+    normal = grid_normals(made, np.array([row]))[0]
+    if not normal.any():
         raise LabelError(f"{where}: the grid is on no shell, so it has no normal; give +X, +Y, +Z")
-    X = made.points[around]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    n = n * np.where(n @ n[0] < 0, -1.0, 1.0)[:, None]
-    return np.asarray(n.sum(axis=0) / np.linalg.norm(n.sum(axis=0)))
+    return normal
 
 
 def grid_row(made: Assembly, grid: int, where: str) -> int:

@@ -21,7 +21,7 @@ from ..model.properties import Isotropic, Part, ShellSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .linear_parameter import LinearScale, linear_scale
 from .ordinary import SPREAD, ordinary, scaled, value
-from .shell_groups import Sheet
+from .shell_groups import ShellGroups
 
 UNITS = {
     **dict.fromkeys(("E", "E1", "E2", "G12"), "Pa"),
@@ -111,20 +111,20 @@ class Freed(Effect):
         y = float(self.y(x)[0][0])
         return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """Where it is."""
-        return self.members[0].settled(self.y(x)[0]) if len(x) > 1 else self.where()
+        return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
 
 
-def freed(sheet: Sheet, free: FreeParameter) -> Freed:
+def freed(groups: ShellGroups, free: FreeParameter) -> Freed:
     """The effect of one number a user frees."""
-    built = sheet.structure
+    built = groups.structure
     parts = built.assembly.parts
     shells = [k for k in free.positions if isinstance(parts[k].section, ShellSection)]
     members: list[Effect] = []
     plain = [k for k in shells if free.field in ("E", "rho", "t")]
     if plain:
-        members.append(ordinary(sheet, free.field, plain))
+        members.append(ordinary(groups, free.field, plain))
     members += [_of_part(built, k, free.field) for k in free.positions if k not in plain]
     members += [_of_lumps(built, family, rows) for family, rows in _lumps(free) if rows]
     values = _values(built.assembly, free)

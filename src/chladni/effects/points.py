@@ -9,6 +9,8 @@ from ..model.assembly import Assembly, Scalars
 from ..model.point_masses import with_masses as with_masses
 from .effect import Effect, Parameter, PointTerm
 
+NOTHING = -30.0  # ln of a strength over its median that is none
+
 
 def _empty() -> sp.csr_array:
     return sp.csr_array((0, 0))
@@ -46,44 +48,9 @@ class MassEffect(AtPoints):
         return with_masses(assembly, self.grids, m)
 
 
-@dataclass(frozen=True, eq=False)
-class SensorMass(MassEffect):
-    """Accelerometers (and their cables) weigh something; taken off before weighing."""
-
-    name = "sensor-mass"
-    claim = "the accelerometers' mass is missing from the model"
-
-    shares: tuple[tuple[tuple[int, float], ...], ...] = ()  # (grid, weight) each sensor hangs on
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at the grids, by their weights."""
-        m = self.parameters[0].value(x[0])
-        total: dict[int, float] = {}
-        for grid, weight in (pair for share in self.shares for pair in share):
-            total[grid] = total.get(grid, 0.0) + weight * m
-        return with_masses(assembly, tuple(total), np.array(list(total.values())))
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Nothing: the article is weighed without its sensors."""
-        return 0.0, np.zeros(1)
-
-
-@dataclass(frozen=True, eq=False)
-class Suspension(AtPoints):
-    """Cords at the hangers hold the structure, so it is not free."""
-
-    name = "suspension"
-    claim = "the suspension's stiffness is missing from the model"
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground at each hanger."""
-        k = self.parameters[0].value(x[0])
-        return with_springs(assembly, self.grids, self.directions, k)
-
-
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
-    return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)
+    return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts, nominal=NOTHING)
 
 
 def with_springs(

@@ -11,13 +11,12 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..dynamics.reduction import attachments
-from ..effects import catalogue
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
-from ..effects.freed import defaults_without_shells, freed, freed_effect
-from ..effects.ordinary import gain, scatter
-from ..effects.shell_components import COMPONENTS
+from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
+from ..effects.ordinary import defaults, gain, scatter
+from ..effects.registry import family
+from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import equalised, identify
 from ..errors import FileError
 from ..fem.assemble import Structure, structure
@@ -200,7 +199,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
 def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
-        scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
+        scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
@@ -222,11 +221,11 @@ def searched(
     )  # fmt: skip
 
 
-def setup_of(question: Question, top: float) -> catalogue.Setup:
+def setup_of(question: Question, top: float) -> Setup:
     """What the effects may know of the test."""
     weight = mass_properties(question.assembly)[0]
     sensors = question.outputs.shares(question.assembly)
-    return catalogue.Setup(sensors, question.hangers, weight, top)
+    return Setup(sensors, question.hangers, weight, top)
 
 
 def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
@@ -236,50 +235,36 @@ def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
     """
     if question.parameters:
         return [_freed(question, bench, top, p) for p in question.parameters]
-    if len(bench.sheet):
-        return list(catalogue.defaults(bench.sheet))
-    return [freed(bench.sheet, p) for p in defaults_without_shells(question.assembly)]
+    if len(bench.groups):
+        return list(defaults(bench.groups))
+    return [freed(bench.groups, p) for p in defaults_without_shells(question.assembly)]
 
 
 def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -> Effect:
-    """One number, or an effect whose place is known."""
-    setup = setup_of(question, top)
-    if p.field == "orthotropic-material":
-        found = [
-            e for e in catalogue.grains(bench.sheet) if set(e.parts) <= set(_names(question, p))
-        ]
-    elif p.field == "sensor-mass":
-        found = catalogue.sensor_mass(bench.sheet, setup)
-    elif p.field == "suspension":
-        found = catalogue.suspension(bench.sheet, setup, bench.grids)[:1]
-    else:
-        return freed(bench.sheet, p)
-    if len(found) != 1:
-        raise FileError(f"{p.field} cannot be freed: {_LACKS[p.field]}")
+    """One number, or an effect whose place is known, of the parts named."""
+    if p.field in UNITS:
+        return freed(bench.groups, p)
+    placed = family(p.field).placed
+    assert placed is not None
+    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup_of(question, top))
+    names = {question.assembly.parts[k].name for k in p.positions}
+    found = [e for e in placed(where) if not names or set(e.parts) <= names]
+    if not found:
+        raise FileError(
+            f"{p.field} cannot be freed: deck and test do not say where it acts (all parts of a "
+            "material for orthotropic-material, [test] hangers for suspension, sensors on the "
+            "structure for sensor-mass)"
+        )
     return freed_effect(found[0], p.name)
-
-
-_LACKS = {
-    "orthotropic-material": "name parts of one isotropic material, all that have it",
-    "sensor-mass": "the recording has no sensors on the structure",
-    "suspension": "the case names no [test] hangers",
-}
-
-
-def _names(question: Question, p: FreeParameter) -> list[str]:
-    return [question.assembly.parts[k].name for k in p.positions]
 
 
 def carrying(bench: Workbench, effects: Sequence[Effect]) -> Workbench:
     """The workbench over a basis that carries what is free in every fit."""
-    model = bench.model
     for effect in effects:
         x = np.array([p.mean for p in effect.parameters])
-        for term in effect.terms(x):
-            model = model.extended(attachments(bench.factor, term.rows))
-        if any(change.field in COMPONENTS for change in effect.fields(x)):
-            model = model.with_components()
-    return bench if model is bench.model else replace(bench, model=model)
+        model = bench.model_for(effect, x)
+        bench = bench if model is bench.model else replace(bench, model=model)
+    return bench
 
 
 def _mass_note(question: Question) -> list[str]:

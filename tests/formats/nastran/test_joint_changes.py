@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.freed import freed
-from chladni.effects.shell_groups import sheet
+from chladni.effects.shell_groups import shell_groups
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
@@ -94,7 +94,7 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     found, before = deck
     given, cards = KINDS[kind]
     at = tuple(position(before, id) for id in given.get("parts", ()))
-    cloth = sheet(structure(before), 4)
+    cloth = shell_groups(structure(before), 4)
     what = {k: v for k, v in given.items() if k != "parts"}
     effect = freed(cloth, FreeParameter(kind, positions=at, **what))
     after = effect.apply(before, np.array([0.05]))
@@ -110,6 +110,6 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
 
 def test_part_of_a_property_is_refused(deck):
     found, before = deck
-    effect = freed(sheet(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
+    effect = freed(shell_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
     with pytest.raises(ModelError, match="PBUSH 7 changed differently"):
         changes(found, before, effect.apply(before, np.array([0.2])), UNITS["mm-t-s"])

@@ -15,12 +15,13 @@ from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
+from .split_properties import bending_changes, split_changes, with_new_properties
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, laminates, thickness, joints and masses that differ.
+    """Edits of the deck: materials, properties, thickness, joints and masses that differ.
 
     Raises
     ------
@@ -29,11 +30,13 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     """
     units = units or UNITS["SI"]
     out: list[Change] = []
+    before, after, split = with_new_properties(deck, before, after)
     free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
     out += _materials(deck, before, after, units, free)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after)
+    out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
         out.append(Add(cards, "put in by the diagnosis"))
@@ -75,8 +78,8 @@ def _materials(
             new = next(free)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
             out += [_of_material(deck, after.parts[k], name, new) for k, name in at]
-    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
-    return out + (_axes(deck, before, after) if grain else [])
+    oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
+    return out + (_axes(deck, before, after) if oriented else [])
 
 
 def _of_material(deck: Deck, part: Part, name: str, material: int) -> Change:
@@ -152,7 +155,7 @@ def _card(m: Material, units: Units) -> list[float | int | str | None]:
 
 
 def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
-    """A coordinate system whose x is the grain, named by the shells it turned."""
+    """A coordinate system whose x is the material axis, named by the shells it turned."""
     moved = np.flatnonzero(np.any(before.shells.axis != after.shells.axis, axis=1))
     if not len(moved):
         return []
@@ -164,7 +167,9 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     cid = 1 + max(
         (i for kind in deck.cards if kind[:4] == "CORD" for i in _cids(deck, kind)), default=900
     )
-    out: list[Change] = [Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "grain of the sheet")]
+    out: list[Change] = [
+        Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
+    ]
     for kind, chosen in _by_kind(after.shells, moved):
         if len(chosen):
             out += [SetField(kind, int(i), "THETA", cid) for i in after.shells.ids[chosen]]

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 
-from .schema import COLUMNS, COMMANDS, SCHEMA, Key, sections
+from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, Key, sections
 
 
 def page() -> str:
@@ -89,5 +89,5 @@ Time histories, spectra and mode shapes are named in the notes and not used.
 """
 
 
-if __name__ == "__main__":  # python -m chladni.case.schema_page > docs/case.md
+if __name__ == "__main__":  # python docs/case_page.py > docs/case.md
     sys.stdout.write(page())
