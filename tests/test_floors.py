@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from chladni.cli.app import COMMANDS
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = {  # every package of ours and where its source is
     "chladni": ROOT / "src",
@@ -32,11 +34,11 @@ MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "i
 BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
 MAY_IMPORT["planning"] = BELOW | {"view"}
-MAY_IMPORT["report"] = BELOW | {"view", "planning"}
-MAY_IMPORT["workflows"] = BELOW | {"planning", "report", "view"}
+MAY_IMPORT["workflows"] = BELOW | {"planning", "view"}
+MAY_IMPORT["report"] = MAY_IMPORT["workflows"] | {"workflows"}
 MAY_IMPORT["chladni_specimens"] = GROUND | {"model", "geometry"}
-MAY_IMPORT["cli"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens", "chladni_evidence"}
-MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
+MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report", "chladni_specimens", "chladni_evidence"}
+MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["report"] | {"report", "chladni_specimens"}
 MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
@@ -46,7 +48,8 @@ LIBRARIES = {
     "io": {"meshio", "pyyeti", "pyuff"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
-    "cli": {"typer", "rich", "threadpoolctl"},
+    "workflows": {"threadpoolctl"},
+    "cli": {"typer", "rich"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
@@ -105,6 +108,22 @@ def test_imports_point_down(path):
     floor, (own, outside) = floor_of(module(path)), imports(path)
     assert {floor_of(m) for m in own} <= MAY_IMPORT[floor] | {floor}
     assert outside <= EVERYWHERE | LIBRARIES.get(floor, set())
+
+
+def test_no_command_imports_another():
+    """What commands share is in run.py, or further down; the list of commands imports them all."""
+    commands = {("chladni", "cli", name) for name in COMMANDS}
+    assert commands <= MODULES
+    for path in (p for p in SOURCES if module(p) in commands):
+        assert not imports(path)[0] & commands, path
+
+
+def test_workflows_touch_no_terminal_and_no_page():
+    """A notebook, an environment and a command call the same function."""
+    for path in (p for p in SOURCES if floor_of(module(p)) in ("workflows", "chladni_envs")):
+        own, outside = imports(path)
+        assert not {floor_of(m) for m in own} & {"cli", "report", "output"}, path
+        assert not outside & {"typer", "rich", "jinja2"}, path
 
 
 def test_no_cycles():

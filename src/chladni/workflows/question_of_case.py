@@ -9,6 +9,7 @@ from ..errors import FileError
 from ..updating.map_fit import Weighing
 from ..updating.question import Places as Sites
 from ..updating.question import Question
+from .unit_check import refuse_other_units
 
 
 def question(case: Case) -> Question:
@@ -17,8 +18,10 @@ def question(case: Case) -> Question:
     Raises
     ------
     FileError
-        If the recordings hold neither FRFs nor poles, or the base was moved.
+        If the recordings hold neither FRFs nor poles, the base was moved, or the deck's unit
+        system cannot be right.
     """
+    refuse_other_units(case)
     frfs = case.frfs
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
