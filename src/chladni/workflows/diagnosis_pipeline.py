@@ -167,15 +167,16 @@ def _scores(
         calibrated = written_Q(asked, prepared, stages.calibrated, sets, real)
     if stages.final is not stages.nominal:
         final = written_Q(asked, prepared, stages.final, sets, real, fault)
-    return tuple(  # type: ignore[return-value]
-        Scores(
-            nominal[k],
-            calibrated[k],
-            final[k],
-            noise_Q(prepared, use, real),
-            fit.calibrated,
-            fit.effect,
-            fit.scatter,
+    fits = fitted_scores(prepared, found)
+    first, second = (
+        (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)
+        for q, use, fit in zip(
+            zip(nominal, calibrated, final, strict=True), sets, fits, strict=True
         )
-        for k, (use, fit) in enumerate(zip(sets, fitted_scores(prepared, found), strict=True))
     )
+    return Scores(*map(_finite, first)), Scores(*map(_finite, second))
+
+
+def _finite(value: float | None) -> float | None:
+    """The value; None where nothing was there to take a mean of."""
+    return value if value is not None and np.isfinite(value) else None
