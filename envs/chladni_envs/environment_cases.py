@@ -11,13 +11,11 @@ from chladni.planning import Linearised, Wishes, find_places
 from chladni.planning.rattle import openings
 from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
-from chladni.updating.preparation import prepare
-from chladni.updating.question import Prepared
 from chladni.updating.reduced_model import State, evaluate
 from chladni.workflows.loaded_model import load_model
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import prepared
 
-from .calibration_questions import Question as Calibration
+from .calibration_problem import CalibrationProblem
 from .small_specimens import Specimen
 
 REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
@@ -66,7 +64,7 @@ class Recorded:
     """
 
     def __init__(self, case: str) -> None:
-        self.prepared = _prepared(case)
+        self.prepared = prepared(load_case(case))
         search = self.prepared.search
         score = self.prepared.score
         if not isinstance(score, Responses):
@@ -92,7 +90,7 @@ class Recorded:
         h, H = self.score.only(self.prepared.held).residual(state, True)
         return Linearised(r, J * self.sd, h, H * self.sd)
 
-    def calibration(self) -> Calibration:
+    def calibration(self) -> CalibrationProblem:
         """The fitted lines and channels; bounds at two prior standard deviations."""
         lines = np.flatnonzero(self.score.use.any(axis=1))
         outputs = np.flatnonzero(self.score.use.any(axis=0))
@@ -104,16 +102,8 @@ class Recorded:
             return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))
 
         frequency = self.score.s.imag[lines] / (2 * np.pi)
-        return Calibration(self.names, frequency, predict, fitted(self.score.values))
+        return CalibrationProblem(self.names, frequency, predict, fitted(self.score.values))
 
 
 def _name(effect: Effect, parameter: Parameter) -> str:
     return f"{parameter.name}, {effect.text}" if effect.text else parameter.name
-
-
-def _prepared(path: str) -> Prepared:
-    """The case's first FRF, made ready for updating."""
-    case = load_case(path)
-    if not case.frfs:
-        raise FileError(f"{case.path}: no recording holds an FRF")
-    return prepare(question(case))

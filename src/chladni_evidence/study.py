@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from chladni.case import load_case
 from chladni.errors import ChladniError, LabelError
@@ -90,6 +89,11 @@ def _mapped(cases: list[Blind], workers: int) -> Iterator[Row]:
 
 def blind_row(blind: Blind) -> Row:
     """Make the case, diagnose its folder, write the answer, then open the seal and score."""
+    return scored(*answered(blind))
+
+
+def answered(blind: Blind) -> tuple[DiagnosisResult, Row]:
+    """The answer to a case, and its truth, which is read when the answer is on disk."""
     specimen = SPECIMENS[blind.specimen]
     write(made(specimen, blind.effect, blind.seed), blind.folder, blind.seal)
     try:
@@ -97,8 +101,8 @@ def blind_row(blind: Blind) -> Row:
     except ChladniError as error:
         found = DiagnosisResult(verdict=f"error: {error}")
     write_json(blind.folder / "diagnosis.json", diagnosis_json(found))
-    truth: dict[str, Any] = json.loads(blind.seal.read_text(encoding="utf-8"))
-    return scored(found, truth)
+    truth: Row = json.loads(blind.seal.read_text(encoding="utf-8"))
+    return found, truth
 
 
 def line(row: Row) -> str:

@@ -10,7 +10,6 @@ import pytest
 
 import chladni
 from chladni_evidence.concealed import SPECIMENS, made, write
-from chladni_evidence.score import scored
 from chladni_evidence.study import Blind
 
 SEED = 40
@@ -24,7 +23,7 @@ def blind(effect, folder):
     return found, json.loads(case.seal.read_text(encoding="utf-8"))
 
 
-def test_a_concealed_mass_is_named_placed_and_weighed(tmp_path):
+def test_a_concealed_mass_is_named_placed_and_weighed(tmp_path, evidence):
     found, truth = blind("point-mass", tmp_path)
     (effect,) = found.effects
     assert found.verdict == "missing physics"
@@ -36,10 +35,10 @@ def test_a_concealed_mass_is_named_placed_and_weighed(tmp_path):
     assert held.with_effect < 0.5 * held.calibrated
     assert held.with_effect < 0.5 * held.nominal
     assert found.models.final.assembly.masses is not None
-    assert scored(found, truth)["right"]
+    assert evidence(found, truth)["right"]
 
 
-def test_nothing_is_found_where_nothing_is_missing(tmp_path):
+def test_nothing_is_found_where_nothing_is_missing(tmp_path, evidence):
     """Scatter, noise, and another element formulation are not missing physics."""
     found, truth = blind("nothing", tmp_path)
     assert found.verdict in ("nothing missing", "calibration only")
@@ -47,7 +46,7 @@ def test_nothing_is_found_where_nothing_is_missing(tmp_path):
     assert found.agreement.largest_gain < found.agreement.threshold
     assert found.agreement.gain is None
     assert all(a.why_not for a in found.alternatives)
-    assert scored(found, truth)["right"]
+    assert evidence(found, truth)["right"]
 
 
 def test_the_study_asks_the_same_function(monkeypatch, tmp_path):

@@ -7,8 +7,9 @@ import numpy as np
 from ..case import Case, Places
 from ..errors import FileError
 from ..updating.map_fit import Weighing
+from ..updating.preparation import prepare
 from ..updating.question import Places as Sites
-from ..updating.question import Question
+from ..updating.question import Prepared, Question
 from .unit_check import refuse_other_units
 
 
@@ -54,6 +55,11 @@ def question(case: Case) -> Question:
         return replace(asked, frf=frfs[0])
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+
+
+def prepared(case: Case) -> Prepared:
+    """A case made ready for updating: identified, reduced, what is held out chosen."""
+    return prepare(question(case))
 
 
 def _sites(places: Places) -> Sites:
