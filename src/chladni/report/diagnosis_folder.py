@@ -38,7 +38,7 @@ def write_diagnosis(
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
     drawn = figures(folder, result, shown(case, result))
-    title = f"Diagnosis – {case.path.parent.name}"
+    title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
     write_page(folder, result, drawn, result.notes, command=command, title=title)
     return result
 

@@ -97,7 +97,7 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
     if result.agreement is not None:
         sides = (("waterfall", result.agreement.fitted), ("held_out", result.agreement.held_out))
         for name, q in sides:
-            if len(steps := _steps(q)) > 1:
+            if len(steps := _steps(q, bool(result.effects))) > 1:
                 made[name] = plots.waterfall(folder / f"{name}.png", steps, q.floor)
     tried: list[NamedEffect | Alternative] = [*result.effects, *result.alternatives]
     evidence = {h.name: h.log_evidence for h in tried if h.log_evidence is not None}
@@ -106,9 +106,11 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
     return made
 
 
-def _steps(q: Scores) -> dict[str, float]:
-    """Q of the decks, in the order in which they came about."""
-    steps = {"nominal": q.nominal, "calibrated": q.calibrated, "with the effect": q.with_effect}
+def _steps(q: Scores, named: bool) -> dict[str, float]:
+    """Q of the decks, in the order in which they came about; without an effect there are two."""
+    steps = {"nominal": q.nominal, "calibrated": q.calibrated}
+    if named:
+        steps["with the effect"] = q.with_effect
     return {name: value for name, value in steps.items() if value is not None}
 
 

@@ -205,8 +205,8 @@ def _scores(result: DiagnosisResult) -> list[Block]:
     steps = (
         ("nominal deck", "nominal", False),
         ("calibrated deck, nothing added", "calibrated", True),
-        ("updated deck", "with_effect", True),
-        ("updated deck, mesh infinitely fine", "with_mesh_error", False),
+        *((("updated deck", "with_effect", True),) if result.effects else ()),
+        ("the last of these, its mesh infinitely fine", "with_mesh_error", False),
         ("and what scatter could explain taken out", "with_scatter", False),
         ("floor: the recording's noise alone", "floor", False),
     )
