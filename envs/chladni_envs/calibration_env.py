@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from . import drawing
-from .calibration_problem import CalibrationProblem, plate_problem
+from .calibration_questions import CalibrationQuestion, plate_question
 from .sensor_placement import Reset, Step
 
 DONE = 1e-5  # Q at which model and recording are one
@@ -30,7 +30,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
 
     Parameters
     ----------
-    problem : model and recording; by default a simply supported plate with unknown E, ρ, a mass
+    question : model and recording; by default a simply supported plate with unknown E, ρ, a mass
                and a spring, the truth drawn at every reset
     case : folder              a case with FRFs: its ordinary parameters within two prior standard
                                deviations, its fitted lines and channels, damping equalised
@@ -40,7 +40,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        problem: CalibrationProblem | None = None,
+        question: CalibrationQuestion | None = None,
         *,
         case: str | None = None,
         bands: int = 8,
@@ -50,12 +50,12 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         if case is not None:
             from .environment_cases import Recorded
 
-            problem = Recorded(case).calibration()
-        self.problem = problem or plate_problem()
-        self.p, self.bands = len(self.problem.names), bands
+            question = Recorded(case).calibration()
+        self.question = question or plate_question()
+        self.p, self.bands = len(self.question.names), bands
         self.max_steps, self.render_mode = max_steps, render_mode
-        n_out = self.problem.predict(np.zeros(self.p)).shape[1]
-        self._edges = np.linspace(0, len(self.problem.frequency), bands + 1).astype(int)
+        n_out = self.question.predict(np.zeros(self.p)).shape[1]
+        self._edges = np.linspace(0, len(self.question.frequency), bands + 1).astype(int)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (self.p,), dtype=np.float32)
         size = self.p + 1 + bands * n_out
         self.observation_space = gym.spaces.Box(-1.0, 1.0, (size,), dtype=np.float64)
@@ -64,10 +64,10 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         """Back to the nominal model; a new truth unless a recording was given."""
         super().reset(seed=seed)
         self.x, self.steps = np.zeros(self.p), 0
-        if self.problem.recorded is None:
-            self.recorded = self.problem.predict(self.np_random.uniform(-0.8, 0.8, self.p))
+        if self.question.recorded is None:
+            self.recorded = self.question.predict(self.np_random.uniform(-0.8, 0.8, self.p))
         else:
-            self.recorded = self.problem.recorded
+            self.recorded = self.question.recorded
         self._judge()
         self.start = self.Q
         return self._observation(), self._info()
@@ -85,7 +85,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
 
     def deviation(self, x: np.ndarray) -> np.ndarray:
         """δ = log10(H_model / H_recorded) (n_f, n_out) complex."""
-        return np.log(self.problem.predict(x) / self.recorded) / np.log(10)
+        return np.log(self.question.predict(x) / self.recorded) / np.log(10)
 
     def _judge(self) -> None:
         """δ at the present x, and Q = mean |δ|², floored at 1e-12."""
@@ -98,7 +98,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
             return None
         model = self.recorded * 10**self.delta
         pairs = [(np.abs(self.recorded[:, 0]), "recorded"), (np.abs(model[:, 0]), "model")]
-        return drawing.curves(self.problem.frequency, pairs, f"Q = {self.Q:.2e}")
+        return drawing.curves(self.question.frequency, pairs, f"Q = {self.Q:.2e}")
 
     def _observation(self) -> np.ndarray:
         mean = np.add.reduceat(self.delta.real, self._edges[:-1], axis=0)

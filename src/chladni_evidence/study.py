@@ -13,7 +13,7 @@ from chladni.report.diagnosis_json import diagnosis_json
 from chladni.workflows.diagnose import diagnose
 from chladni.workflows.diagnosis_result import DiagnosisResult
 
-from .concealed import EFFECTS, SPECIMENS, made, write
+from .concealed import SPECIMENS, concealable, made, write
 from .score import Row, scored
 
 CODE = {"nothing": "n", "calibration": "c"}  # a folder's name must not say whether there is any
@@ -43,19 +43,19 @@ class Blind:
 def blinds(
     place: Path,
     seeds: Iterable[int],
-    effects: Iterable[str] = EFFECTS,
+    effects: Iterable[str] = (),
     specimens: Iterable[str] = tuple(SPECIMENS),
 ) -> list[Blind]:
-    """Every effect in every structure with every seed.
+    """Every one of these effects (all, where none is given) in every structure with every seed.
 
     Raises
     ------
     LabelError
         If there is no such effect or structure.
     """
-    effects, specimens = list(effects), list(specimens)
+    effects, specimens = list(effects) or list(concealable()), list(specimens)
     for what, given, known in (
-        ("effect", effects, EFFECTS), ("structure", specimens, tuple(SPECIMENS))
+        ("effect", effects, concealable()), ("structure", specimens, tuple(SPECIMENS))
     ):  # fmt: skip
         if unknown := sorted(set(given) - set(known)):
             raise LabelError(f"no {what} {unknown}; there are {', '.join(known)}")

@@ -143,7 +143,7 @@ def test_calibration_of_a_case(ready, case):
     """The textbook agent finds the modulus of the article, to a quarter of what it is off."""
     env = gym.make("chladni_envs:chladni/Calibration-v0", case=case)
     end = agents.play(env, agents.gauss_newton(env))
-    assert env.unwrapped.problem.names == ready.names
+    assert env.unwrapped.question.names == ready.names
     found = ready.mean[0] + cases.REACH * ready.sd[0] * end["x"][0]
     assert found == pytest.approx(np.log(SOFT), rel=0.25)
     assert end["score"] > 0.1

@@ -12,7 +12,7 @@ import chladni
 from chladni.bench.article import Front, measured
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
-from chladni.model.refine import _edges
+from chladni.geometry.refine import _edges
 from chladni_evidence import concealed
 from chladni_specimens.plates import STEEL
 

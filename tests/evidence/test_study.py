@@ -2,7 +2,7 @@
 
 import pytest
 
-from chladni_evidence.concealed import EFFECTS, SPECIMENS
+from chladni_evidence.concealed import SPECIMENS, concealable
 from chladni_evidence.score import NULLS
 from chladni_evidence.study import answered, blinds
 
@@ -12,7 +12,7 @@ SEED = 41
 
 
 @pytest.mark.parametrize("specimen", SPECIMENS)
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", concealable())
 def test_concealed_effect(effect, specimen, tmp_path, evidence):
     """Nothing is named where nothing is missing; what else was called what is in the table."""
     (blind,) = blinds(tmp_path, [SEED], [effect], [specimen])

@@ -18,13 +18,11 @@ def run(
     out: Out = None,
 ) -> None:
     """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
-    from chladni_evidence.concealed import EFFECTS
     from chladni_evidence.score import Row, confusion, summary
     from chladni_evidence.study import blinds, line, study
 
     place, rows = out or Path("runs") / "study", []
-    chosen = _names(effects) or list(EFFECTS)
-    cases = blinds(place, _range(seeds), chosen, _names(structures))
+    cases = blinds(place, _range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:
         rows.append(row)

@@ -15,7 +15,7 @@ from ..updating.result import (
     FrequencyError,
     FrequencyRow,
     Location,
-    Masses,
+    MassComparison,
     NamedEffect,
     Remainder,
     Scores,
@@ -115,7 +115,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
             CalibratedParameter(c.get("where", ""), _read_estimate(c), c.get("deck_value"))
             for c in d.get("calibrated") or ()
         ),
-        mass=Masses(**mass) if mass else None,
+        mass=MassComparison(**mass) if mass else None,
         frequencies=tuple(_known(FrequencyRow, r) for r in d.get("frequencies") or ()),
         frequency_error=_known(FrequencyError, error) if error else None,
         structured=Remainder(left["is"], left["left"], left["known"], left["sentence"])

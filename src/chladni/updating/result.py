@@ -112,7 +112,7 @@ class CalibratedParameter:
 
 
 @dataclass(frozen=True)
-class Masses:
+class MassComparison:
     """What the scales say and what the updated deck weighs [kg]."""
 
     weighed_kg: float | None = None

@@ -29,7 +29,7 @@ def named_effect(trial: Trial) -> NamedEffect:
         effect.name,
         effect.claim,
         -trial.S / 2,
-        location(effect.settled(x)),
+        location(effect.location(x)),
         tuple(estimate(row) for row in rows),
     )
 
@@ -43,7 +43,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             trial.effect.name,
             -trial.S / 2,
             why_not(trial, best, found is not None, diagnosis.gain(trial)),
-            location(trial.effect.settled(trial.fit.of(trial.effect))),
+            location(trial.effect.location(trial.fit.of(trial.effect))),
         )
         for trial in diagnosis.trials
         if trial is not found

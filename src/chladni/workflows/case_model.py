@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case, Places
+from ..case import Case
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility
 from ..errors import FileError
 from ..fem.assemble import Structure
-from ..fem.locate import rows_of
+from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, node_points
 from ..fem.solve import inertia_load
 
@@ -21,20 +21,6 @@ DAMPING = 0.01  # where neither case nor test says
 REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
 
 
-def rows(places: Places, built: Structure) -> sp.csr_array:
-    """Motion at the places along their directions over the free dofs (k, n_free).
-
-    A place that is no grid is on the nearest shell; the base has no row of its own (zeros).
-    """
-    found = sp.lil_array((len(places.labels), built.T.shape[1]))
-    real = np.flatnonzero(~places.base)
-    if len(real):
-        found[real] = rows_of(
-            built, places.grids[real], places.points[real], places.directions[real]
-        )
-    return sp.csr_array(found)
-
-
 def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
     """The model's responses on the lines, labels and quantity of a recording.
 
@@ -42,7 +28,7 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
     """
     s, f = model.structure, test.frequency
     modal = model.modes.with_damping(damping)
-    pick = rows(case.outputs, s).T.toarray()
+    pick = case.outputs.rows(s).T.toarray()
     load, carried = _drives(case, s)
     rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -60,23 +46,23 @@ def _drives(case: Case, s: Structure) -> tuple[np.ndarray, np.ndarray]:
     if base.any() and not base.all():
         raise FileError(f"{case.path}: forces and a moving base cannot be inputs together")
     if not base.any():
-        return rows(case.inputs, s).T.toarray(), np.zeros(1)
+        return case.inputs.rows(s).T.toarray(), np.zeros(1)
     axes = case.inputs.directions.T  # (3, n_in)
     load = s.T.T @ inertia_load(s.assembly, -axes)
     return np.asarray(load), case.outputs.directions @ axes
 
 
-def markers(places: Places) -> list["Marker"]:
+def markers(dofs: MeasuredDofs) -> list["Marker"]:
     """Sensors and shakers for a picture; the base has no place."""
     from ..view.scene import Marker
 
     return [
         Marker((x[0], x[1], x[2]), (n[0], n[1], n[2]), text)
         for x, n, text, base in zip(
-            places.points.tolist(),
-            places.directions.tolist(),
-            places.labels,
-            places.base,
+            dofs.points.tolist(),
+            dofs.directions.tolist(),
+            dofs.labels,
+            dofs.base,
             strict=True,
         )
         if not base

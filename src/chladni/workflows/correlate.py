@@ -11,11 +11,11 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
-from ..ema.mode_pairing import Pairs, pair
+from ..ema.mode_pairing import ModePairs, pair
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
-from .case_model import DAMPING, REACH, model_frf, rows
+from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .unit_check import refuse_other_units
 
@@ -32,7 +32,7 @@ class Correlation:
     test : what was identified; None where only poles were given
     f_test, f_model : (r_test,), (r_model,) [Hz]
     mac : (r_model, r_test) or None
-    pairs : Pairs
+    pairs : ModePairs
     comac : (n_out,) or None
     quality : Q by channel and band, or None
     model : responses of the model on the lines of the recording, or None
@@ -44,7 +44,7 @@ class Correlation:
     f_test: np.ndarray
     f_model: np.ndarray
     mac: np.ndarray | None
-    pairs: Pairs
+    pairs: ModePairs
     comac: np.ndarray | None = None
     quality: Quality | None = None
     model: FRF | None = None
@@ -76,7 +76,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     progress("modes of the test", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
-    phi, psi = rows(case.outputs, model.structure) @ near.shapes, _shapes(found)
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, _shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)
     by_dof = None

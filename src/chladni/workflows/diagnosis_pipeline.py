@@ -30,7 +30,7 @@ from ..updating.outcome import fitted_scores, held_out, judged, models, real_pol
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from ..updating.result import Masses, Scores
+from ..updating.result import MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
@@ -143,7 +143,7 @@ def _result(
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
-        mass=Masses(weighed, mass_properties(stages.final.assembly)[0]),
+        mass=MassComparison(weighed, mass_properties(stages.final.assembly)[0]),
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,

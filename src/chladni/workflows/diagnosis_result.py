@@ -17,7 +17,7 @@ from ..updating.result import (
     CalibratedParameter,
     FrequencyError,
     FrequencyRow,
-    Masses,
+    MassComparison,
     NamedEffect,
     Remainder,
 )
@@ -72,7 +72,7 @@ class DiagnosisResult:
     alternatives: tuple[Alternative, ...] = ()
     agreement: Agreement | None = None
     calibrated: tuple[CalibratedParameter, ...] = ()
-    mass: Masses | None = None
+    mass: MassComparison | None = None
     frequencies: tuple[FrequencyRow, ...] = ()
     frequency_error: FrequencyError | None = None
     structured: Remainder | None = None

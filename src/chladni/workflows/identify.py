@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
-from ..ema.setup import Poles, Recording
+from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent
 
@@ -35,11 +35,11 @@ class RecordingModes:
         return self.whole.sel(self.whole.inside)
 
     @property
-    def poles(self) -> Poles:
+    def poles(self) -> PoleTable:
         """The modes that are known well enough, as a table of a report has them."""
         m = self.modes.sel(firm(self.modes))
         r = len(m.poles)
-        return Poles(m.frequency, m.frequency_sd, m.damping, np.arange(1, r + 1), ("",) * r)
+        return PoleTable(m.frequency, m.frequency_sd, m.damping, np.arange(1, r + 1), ("",) * r)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..case import Case, Places
+from ..case import Case
 from ..errors import FileError
 from ..updating.map_fit import Weighing
 from ..updating.preparation import prepare
-from ..updating.question import Places as Sites
 from ..updating.question import Prepared, Question
 from .unit_check import refuse_other_units
 
@@ -37,8 +36,8 @@ def question(case: Case) -> Question:
         weighing = Weighing(case.setup.mass, case.setup.mass_sd)
     asked = Question(
         case.assembly,
-        _sites(case.outputs),
-        _sites(case.inputs),
+        case.outputs,
+        case.inputs,
         weighing=weighing,
         hangers=case.setup.hangers,
         band=case.band or (0.0, np.inf),
@@ -60,7 +59,3 @@ def question(case: Case) -> Question:
 def prepared(case: Case) -> Prepared:
     """A case made ready for updating: identified, reduced, what is held out chosen."""
     return prepare(question(case))
-
-
-def _sites(places: Places) -> Sites:
-    return Sites(places.labels, places.grids, places.points, places.directions, places.sd)
