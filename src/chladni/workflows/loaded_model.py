@@ -14,6 +14,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure, structure
+from ..fem.modelled import Modelled, node_points, solved
 from ..geometry.grid_normals import normals_at
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
@@ -22,6 +23,7 @@ from ..units import units as unit_system
 from ..view.surface import Surface, surface
 
 if TYPE_CHECKING:
+    from ..case import Case
     from ..io.nastran import Deck
 
 
@@ -42,8 +44,11 @@ class Model:
     @cached_property
     def places(self) -> np.ndarray:
         """Place of the node of each row of the system (n, 3) [m]."""
-        dofs = self.structure.system.dofs
-        return np.asarray(self.assembly.points[self.assembly.rows(dofs[:, 0])])
+        return node_points(self.structure)
+
+    def solved(self, band: float) -> Modelled:
+        """Its modes up to a frequency [Hz]."""
+        return solved(self.structure, band)
 
     @cached_property
     def seen(self) -> Surface:
@@ -116,6 +121,15 @@ class DeckModels:
 
         made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
         return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
+
+
+def as_model(source: "Case | Model | DeckModels") -> Model:
+    """The model of a case or of a deck; a model as it is."""
+    if isinstance(source, Model):
+        return source
+    if isinstance(source, DeckModels):
+        return source.model()
+    return Model(source.path, source.assembly)
 
 
 def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:
