@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, RigidBody
+from .cells import point_means
 from .curvature import part_curvature
 from .nearest import ShellSurface
 from .thickness_mapping import shell_area
@@ -88,10 +89,11 @@ class _Sheets:
 
 
 def _sheets(assembly: Assembly) -> _Sheets:
+    nodes, n = assembly.shells.nodes, len(assembly.points)
     facet = shell_area(assembly)[:, None] * part_curvature(assembly) / 8
     return _Sheets(
-        _nodal(assembly, assembly.shells.thickness),
-        _nodal(assembly, facet),
+        point_means(nodes, assembly.shells.thickness, n),
+        point_means(nodes, facet, n),
         assembly.points[joint_points(assembly)],
     )
 
@@ -145,13 +147,6 @@ def _gaps(
 def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
     low, high = other.min(axis=0) - margin, other.max(axis=0) + margin
     return np.asarray(np.all((points >= low) & (points <= high), axis=1))
-
-
-def _nodal(assembly: Assembly, corner: np.ndarray) -> np.ndarray:
-    """Mean at the points of values at the shells' corners."""
-    at, n = assembly.shells.nodes.ravel(), len(assembly.points)
-    count = np.bincount(at, minlength=n)
-    return np.asarray(np.bincount(at, corner.ravel(), minlength=n) / np.maximum(count, 1))
 
 
 @dataclass(frozen=True)
