@@ -49,7 +49,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class AttachmentPoints:
     """Grids where something unknown may sit, with the surface normal there.
 
     ``rows`` (k, n) is translation along the normal; ``point`` (k, 3) [m].
@@ -67,14 +67,14 @@ class Places:
         """Position of a grid among them."""
         return int(np.flatnonzero(self.grids == grid)[0])
 
-    def only(self, chosen: np.ndarray) -> "Places":
+    def only(self, chosen: np.ndarray) -> "AttachmentPoints":
         """Some of them."""
-        return Places(
+        return AttachmentPoints(
             self.grids[chosen], self.normal[chosen], self.point[chosen], self.rows[chosen]
         )
 
 
-def places(sheet: Sheet) -> Places:
+def places(sheet: Sheet) -> AttachmentPoints:
     """All grids of shells."""
     assembly = sheet.structure.assembly
     normal = point_normals(assembly.points, assembly.shells.nodes)
@@ -82,7 +82,7 @@ def places(sheet: Sheet) -> Places:
     normal = normal[at]
     rows = sheet.structure.along(assembly.ids[at], normal)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)
-    return Places(
+    return AttachmentPoints(
         assembly.ids[at[moving]], normal[moving], assembly.points[at[moving]], rows[moving]
     )
 
@@ -93,14 +93,16 @@ def everywhere(sheet: Sheet, grids: Sequence[int]) -> sp.csr_array:
     return sheet.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
 
 
-def point_mass(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+def point_mass(sheet: Sheet, setup: Setup, spots: AttachmentPoints, k: int, tried: int) -> Effect:
     """A mass near one grid; median 3 % of the structure's."""
     m = points.strength("M", "kg", 0.03 * setup.weight, 1.2, (-1.5, -0.5, 0.5))
     area = patch(sheet, spots, k, np.eye(3))
     return PointMass(moved(m), places=tried, patch=area, **_there(sheet, spots, k))
 
 
-def extra_support(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int) -> Effect:
+def extra_support(
+    sheet: Sheet, setup: Setup, spots: AttachmentPoints, k: int, tried: int
+) -> Effect:
     """A spring to ground along the normal near one grid."""
     K = points.strength("K", "N/m", stiffness_scale(setup), 2.0, (-2.0, 0.0, 2.0))
     n = spots.normal[k]
@@ -108,12 +110,12 @@ def extra_support(sheet: Sheet, setup: Setup, spots: Places, k: int, tried: int)
     return ExtraSupport(moved(K), places=tried, patch=area, direction=n, **_there(sheet, spots, k))
 
 
-def _there(sheet: Sheet, spots: Places, k: int) -> dict[str, Any]:
+def _there(sheet: Sheet, spots: AttachmentPoints, k: int) -> dict[str, Any]:
     grid = int(spots.grids[k])
     return {"text": f"at grid {grid}", "grids": (grid,), "point": _tuple(spots.point[k])}
 
 
-def patch(sheet: Sheet, spots: Places, k: int, directions: np.ndarray) -> Patch:
+def patch(sheet: Sheet, spots: AttachmentPoints, k: int, directions: np.ndarray) -> Patch:
     """The grids round one of the places that lie in the same face of the sheet."""
     d = spots.point - spots.point[k]
     facing = np.abs(spots.normal @ spots.normal[k]) > FACING
@@ -147,7 +149,7 @@ def sensor_mass(sheet: Sheet, setup: Setup) -> list[Effect]:
     return [points.SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3))]
 
 
-def suspension(sheet: Sheet, setup: Setup, normals: Places) -> list[Effect]:
+def suspension(sheet: Sheet, setup: Setup, normals: AttachmentPoints) -> list[Effect]:
     """Springs at the hangers, along the surface normal or along every direction."""
     if not setup.hangers:
         return []

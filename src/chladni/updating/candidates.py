@@ -117,7 +117,7 @@ def _points(search: Search, bases: list[Baseline], data: Responses) -> list[Cand
     return out
 
 
-def point_effect(search: Search, matrix: str, spots: catalogue.Places, k: int) -> Effect:
+def point_effect(search: Search, matrix: str, spots: catalogue.AttachmentPoints, k: int) -> Effect:
     """A mass ("M") or a spring to ground ("K") near one of the places."""
     sheet, setup, tried = search.bench.sheet, search.setup, len(search.bench.candidates)
     make = catalogue.point_mass if matrix == "M" else catalogue.extra_support

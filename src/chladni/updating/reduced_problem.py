@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
-from ..effects.catalogue import Places, places
+from ..effects.catalogue import AttachmentPoints, places
 from ..effects.shell_groups import Sheet, sheet
 from ..fem.assemble import Structure, structure
 from ..geometry.sampling import farthest_point_sample
@@ -25,7 +25,7 @@ class Workbench:
     Attributes
     ----------
     frequency : (r,) Hz      of the nominal model's modes, rigid ones included
-    candidates : Places      a spread of all of ``grids``
+    candidates : AttachmentPoints      a spread of all of ``grids``
     flexibility : (k,)       static response at each candidate beyond the basis [m/N]
     hertz : shift of the static responses
     """
@@ -36,10 +36,10 @@ class Workbench:
     frequency: np.ndarray
     factor: Factor
     hertz: float
-    grids: Places
-    candidates: Places
+    grids: AttachmentPoints
+    candidates: AttachmentPoints
 
-    def flexibility(self, where: Places) -> np.ndarray:
+    def flexibility(self, where: AttachmentPoints) -> np.ndarray:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
         exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
         b = self.model.rows(where.rows)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.catalogue import Places
+from ..effects.catalogue import AttachmentPoints
 from ..effects.effect import Effect, FieldChange, Parameter
 from .likelihood import LN10, POWER, Data, Responses
 from .map_fit import Weighing, unknowns
@@ -62,7 +62,7 @@ def baseline(
 
 
 def point_scores(
-    base: Baseline, model: Reduced, data: Responses, places: Places, matrix: str,
+    base: Baseline, model: Reduced, data: Responses, places: AttachmentPoints, matrix: str,
     strengths: np.ndarray, residual_flexibility: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Score of one mass or spring of each strength at each place (n_places, n_strengths).
