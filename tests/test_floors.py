@@ -32,7 +32,7 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
 MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
-MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io"}
+MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
 BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
 MAY_IMPORT["planning"] = BELOW | {"view"}

@@ -13,6 +13,7 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
+from ..effects.registry import names
 from ..ema.setup import Recording, TestSetup
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
@@ -25,14 +26,6 @@ from .sensor_places import grid_row, places
 from .toml_sections import KeyFile, TomlSection, read_keys
 
 FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
-EFFECTS = (
-    *("global-stiffness", "global-density", "part-stiffness", "stiffness-patch"),
-    *("thickness-scale", "thickness-distribution", "orthotropic-material", "membrane-prestress"),
-    *("adhesive-stiffness", "viscoelastic-joint", "hem-contact", "weld-missing"),
-    *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
-    *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
-    *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault"),
-)
 _TABLES = ("model", "test", "band", "held_out", "parameter")
 _TEST = ("recordings", "quantity", "gain", "sensors", "mass", "mass_sd", "hangers")
 _MASS_SD = 0.002  # of the mass, where the user gives none
@@ -263,7 +256,7 @@ _PARAMETER = ("name", "parts", "field")
 
 def _parameter(section: TomlSection, made: Assembly) -> FreeParameter:
     """A parameter the user frees."""
-    what = section.text("field", due=True, among=(*FIELDS, *EFFECTS)) or ""
+    what = section.text("field", due=True, among=(*FIELDS, *names())) or ""
     parts: list[str] = []
     given = section.values.get("parts", [])
     for name in given if isinstance(given, list) else [given]:

@@ -39,6 +39,7 @@ class Jitter(Effect):
     name = "jitter"
     claim = "elements of another formulation give slightly other frequencies"
     kind = "nuisance"
+    writable = False
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     lam: np.ndarray = field(default_factory=lambda: np.zeros(0))
