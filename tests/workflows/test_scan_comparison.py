@@ -9,7 +9,7 @@ from chladni.cli.app import application
 from chladni.errors import FileError
 from chladni.geometry.facets import point_normals
 from chladni.io.nastran import write_assembly
-from chladni.io.scanned_surface import Scan, read_scan
+from chladni.io.scanned_surface import ScannedSurface, read_scan
 from chladni.units import units
 from chladni.workflows.scan_comparison import compare_with_scan
 from chladni_specimens.plates import folded_panel, plate
@@ -22,7 +22,7 @@ NORMAL = point_normals(PANEL.points, CELLS)
 
 def _scan(points):
     halves = np.vstack([CELLS[:, [0, 1, 2, 2]], CELLS[:, [0, 2, 3, 3]]])
-    return Scan(points, halves, np.nan, ())
+    return ScannedSurface(points, halves, np.nan, ())
 
 
 def _panel(found):
@@ -34,7 +34,7 @@ def test_a_scan_of_either_face_is_no_distance_away(side):
     """The sheet's face is half its thickness from the middle that the shells stand for."""
     flat = plate(0.4, 0.3, 8, 6, 2e-3)
     halves = np.vstack([flat.shells.nodes[:, [0, 1, 2, 2]], flat.shells.nodes[:, [0, 2, 3, 3]]])
-    scan = Scan(flat.points + side * np.array([0, 0, 1e-3]), halves, np.nan, ())
+    scan = ScannedSurface(flat.points + side * np.array([0, 0, 1e-3]), halves, np.nan, ())
     (found,) = compare_with_scan(flat, scan).parts
     assert found.covered == pytest.approx(1)
     assert found.worst < 1e-12
@@ -44,7 +44,7 @@ def test_half_a_scan_covers_half_the_part():
     flat = plate(0.4, 0.3, 8, 6, 2e-3)
     left = flat.shells.nodes[flat.points[flat.shells.nodes, 0].max(axis=1) < 0.21]
     halves = np.vstack([left[:, [0, 1, 2, 2]], left[:, [0, 2, 3, 3]]])
-    one = compare_with_scan(flat, Scan(flat.points, halves, np.nan, ()))
+    one = compare_with_scan(flat, ScannedSurface(flat.points, halves, np.nan, ()))
     assert one.parts[0].covered == pytest.approx(0.5)
     assert np.isnan(one.off).sum() == 24
 

@@ -14,7 +14,7 @@ SUFFIXES = (".stl", ".ply", ".obj")
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class ScannedSurface:
     """A triangulated surface.
 
     Attributes
@@ -31,7 +31,7 @@ class Scan:
     notes: tuple[str, ...]
 
 
-def read_scan(path: Path, length: float = 1.0) -> Scan:
+def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
     """A scan whose coordinates are in units of ``length`` [m].
 
     Raises
@@ -60,7 +60,7 @@ def read_scan(path: Path, length: float = 1.0) -> Scan:
         raise FileError(f"{path}: none of its {len(cells)} triangles has an area")
     closed = mesh.is_watertight and mesh.is_winding_consistent
     volume = abs(float(mesh.volume)) * length**3 if closed else np.nan
-    return Scan(points, cells[real], volume, tuple(_remarks(points, cells[real], ~real)))
+    return ScannedSurface(points, cells[real], volume, tuple(_remarks(points, cells[real], ~real)))
 
 
 def _remarks(points: np.ndarray, cells: np.ndarray, flat: np.ndarray) -> list[str]:

@@ -10,7 +10,7 @@ from ..geometry.facets import cell_areas, point_normals
 from ..geometry.formed_mesh import FormedMesh
 from ..geometry.nearest import ShellSurface
 from ..geometry.thickness_alignment import Alignment, align, moved
-from ..io.scanned_surface import Scan
+from ..io.scanned_surface import ScannedSurface
 from ..model.assembly import Assembly
 
 REACH = 0.01  # of the size of the structure: shells farther from the scan were not scanned
@@ -47,7 +47,9 @@ class ScanComparison:
     alignment: Alignment | None
 
 
-def compare_with_scan(assembly: Assembly, scan: Scan, aligned: bool = False) -> ScanComparison:
+def compare_with_scan(
+    assembly: Assembly, scan: ScannedSurface, aligned: bool = False
+) -> ScanComparison:
     """Distances of the sheets' faces from a scan, which may be brought onto the model first.
 
     A scanner sees the outside of a sheet: half the thickness from the middle the shells stand for.
@@ -98,7 +100,7 @@ def _by_part(assembly: Assembly, middle: np.ndarray, off: np.ndarray) -> tuple[P
     return tuple(sorted(out, key=lambda p: (-round(p.covered, 3), p.most)))
 
 
-def _as_formed(scan: Scan) -> FormedMesh:
+def _as_formed(scan: ScannedSurface) -> FormedMesh:
     """A scan as the mesh of a sheet whose thickness is not known."""
     n, m = len(scan.points), len(scan.cells)
     unknown = np.full((m, 4), np.nan)
