@@ -44,7 +44,7 @@ def auto_mac(phi: np.ndarray) -> np.ndarray:
 
 
 def _power(x: np.ndarray, axis: int) -> np.ndarray:
-    return np.asarray((np.abs(x) ** 2).sum(axis=axis))
+    return (np.abs(x) ** 2).sum(axis=axis)
 
 
 def _ratio(above: np.ndarray, below: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ def comac(phi: np.ndarray, psi: np.ndarray, convention: Convention = "allemang")
     if convention == "allemang":
         return _ratio(np.abs(phi * psi.conj()).sum(1) ** 2, _power(phi, 1) * _power(psi, 1))
     if convention == "enhanced":
-        return np.asarray(_power(phi - psi, 1) / (2 * phi.shape[1]))
+        return _power(phi - psi, 1) / (2 * phi.shape[1])
     raise LabelError(f"no convention {convention!r}; there are allemang, enhanced")
 
 

@@ -52,4 +52,4 @@ def components(quads: np.ndarray, count: int) -> np.ndarray:
     """Number (from 0) of the connected piece each of `count` points belongs to."""
     a, b = edges_of(quads).T
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return connected_components(graph, directed=False)[1]

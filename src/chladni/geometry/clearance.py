@@ -56,7 +56,7 @@ class Gaps:
         shapes : (n_points, 3, r)   translations of all points of the assembly
         """
         other = np.einsum("kc,kcir->kir", self.weight, shapes[self.opposite])
-        return np.asarray(np.einsum("ki,kir->kr", self.normal, other - shapes[self.rows]))
+        return np.einsum("ki,kir->kr", self.normal, other - shapes[self.rows])
 
     def first_contact(
         self,
@@ -76,7 +76,7 @@ class Gaps:
         omega = 2 * np.pi * np.asarray(frequency)
         per_force = np.abs(self.relative_motion(shapes) * drive) / (2 * damping * omega**2)
         gap = np.maximum(self.clearance, 0.0)[:, None]
-        return np.asarray(gap / np.maximum(per_force, 1e-30))
+        return gap / np.maximum(per_force, 1e-30)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def _gaps(
 
 def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
     low, high = other.min(axis=0) - margin, other.max(axis=0) + margin
-    return np.asarray(np.all((points >= low) & (points <= high), axis=1))
+    return np.all((points >= low) & (points <= high), axis=1)
 
 
 @dataclass(frozen=True)

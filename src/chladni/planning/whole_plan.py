@@ -250,13 +250,13 @@ def motion(built: Structure, modal: ModalModel) -> np.ndarray:
 def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
     """Translation of every point (n_points, 3, k) in vectors over the free dofs (n_free, k)."""
     u = built.T @ vectors
-    return np.asarray(u.reshape(len(built.assembly.points), 6, -1)[:, :3])
+    return u.reshape(len(built.assembly.points), 6, -1)[:, :3]
 
 
 def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
     """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
     at = places.moving(moving, mounts.place)
-    return np.asarray(np.einsum("mir,mi->mr", at, mounts.directions))
+    return np.einsum("mir,mi->mr", at, mounts.directions)
 
 
 def mounts_at(places: SensorCandidates) -> Mount:

@@ -92,7 +92,7 @@ def _improved(
         np.block([[own, modes.T @ AZ], [(modes.T @ AZ).T, Z.T @ AZ]])
         for own, AZ in ((K, KZ), (B, MZ))
     )
-    return np.asarray(sl.eigh((K + K.T) / 2, (B + B.T) / 2, eigvals_only=True))
+    return sl.eigh((K + K.T) / 2, (B + B.T) / 2, eigvals_only=True)
 
 
 def products(
@@ -128,4 +128,4 @@ def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:
     gather = sp.csr_array(
         (np.ones(dofs.size), (dofs.ravel(), np.arange(dofs.size))), shape=(T.shape[0], dofs.size)
     )
-    return np.asarray(T.T @ (gather @ force.reshape(dofs.size, -1)))
+    return T.T @ (gather @ force.reshape(dofs.size, -1))

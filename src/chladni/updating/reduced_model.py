@@ -113,7 +113,7 @@ def _bordered(old: np.ndarray, side: np.ndarray, corner: np.ndarray) -> np.ndarr
     """[[old, side], [sideᵀ, corner]] over the last two axes."""
     top = np.concatenate([old, side], axis=-1)
     low = np.concatenate([side.swapaxes(-1, -2), corner], axis=-1)
-    return np.asarray(np.concatenate([top, low], axis=-2))
+    return np.concatenate([top, low], axis=-2)
 
 
 def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:

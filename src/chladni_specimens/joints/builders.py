@@ -351,4 +351,4 @@ def _tangent(line: np.ndarray) -> np.ndarray:
     t = np.gradient(line, axis=0) if len(line) > 2 else np.repeat(np.diff(line, axis=0), 2, axis=0)
     if len(line) > 2 and np.allclose(line[0], line[-1]):
         t[0] = t[-1] = line[1] - line[-2]
-    return np.asarray(t / np.linalg.norm(t, axis=1, keepdims=True))
+    return t / np.linalg.norm(t, axis=1, keepdims=True)
