@@ -139,7 +139,7 @@ def _outward(d: np.ndarray) -> np.ndarray:
 
 
 def _upright(d: np.ndarray, seen: Surface) -> np.ndarray:
-    """Z is up unless one looks along it; then the shorter side is, so that pictures are wide."""
+    """z is up unless one looks along it; then the shorter side is, so that pictures are wide."""
     up = np.array([0.0, 0.0, 1.0])
     if abs(d[2]) > 0.8:
         span = np.ptp(seen.points[seen.used], axis=0)
