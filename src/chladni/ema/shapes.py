@@ -131,7 +131,7 @@ def modal_model(identified: Identified) -> ModalModel:
 def lines_per_bandwidth(identified: Identified, frequency: np.ndarray) -> np.ndarray:
     """Lines within the half-power bandwidth 2 ζ f of each mode, over two: per half bandwidth (r,).
 
-    Three or more are needed for the damping (thesis, lines 1045-1051).
+    Three or more are needed for the damping (Echaniz Granado 2015, section 5.2).
     """
     f, half = identified.frequency, identified.damping * identified.frequency
     inside = (frequency >= (f - half)[:, None]) & (frequency <= (f + half)[:, None])

@@ -1,4 +1,7 @@
-"""Where to shake: every candidate's condition number (thesis table 2), drive point and rattle."""
+"""Where to shake: every candidate's condition number, drive point and rattle.
+
+The condition number is that of Echaniz Granado (2015), section 4.1.1 and table 2.
+"""
 
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,4 +1,7 @@
-"""Which frequencies to measure and how long that takes (thesis 4.2.5, table 3)."""
+"""Which frequencies to measure and how long that takes.
+
+Echaniz Granado (2015), section 4.2.5 and table 3.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -86,7 +89,7 @@ TABLE_3 = (
     Stage(50, 100, 200, 80),
     Stage(100, 200, 200, 120),
     Stage(200, 400, 200, 300),
-)  # of the thesis, five sweeps
+)  # Echaniz Granado 2015, table 3, five sweeps
 
 
 def stage_lines(stages: Sequence[Stage]) -> np.ndarray:

@@ -82,7 +82,7 @@ def _open(c: Candidates, rules: Rules, kept: np.ndarray, i: int) -> np.ndarray:
 
 
 def _joined(c: Candidates, rest: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Log det F of the rest with each of the others (m,)."""
+    """log det F of the rest with each of the others (m,)."""
     U = c.joining(rest, others)
     return changed("D", _regular(c, rest), U, np.ones(U.shape[2]))
 

@@ -194,7 +194,7 @@ def _given(c: Candidates, rest: np.ndarray, others: np.ndarray) -> tuple[np.ndar
 
 
 def _pair_gain(gamma: np.ndarray, E: np.ndarray) -> np.ndarray:
-    """Log det(Γ_JJ + E_JJ) - log det Γ_JJ of every pair J, mean over draws (m, m)."""
+    """log det(Γ_JJ + E_JJ) - log det Γ_JJ of every pair J, mean over draws (m, m)."""
 
     def det(A: np.ndarray) -> np.ndarray:
         diagonal = np.diagonal(A, axis1=-2, axis2=-1)

@@ -221,7 +221,7 @@ def changed(criterion: Criterion, F: np.ndarray, U: np.ndarray, sign: np.ndarray
 def log_det_fisher(
     phi: np.ndarray, noise: np.ndarray | None = None, prior: np.ndarray | None = None
 ) -> float:
-    """Log det(ΦᵀΣ⁻¹Φ): the information all rows (sensors) carry about the columns (modes)."""
+    """log det(ΦᵀΣ⁻¹Φ): the information all rows (sensors) carry about the columns (modes)."""
     c = candidates(phi, noise, prior)
     return value("D", c.fisher(np.arange(len(c))))
 

@@ -30,7 +30,7 @@ def visibility(seen: np.ndarray, largest: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Move:
-    """A sensor that was given up so that a mode is seen (thesis 4.2.4.6)."""
+    """A sensor that was given up so that a mode is seen (Echaniz Granado 2015, section 4.2.4.6)."""
 
     mode: int
     out: int

@@ -48,7 +48,7 @@ class Walk:
         self._anew()
 
     def exact(self) -> float:
-        """Log det F of the kept, from scratch."""
+        """log det F of the kept, from scratch."""
         F = self.c.fisher(np.flatnonzero(self.kept)) + (self.prior - self.c.prior)
         return value("D", F)
 
