@@ -105,8 +105,8 @@ def gramians(system: StateSpace) -> tuple[np.ndarray, np.ndarray]:
 def gramian_quotient(W: np.ndarray, frequency: np.ndarray | None = None) -> float:
     """Largest over smallest diagonal entry of a gramian; inf where one vanishes.
 
-    It depends on the coordinates: with ``frequency`` those of Echaniz Granado (2015), section 4.1.1,
-    are taken, (η, η'), where an observability gramian has ω_r² W for the velocity states.
+    It depends on the coordinates: with ``frequency`` those of Echaniz Granado (2015), section
+    4.1.1, are taken, (η, η'), where an observability gramian has ω_r² W for the velocity states.
     """
     diagonal = np.diag(W).copy()
     if frequency is not None:
