@@ -24,8 +24,8 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
     monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
     prepared = SimpleNamespace(search=SimpleNamespace())
-    trial, _ = renewal.renewed(None, prepared, SimpleNamespace(effect=effect, structure="deck"))
-    assert trial.structure == structure
+    begun = SimpleNamespace(effect=effect, structure="deck")
+    assert renewal.renewed(None, prepared, begun).trial.structure == structure
 
 
 def a_trial():
