@@ -14,6 +14,7 @@ from chladni.dynamics.frf import FRF
 from chladni.effects.effect import Effect
 from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
+from chladni.fem.modelled import modelled
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.read_tables import read_table
 from chladni.io.tables.sensor_table import _OPTIONAL
@@ -21,7 +22,6 @@ from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS
 from chladni.updating.preparation import prepare
 from chladni.workflows.case_model import model_frf
-from chladni.workflows.loaded_model import Model
 from chladni.workflows.question_of_case import question
 
 from .test_case import deck
@@ -166,9 +166,8 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
     mark.update(repr((search.weighing, search.setup.hangers, search.setup.sensors)).encode())
     mark.update(repr((ready.held.tolist(), ready.what, ready.notes)).encode())
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
-    model = Model(case.path, case.tested(case.assembly))
-    modal = normal_modes(model.structure.system, 20, points=model.places)
-    curves = model_frf(case, model, modal.with_damping(case.damping or 0.01), case.frfs[0])
+    model = modelled(case.tested(case.assembly), 200.0)
+    curves = model_frf(case, model, case.damping or 0.01, case.frfs[0])
     mark.update(np.round(curves.values / np.abs(curves.values).max(), 9).tobytes())
     return mark.hexdigest()
 

@@ -123,7 +123,7 @@ def test_welds(tmp_path, patch):
     ids=["soft", "cured", "steel-like"],
 )
 def test_bead(tmp_path, material):
-    """The same of a glued one, from sealant to the thesis' steel-like adhesive."""
+    """The same of a glued one, from sealant to a steel-like adhesive."""
     assembly, _ = adhesive_bead(coupon(), LINE, ("a", "b"), width=0.012, material=material)
     compare(assembly, tmp_path)
 

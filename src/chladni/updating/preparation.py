@@ -18,9 +18,10 @@ from ..effects.ordinary import defaults, gain, scatter
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import equalised, identify
+from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
-from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
+from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
 from .hypothesis_fit import Search
 from .least_data import too_little
@@ -34,6 +35,7 @@ ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough 
 ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
+SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
 
 
 def prepare(question: Question) -> Prepared:
@@ -59,9 +61,16 @@ def _by_responses(question: Question) -> Prepared:
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
-    built = structure(question.tested(question.assembly))
+    seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
+    if not seen.any():
+        raise FileError(
+            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
+            "nothing to fit a model to"
+        )
+    nominal = modelled(question.tested(question.assembly), SOLVED * top)
+    built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    bench = workbench(built.assembly, top, sp.csr_array(sp.vstack([rows_o, rows_i])), built=built)
+    bench = workbench(nominal, top, sp.csr_array(sp.vstack([rows_o, rows_i])))
     bench = carrying(bench, freed_by(question, bench, top))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -72,7 +81,7 @@ def _by_responses(question: Question) -> Prepared:
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
-    nuisance = nuisances(bench, built, top)
+    nuisance = nuisances(bench, nominal, top)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, top)
@@ -105,14 +114,11 @@ def _by_responses(question: Question) -> Prepared:
             f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
         )
     notes += _mass_note(question)
-    seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
-    if not seen.any():
-        raise FileError(
-            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
-            "nothing to fit a model to"
-        )
+    noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     few = too_little(int(seen.sum()), int(data[0].use.any(axis=0).sum()))
-    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found, few)
+    return Prepared(
+        search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
+    )
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
@@ -174,8 +180,10 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
-    built = structure(question.tested(question.assembly))
-    bench = workbench(built.assembly, top, built=built, groups=48)
+    highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
+    nominal = modelled(question.tested(question.assembly), SOLVED * highest)
+    built = nominal.structure
+    bench = workbench(nominal, top, groups=48)
     bench = carrying(bench, freed_by(question, bench, top))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
@@ -188,22 +196,22 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
     ).over(bench.model)
-    nuisance = nuisances(bench, built, top)
+    nuisance = nuisances(bench, nominal, top)
     search = searched(question, bench, data, nuisance, top)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
     few = too_little(len(frequency), 0)
-    return Prepared(search, data, held, what, notes, found, few, ~held)
+    return Prepared(search, data, held, what, notes, nominal, None, found, few, ~held)
 
 
-def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
+def nuisances(bench: Workbench, model: Modelled, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
         scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
-    if (mesh := mesh_error(built, top)) is not None:
+    if (mesh := mesh_error(model, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(built, top, mesh)]
+    return [*out, jitter(model, top, mesh)]
 
 
 def searched(
