@@ -62,7 +62,7 @@ def _scores(search: Search, base: Baseline, effect: Effect, starts: list[np.ndar
             r, _ = poles.residual(state, False)
             out[way, k] = r @ r + (((start - mean) / sd) ** 2).sum()
         if not wide:
-            r, _ = data.residual(state, False)
+            r, _ = data.scaled(state, False)
             out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
     return out
 

@@ -18,7 +18,9 @@ from ..effects.somewhere import Somewhere
 from ..errors import ModelError
 from .calibration import Status
 from .candidates import candidates, point_effect
+from .discrepancy import MEDIAN
 from .likelihood import Data, Poles, Responses
+from .reduced import evaluate
 from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 
 THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
@@ -72,8 +74,8 @@ def diagnose(
     bring starts of their own.
     """
     progress("calibration without new physics", 0.05)
+    search, null = _null(search)
     nominal = _base_trial(search, search.nuisance, _nominal_starts(search))
-    null = _base_trial(search, search.base, _null_starts(search))
     if not effects:
         return _calibrated(search, nominal, null)
     plain = _plain(search, null)
@@ -90,6 +92,20 @@ def diagnose(
     null = _restarted(search, null, trials)
     progress("verdict", 0.95)
     return Diagnosis(nominal, null, plain, tuple(trials), verdict(nominal, null, trials))
+
+
+def _null(search: Search) -> tuple[Search, Trial]:
+    """The null, and the search with errors of the model's form as they spread from its state."""
+    model, delta = search.bench.model, MEDIAN
+    state = evaluate(model, search.base, search.mean(), False)
+    starts = _null_starts(search)
+    for _ in range(2):
+        search = search.allowing_errors(state, delta)
+        null = _base_trial(search, search.base, starts)
+        if not isinstance(null.data, Responses) or null.data.error is None:
+            break
+        state, delta, starts = null.fit.state, null.data.error.delta, [null.fit.x]
+    return search, null
 
 
 def threshold(data: Data) -> float:
@@ -140,6 +156,7 @@ def _plain(search: Search, null: Trial) -> Trial:
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(search.base, kept, strict=True)]
     ).astype(bool)
+    search = search.exactly()
     return _base_trial(search, chosen, [x[inside] for x in (*_null_starts(search), null.fit.x)])
 
 

@@ -65,7 +65,7 @@ def _by_responses(question: Question) -> Prepared:
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
-    nuisance = nuisances(bench, built, top)
+    nuisance = nuisances(bench, built, top, jittered=False)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, top)
@@ -176,14 +176,19 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     return Prepared(search, data, held, what, notes, found, ~held)
 
 
-def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
-    """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
+def nuisances(
+    bench: Workbench, built: Structure, top: float, jittered: bool = True
+) -> list[Effect]:
+    """Scatter within parts, mesh error, jitter: what calibration cannot remove.
+
+    Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
+    """
     out: list[Effect] = [
         scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(built, top, mesh)]
+    return [*out, jitter(built, top, mesh)] if jittered else out
 
 
 def searched(

@@ -60,6 +60,10 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     )  # fmt: skip
     extra = [e for e in old.nuisance if e.name == "gain"]
     fresh = searched(
-        changed, bench, data.over(bench.model), [*nuisances(bench, built, top), *extra], top
+        changed,
+        bench,
+        data.over(bench.model),
+        [*nuisances(bench, built, top, not rows), *extra],
+        top,
     )
     return fresh, fresh.trial(effect.begun_at(x), x, fresh.mean())
