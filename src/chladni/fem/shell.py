@@ -19,8 +19,9 @@ import numpy as np
 from . import triangle
 from .shell_geometry import ShellGeometry as ShellGeometry
 from .shell_geometry import geometry as geometry
+from .shell_geometry import to_element
 from .shell_membrane import N as QUAD_N
-from .shell_membrane import jacobians, middle_slope
+from .shell_membrane import jacobians
 from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
@@ -73,7 +74,7 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     B[:, :, DRILL, :, :2] = omega.reshape(len(geo), -1, 1, 4, 2)
     B[:, :, 8, :, 5] = -N
     B[:, :, DRILL] = _damped(B[:, :, DRILL], weight)
-    B = B.reshape(len(geo), -1, 24) @ _to_element(geo)
+    B = B.reshape(len(geo), -1, 24) @ to_element(geo)
     return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
 
 
@@ -319,24 +320,6 @@ def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
     """Those rows of what is given for each element; one (3, 3) stands for all."""
     for a in arrays:
         yield a if a is None or a.shape == (3, 3) else a[rows]
-
-
-def _to_element(geo: ShellGeometry) -> np.ndarray:
-    """Motion of the flattened mid-surface in the element frame from the nodes': (m, 24, 24).
-
-    u' = R u + (d R r - z w) x n with d the offset, z the warp and w = (w,y -w,x) the turn of the
-    element, from the corners' deflections; a b for b x n = (b_y, -b_x, 0).
-    """
-    T = np.zeros((len(geo), 4, 6, 4, 6))
-    x, y, n = (geo.frames[:, k] for k in range(3))
-    for k in range(4):
-        T[:, k, :3, k, :3] = T[:, k, 3:, k, 3:] = geo.frames
-        T[:, k, 0, k, 3:] = geo.offset[:, None] * y
-        T[:, k, 1, k, 3:] = -geo.offset[:, None] * x
-    if geo.warp.any():
-        slope = middle_slope(geo.corners)
-        T[:, :, :2, :, :3] += np.einsum("mk,mij,ml->mkijl", geo.warp, slope, n)
-    return T.reshape(len(geo), 24, 24)
 
 
 def _mass(
