@@ -45,6 +45,11 @@ def corner_slopes(corners: np.ndarray) -> np.ndarray:
     return np.asarray(inverse @ _CORNER_SLOPES)
 
 
+def corner_jacobians(corners: np.ndarray) -> np.ndarray:
+    """Jacobian of the unit square at each corner (m, 4), the area of a parallelogram [m²]."""
+    return np.asarray(4 * invert(_CORNER_SLOPES @ corners[:, None])[0])
+
+
 def symmetric(grad: np.ndarray) -> np.ndarray:
     """(ux,x  uy,y  ux,y + uy,x) from a field's nodal ux uy: (..., 2, k) -> (..., 3, 2k)."""
     B = np.zeros((*grad.shape[:-2], 3, 2 * grad.shape[-1]))
