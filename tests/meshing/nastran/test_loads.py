@@ -265,6 +265,14 @@ def test_what_is_left_out_is_said(bulk):
     assert all("left out" in n and "deck.bdf:" in n for n in notes)
 
 
+def test_parameters_without_effect_are_said(bulk):
+    """Those heeded and those of output alone are not."""
+    text = PLATE + "PARAM,POST,-1\nPARAM,G,.02\nPARAM,SNORM,20.\nPARAM,K6ROT,1.\n"
+    notes = analysis(bulk(text, "SOL 111\nCEND\nPARAM,LFREQ,1.\n")).notes
+    assert len(notes) == 1
+    assert "PARAM LFREQ, SNORM: not acted upon" in notes[0]
+
+
 @pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks are not at hand")
 def test_wing_box_pressure():
     """The resultant of 1632 pressures on a closed skin equals p times its projected area."""
