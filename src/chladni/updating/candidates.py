@@ -15,6 +15,7 @@ from .reduced import evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 from .search import Search, Trial
 
+NEAR = 60  # grids tried round each of the best places
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 Candidate = tuple[Effect, np.ndarray, np.ndarray]  # effect, its start, start of the base
@@ -107,13 +108,26 @@ def _points(search: Search, bases: list[Baseline], data: Responses) -> list[Cand
             score = point_scores(base, bench.model, data, spots, matrix, strengths, rest)
             for k in _distinct(score.min(axis=1), spots.point, chosen, 2):
                 chosen.append(k)
-                c = strengths[int(np.argmin(score[k]))]
+                near = _around(bench.grids, spots, k)
+                closer = point_scores(
+                    base, bench.model, data, near, matrix, strengths, bench.flexibility(near)
+                )
+                best, level = np.unravel_index(np.argmin(closer), closer.shape)
+                c = strengths[level]
                 effect = point_effect(
-                    search, matrix, bench.grids, bench.grids.position(spots.grids[k])
+                    search, matrix, bench.grids, bench.grids.position(near.grids[best])
                 )
                 start = np.array([np.log(c / effect.parameters[0].scale), 0.0, 0.0])
                 out.append((effect, start, base.x))
     return out
+
+
+def _around(grids: catalogue.Places, spots: catalogue.Places, k: int) -> catalogue.Places:
+    """A closer spread of the grids round one of the places, as far as the next ones."""
+    d = np.linalg.norm(spots.point - spots.point[k], axis=1)
+    reach = np.sort(d)[min(4, len(d) - 1)]
+    near = np.flatnonzero(np.linalg.norm(grids.point - spots.point[k], axis=1) <= reach)
+    return grids.only(near[catalogue.spread(grids.point[near], NEAR)])
 
 
 def point_effect(search: Search, matrix: str, spots: catalogue.Places, k: int) -> Effect:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import scipy.linalg as sl
 
-from .reduced import State
+from .reduced import Reduced, State
 
 if TYPE_CHECKING:
     from .likelihood import Responses
@@ -28,8 +28,53 @@ REACH = 1.5  # modes up to this many times the highest line take part
 RIGID = 0.02  # of the highest line: below it a mode counts as rigid and is known
 MOST = 2000  # pairs of modes, or samples, that are decomposed
 CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
+USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
 WRAPS = 0.4  # relative deviation of H from which its phase may wrap
-BLOCK = 500  # pairs whose columns are held at once
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """A change of the form of the model, held: G and G' in the modes of a reference state.
+
+    Attributes
+    ----------
+    rows : (k, r)      of Φ⁻¹, the reference modes that take part
+    lam : (k,)         their ω² [rad²/s²]
+    G : (2, k, k)      relative change of modal stiffness and mass
+    """
+
+    rows: np.ndarray
+    lam: np.ndarray
+    G: np.ndarray
+
+    def changed(self, model: Reduced) -> Reduced:
+        """The model with the change in it."""
+        root = np.sqrt(self.lam)
+        dK, dM = (
+            self.rows.T @ A @ self.rows for A in (root[:, None] * self.G[0] * root, self.G[1])
+        )
+        return replace(model, K0=model.K0 + dK, M0=model.M0 + dM)
+
+    def with_values(self, g: np.ndarray) -> Self:
+        """The same modes, entries g (2 pairs,) in units of their deviation at δ = 1."""
+        i, j = self.pairs.T
+        G = np.zeros_like(self.G)
+        for q, values in enumerate(g.reshape(2, -1)):
+            G[q, i, j] = G[q, j, i] = values * np.where(i == j, 1.0, np.sqrt(0.5))
+        return replace(self, G=G)
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Pairs i <= j of the modes that take part (n_pairs, 2)."""
+        return np.stack(np.triu_indices(len(self.lam)), axis=1)
+
+
+def form(state: State, top: float) -> Form:
+    """No change yet, in the flexible modes up to ``REACH`` times the highest line [rad/s]."""
+    omega = np.sqrt(np.maximum(state.lam, 0))
+    modes = np.flatnonzero((omega > RIGID * top) & (omega < REACH * top))
+    k = len(modes)
+    return Form(np.linalg.inv(state.phi)[modes], state.lam[modes], np.zeros((2, k, k)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,20 +117,10 @@ def discrepancy(data: "Responses", state: State) -> Discrepancy:
 
     The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs.
     """
-    top = float(np.abs(data.s.imag).max())
-    pairs = mode_pairs(state, top)
-    n = 2 * int(data.use.sum()) * data.values.shape[2]
-    if n <= MOST:
-        gram = np.zeros((n, n))
-        for at in range(0, len(pairs), BLOCK):
-            W = columns(data, state, pairs[at : at + BLOCK])
-            gram += W @ W.T
-        s, U = sl.eigh(gram, overwrite_a=True, check_finite=False, driver="evd")
+    W = columns(data, state, form(state, float(data.s.imag.max())))
+    if len(W) <= MOST:
+        s, U = sl.eigh(W @ W.T, overwrite_a=True, check_finite=False, driver="evd")
     else:
-        W = np.concatenate(
-            [columns(data, state, pairs[at : at + BLOCK]) for at in range(0, len(pairs), BLOCK)],
-            axis=1,
-        )
         W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST]]
         s, V = sl.eigh(W.T @ W, overwrite_a=True, check_finite=False, driver="evd")
         U = W @ (V / np.sqrt(np.maximum(s, 1e-300)))
@@ -93,49 +128,43 @@ def discrepancy(data: "Responses", state: State) -> Discrepancy:
     return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
 
 
-def curvature(data: "Responses", state: State, delta: float) -> np.ndarray:
+def curvature(data: "Responses", state: State) -> np.ndarray:
     """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
 
     For H = H_0 (1 + z), z of variance σ², ln(1 + z) = z - z²/2: near a zero of H, where σ is no
-    longer small, the logarithm is bent, and beyond σ = 0.4 its phase may wrap.
+    longer small, the logarithm is bent, and beyond σ = 0.4 its phase may wrap. What is left of the
+    exact response to G is alike along lines and counts ``BENT`` times.
     """
     every = replace(data, use=np.ones(data.use.shape, bool))
-    pairs = mode_pairs(state, float(np.abs(data.s.imag).max()))
-    var = np.zeros(2 * data.values.size)
-    for at in range(0, len(pairs), BLOCK):
-        var += (columns(every, state, pairs[at : at + BLOCK]) ** 2).sum(axis=1)
-    sd = every.spread() * np.log(10) * delta
+    var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
+    sd = every.spread() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
-    return np.asarray(sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
+    return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
 
 
-def mode_pairs(state: State, top: float) -> np.ndarray:
-    """Pairs i <= j of flexible modes up to ``REACH`` times the highest line [rad/s] (k, 2)."""
-    omega = np.sqrt(np.maximum(state.lam, 0))
-    modes = np.flatnonzero((omega > RIGID * top) & (omega < REACH * top))
-    i, j = np.triu_indices(len(modes))
-    return np.stack([modes[i], modes[j]], axis=1)
+def columns(data: "Responses", state: State, about: Form) -> np.ndarray:
+    """∂r/∂G and ∂r/∂G' of pairs of modes, times the standard deviation at δ = 1 (n, 2 pairs).
 
-
-def columns(data: "Responses", state: State, pairs: np.ndarray) -> np.ndarray:
-    """∂r/∂G and ∂r/∂G' of pairs of modes, times the standard deviation at δ = 1 (n, 2 k).
-
-    dH = -s^k φ_o D (√(λ_i λ_j) dG + s² dG') D φ_i, and its mirror image.
+    dH = -s^k a_oᵀ (Λ^½ dG Λ^½ + s² dG') a_i with a = T D φ, T the reference modes' share in those
+    of the state.
     """
-    i, j = pairs.T
+    i, j = about.pairs.T
     phi_o, phi_i, d = data.modal(state)
     H, sd = data.model(state), data.spread()
-    s2 = data.s[:, None] ** 2
-    both = d[:, i] * d[:, j] * data.s[:, None] ** data.power
+    T = about.rows @ state.phi
+    a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
+    a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)
+    a_o = a_o * (data.s**data.power)[:, None]
     std = np.where(i == j, 0.5, np.sqrt(0.5))  # half, for i = j counts twice below
-    over = [both * np.sqrt(np.maximum(state.lam[i] * state.lam[j], 0)), both * s2]
-    out = np.empty((2, len(pairs), *H.shape), complex)
+    root = np.sqrt(about.lam[i] * about.lam[j])
+    out = np.empty((2, len(i), *H.shape), complex)
     for p in range(len(phi_i)):
-        shape = (phi_o[:, i] * phi_i[p, j] + phi_o[:, j] * phi_i[p, i]) * std
-        for q, spectrum in enumerate(over):
-            out[q, ..., p] = -np.einsum("fk,ok->kfo", spectrum, shape)
+        both = a_o[i] * a_i[j, :, p, None] + a_o[j] * a_i[i, :, p, None]
+        both *= -std[:, None, None]
+        out[0, ..., p] = root[:, None, None] * both
+        out[1, ..., p] = data.s[:, None] ** 2 * both
     out /= H * sd * np.log(10)
-    z = out[:, :, data.use].reshape(2 * len(pairs), -1).T
+    z = out[:, :, data.use].reshape(2 * len(i), -1).T
     return np.concatenate([z.real, z.imag])
 
 

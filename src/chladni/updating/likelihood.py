@@ -18,7 +18,6 @@ from .pairing import paired, price_alone, price_missed
 from .reduced import Reduced, State
 
 LN10 = np.log(10.0)
-WIDEST = 0.02  # δ up to which samples near a zero of H are spared
 POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
@@ -45,7 +44,7 @@ class Responses:
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
     use : (n_f, n_out) bool                lines and channels the fit may see
-    floor : float                          standard deviation of log10 H that no model reaches
+    floor : float                          sd of log10 H that neither noise nor δ explains
     """
 
     values: np.ndarray
@@ -54,7 +53,7 @@ class Responses:
     inputs: object
     use: np.ndarray
     quantity: str = "accelerance"
-    floor: float = 0.015
+    floor: float = 0.003
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
@@ -99,7 +98,7 @@ class Responses:
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
         """The same responses of a model whose form is off by about δ, as seen from a state."""
         plain = self.exactly()
-        data = replace(plain, bent=curvature(plain, state, min(delta, WIDEST)))
+        data = replace(plain, bent=curvature(plain, state))
         return replace(data, error=discrepancy(data, state).with_delta(delta))
 
     def exactly(self) -> Self:

@@ -11,11 +11,12 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.frf import FRF
 from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.mesh import jitter, mesh_error
 from ..effects.ordinary import PartScale, gain, ordinary, scatter
-from ..ema.identification import equalised, identify
+from ..ema.identification import Identified, equalised, identify, spread
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from .calibration import fit
@@ -62,9 +63,9 @@ def _by_responses(question: Question) -> Prepared:
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_top, held_sensors)
-        data.append(
-            Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
-        )
+        H = equalised(found, s)
+        read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
+        data.append(read.over(bench.model))
     nuisance = nuisances(bench, built, top, jittered=False)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
@@ -95,6 +96,19 @@ def _by_responses(question: Question) -> Prepared:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     notes += _mass_note(question)
     return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found)
+
+
+def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
+    """Standard deviation of log10 H(s) from the noise of the recording (n_f, n_out, n_in).
+
+    The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
+    """
+    sd = np.sqrt(spread(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    f, own = s.imag / (2 * np.pi), frf.frequency
+    near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
+    lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))
+    per_line = np.minimum(sd[near], 1.0) * max(found.chi, 1.0)
+    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
