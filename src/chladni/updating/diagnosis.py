@@ -9,13 +9,15 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects import catalogue
 from ..effects.effect import Effect
 from ..effects.somewhere import Somewhere
 from ..errors import ModelError
+from .adequacy import Adequacy, adequacy
 from .calibration import Status
 from .candidates import candidates, point_effect
 from .discrepancy import MEDIAN
@@ -23,8 +25,8 @@ from .likelihood import Data, Poles, Responses
 from .reduced import evaluate
 from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 
-THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
-THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
+FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing
+THRESHOLD_POLES = 25.0  # gain in -2 ln evidence below which poles name nothing
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
@@ -44,6 +46,7 @@ class Diagnosis:
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
+    adequacy : whether the explanation fits at all, where that was tested
     """
 
     nominal: Trial
@@ -53,6 +56,7 @@ class Diagnosis:
     verdict: str
     notes: tuple[str, ...] = ()
     written: Trial | None = None
+    adequacy: Adequacy | None = None
 
     @property
     def found(self) -> Trial | None:
@@ -91,7 +95,24 @@ def diagnose(
     trials = _by_family([*trials, *(t for lead in trials[:RUNNING] for t in _closer(search, lead))])
     null = _restarted(search, null, trials)
     progress("verdict", 0.95)
-    return Diagnosis(nominal, null, plain, tuple(trials), verdict(nominal, null, trials))
+    called = verdict(nominal, null, trials)
+    found = Diagnosis(nominal, null, plain, tuple(trials), called)
+    return tested(found, search)
+
+
+def tested(diagnosis: Diagnosis, search: Search) -> Diagnosis:
+    """The diagnosis with its explanation held against what it predicts itself."""
+    winner = diagnosis.found or diagnosis.null
+    fits = adequacy(winner, search.weighing, search.labels)
+    if fits is None:
+        return diagnosis
+    name = winner.effect.name if diagnosis.found else "calibration alone"
+    note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
+    if fits.passes:
+        return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
+    note = f"{note}, {fits.where}; nothing in the catalogue explains the recording"
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None)
 
 
 def _null(search: Search) -> tuple[Search, Trial]:
@@ -109,8 +130,14 @@ def _null(search: Search) -> tuple[Search, Trial]:
 
 
 def threshold(data: Data) -> float:
-    """The gain that is needed to name anything."""
-    return THRESHOLD_POLES if isinstance(data, Poles) else THRESHOLD
+    """The gain in -2 ln evidence that is needed to name anything.
+
+    Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
+    (Markov); the families share the chance of a false alarm.
+    """
+    if isinstance(data, Poles):
+        return THRESHOLD_POLES
+    return float(2 * np.log(len(catalogue.NAMES) / FALSE_ALARM))
 
 
 def verdict(nominal: Trial, null: Trial, trials: Sequence[Trial]) -> str:
@@ -131,7 +158,7 @@ def _calibrated(search: Search, nominal: Trial, null: Trial) -> Diagnosis:
         "best -2 ln evidence"
     )
     plain = _plain(search, best)
-    return Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,))
+    return tested(Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,)), search)
 
 
 def _random_starts(search: Search, count: int = 4) -> list[np.ndarray]:

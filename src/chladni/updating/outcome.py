@@ -13,7 +13,7 @@ from ..ema.pairing import pair
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, threshold, verdict
+from .diagnosis import Diagnosis, tested, threshold, verdict
 from .likelihood import Poles, Responses
 from .question import Prepared, Question
 from .reduced import State, evaluate
@@ -113,7 +113,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         "named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
-    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note), written=None)
+    notes = (*diagnosis.notes, note)
+    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.search)
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
@@ -184,7 +185,10 @@ def alternatives(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
     """Why a hypothesis was not named, with a number."""
     if not named and gain > threshold(trial.data):
-        return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
+        return (
+            f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out or does "
+            "not fit"
+        )
     if not named:
         return (
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
