@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from chladni.fem.assemble import structure
-from chladni.meshing.nastran import read_deck, write_assembly
-from chladni.model.plates import plate
+from chladni.io.nastran import read_deck, write_assembly
 from chladni.units import units
+from chladni_specimens.plates import plate
 
 
 def seconds(call: Callable[[], object], times: int = 3) -> float:

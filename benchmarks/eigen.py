@@ -37,7 +37,7 @@ def specimen(edge, turned=True):
     shell; parallel to the axes, membrane and bending of flat walls part and leave 26.
     """
     from chladni.fem.assemble import structure
-    from chladni.model.plates import box
+    from chladni_specimens.plates import box
 
     assembly = box(1.0, 0.7, 0.5, h=edge)
     if turned:
@@ -69,8 +69,8 @@ def ours_unproved(system, places):
 
 def bare(system, places):
     """Block Lanczos on CHOLMOD with METIS, nothing checked."""
-    from chladni.dynamics.factor import factorise
-    from chladni.dynamics.lanczos import block_lanczos
+    from chladni.sparse.factor import factorise
+    from chladni.sparse.lanczos import block_lanczos
 
     sigma = shift(system)
     factor = factorise(system.K - sigma * system.M, backend="cholmod")

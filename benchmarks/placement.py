@@ -15,13 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import chladni_envs  # noqa: F401
-from chladni.ema.pretest import (
-    effective_independence,
-    exchange,
-    greedy,
-    independence,
-    log_det_fisher,
-)
+from chladni.planning import effective_independence, exchange, greedy, independence, log_det_fisher
 
 Shapes = np.ndarray
 

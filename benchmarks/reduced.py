@@ -21,12 +21,12 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import count
 from chladni.effects.ordinary import ordinary
 from chladni.effects.points import MassEffect, Suspension, strength
-from chladni.effects.thickness import thickness_distribution
+from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
-from chladni.model.plates import folded_panel
 from chladni.updating.accuracy import accuracy
-from chladni.updating.reduced import evaluate
-from chladni.updating.workbench import REACH, workbench
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import REACH, workbench
+from chladni_specimens.plates import folded_panel
 
 TOP = 380.0  # Hz
 SIZES = {"demonstration": 0.02, "fine": 0.0065, "large": 0.00314}

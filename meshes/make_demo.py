@@ -5,7 +5,7 @@ Run from the checkout: ``python meshes/make_demo.py``; it writes ``demo/`` and `
 
 from pathlib import Path
 
-from chladni.study.concealed import SPECIMENS, made, write
+from chladni_evidence.concealed import SPECIMENS, made, write
 
 HERE = Path(__file__).resolve().parent
 

@@ -9,13 +9,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from chladni.meshing.dyna import write_keyword
-from chladni.meshing.nastran import write_assembly
-from chladni.model.tailgate import tailgate
-from chladni.model.tailgate_design import TailgateDesign
-from chladni.model.tailgate_formed import forming_mesh
-from chladni.model.tailgate_shape import Skin
+from chladni.io.dyna import write_keyword
+from chladni.io.nastran import write_assembly
 from chladni.units import units
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.formed_thickness import forming_mesh
+from chladni_specimens.tailgate.skin import Skin
+from chladni_specimens.tailgate.tailgate import tailgate
 
 ORIGIN = "`meshes/make_tailgate.py`"
 FILES = {

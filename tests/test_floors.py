@@ -7,47 +7,67 @@ from pathlib import Path
 
 import pytest
 
-SRC = Path(__file__).parents[1] / "src"
+ROOT = Path(__file__).parents[1]
+PACKAGES = {  # every package of ours and where its source is
+    "chladni": ROOT / "src",
+    "chladni_specimens": ROOT / "src",
+    "chladni_evidence": ROOT / "src",
+    "chladni_envs": ROOT / "envs",
+}
 GROUND = {"errors", "arrays", "dofs", "units", "output", "progress"}
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
     "model": GROUND,
-    "dynamics": GROUND,
-    "meshing": GROUND | {"model"},
-    "fem": GROUND | {"model", "dynamics"},
+    "geometry": GROUND | {"model"},
+    "sparse": GROUND,
+    "dynamics": GROUND | {"sparse"},
     "ema": GROUND | {"dynamics"},
+    "fem": GROUND | {"model", "geometry", "sparse", "dynamics"},
+    "io": GROUND | {"model", "dynamics", "ema"},
     "bench": GROUND | {"dynamics", "ema"},
     "effects": GROUND | {"model", "dynamics", "fem", "ema"},
 }
-MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects"}
-MAY_IMPORT["case"] = GROUND | {"model", "dynamics", "meshing", "fem", "ema"}
-BELOW = MAY_IMPORT["updating"] | {"updating", "meshing", "bench", "case"}
-MAY_IMPORT |= {"view": BELOW, "study": BELOW, "report": BELOW}
-MAY_IMPORT["planning"] = BELOW | {"view", "report"}
-MAY_IMPORT["cli"] = BELOW | {"view", "study", "report", "planning"}
+MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
+MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io"}
+BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
+MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
+MAY_IMPORT["planning"] = BELOW | {"view"}
+MAY_IMPORT["report"] = BELOW | {"view", "planning"}
+MAY_IMPORT["workflows"] = BELOW | {"planning", "report", "view"}
+MAY_IMPORT["chladni_specimens"] = GROUND | {"model", "geometry"}
+MAY_IMPORT["cli"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens", "chladni_evidence"}
+MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
+MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},
-    "dynamics": {"sksparse"},
-    "meshing": {"meshio", "pyvista", "trimesh", "pyyeti"},
-    "ema": {"pyuff"},
+    "sparse": {"sksparse"},
+    "geometry": {"pyvista", "trimesh"},
+    "io": {"meshio", "pyyeti", "pyuff"},
     "view": {"pyvista", "matplotlib", "PIL"},
-    "study": {"dask"},
     "report": {"jinja2"},
     "cli": {"typer", "rich", "threadpoolctl"},
+    "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
 SOURCES = sorted(
     p
-    for p in (SRC / "chladni").rglob("*.py")
-    if p.parent != SRC / "chladni" or p.name != "__init__.py"
+    for name, root in PACKAGES.items()
+    for p in (root / name).rglob("*.py")
+    if p != root / "chladni" / "__init__.py"
 )
 
 
 def module(path):
     """("chladni", "dynamics", "frf") of .../chladni/dynamics/frf.py; a package by its folder."""
-    parts = path.relative_to(SRC).with_suffix("").parts
+    root = next(r for n, r in PACKAGES.items() if path.is_relative_to(r / n))
+    parts = path.relative_to(root).with_suffix("").parts
     return parts[:-1] if parts[-1] == "__init__" else parts
+
+
+def floor_of(name):
+    """The floor of a module: its room in chladni, or the package beside it."""
+    return name[0] if name[0] != "chladni" or len(name) == 1 else name[1]
 
 
 def package(path):
@@ -58,7 +78,7 @@ MODULES = {module(p) for p in SOURCES}
 
 
 def imports(path):
-    """(own modules, outside packages) imported anywhere in a file; own ones must be relative."""
+    """(own modules, outside packages) imported anywhere in a file; own ones stay relative."""
     own, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -66,6 +86,11 @@ def imports(path):
             base = here[: len(here) - node.level + 1] + tuple(
                 (node.module or "").split(".")
             ) * bool(node.module)
+            named = {(*base, alias.name) for alias in node.names}
+            own |= {name if name in MODULES else base for name in named}
+        elif isinstance(node, ast.ImportFrom) and node.module.split(".")[0] in PACKAGES:
+            base = tuple(node.module.split("."))
+            assert base[0] != module(path)[0], f"{path}:{node.lineno}: own modules are relative"
             named = {(*base, alias.name) for alias in node.names}
             own |= {name if name in MODULES else base for name in named}
         elif isinstance(node, ast.ImportFrom):
@@ -77,8 +102,8 @@ def imports(path):
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: "/".join(module(p)))
 def test_imports_point_down(path):
-    floor, (own, outside) = module(path)[1], imports(path)
-    assert {m[1] for m in own} <= MAY_IMPORT[floor] | {floor}
+    floor, (own, outside) = floor_of(module(path)), imports(path)
+    assert {floor_of(m) for m in own} <= MAY_IMPORT[floor] | {floor}
     assert outside <= EVERYWHERE | LIBRARIES.get(floor, set())
 
 
@@ -91,7 +116,7 @@ def test_no_cycles():
 
 
 def test_files_stay_readable():
-    long = {p.name: n for p in SOURCES if (n := len(p.read_text().splitlines())) > 400}
+    long = {str(p): n for p in SOURCES if (n := len(p.read_text().splitlines())) > 400}
     assert not long
 
 

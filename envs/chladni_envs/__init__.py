@@ -10,10 +10,10 @@
 from gymnasium.envs.registration import register, registry
 
 IDS = {
-    "chladni/SensorPlacement-v0": "chladni_envs.placement:SensorPlacementEnv",
-    "chladni/ActuatorPlacement-v0": "chladni_envs.actuators:ActuatorPlacementEnv",
-    "chladni/ParameterSelection-v0": "chladni_envs.selection:ParameterSelectionEnv",
-    "chladni/Calibration-v0": "chladni_envs.calibration:CalibrationEnv",
+    "chladni/SensorPlacement-v0": "chladni_envs.sensor_placement:SensorPlacementEnv",
+    "chladni/ActuatorPlacement-v0": "chladni_envs.actuator_placement:ActuatorPlacementEnv",
+    "chladni/ParameterSelection-v0": "chladni_envs.parameter_selection:ParameterSelectionEnv",
+    "chladni/Calibration-v0": "chladni_envs.calibration_env:CalibrationEnv",
 }
 for _id, _entry_point in IDS.items():
     if _id not in registry:

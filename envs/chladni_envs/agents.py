@@ -12,12 +12,12 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from chladni.ema import pretest
+from chladni import planning as pretest
 from chladni.errors import ShapeError
 
-from .actuators import ActuatorPlacementEnv
-from .calibration import STRIDE, CalibrationEnv
-from .placement import SensorPlacementEnv
+from .actuator_placement import ActuatorPlacementEnv
+from .calibration_env import STRIDE, CalibrationEnv
+from .sensor_placement import SensorPlacementEnv
 
 Agent = Callable[[np.ndarray, dict[str, Any]], Any]
 

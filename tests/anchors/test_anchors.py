@@ -18,16 +18,16 @@ from scipy.linalg import eigh
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
+from chladni.fem.deck_response import response
 from chladni.fem.energy import mass_properties
-from chladni.fem.respond import response
 from chladni.fem.rigid import dependencies
 from chladni.fem.solve import motion_at, subcase_statics
-from chladni.meshing.nastran.analysis import analysis
-from chladni.meshing.nastran.convert import assembly
-from chladni.meshing.nastran.deck import read_deck
+from chladni.io.nastran.read.analysis_requests import analysis
+from chladni.io.nastran.read.assembly_from_deck import assembly
+from chladni.io.nastran.text.deck import read_deck
 from chladni.model.assembly import Beams
-from chladni.model.plates import plate
 from chladni.model.properties import Isotropic, ShellSection
+from chladni_specimens.plates import plate
 
 FOLDER = Path(__file__).resolve().parents[2] / "../shared/anchors"
 LINES, SHELLS, RIGID = 1e-4, 1e-2, 1e-3

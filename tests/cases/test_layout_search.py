@@ -3,8 +3,8 @@
 import importlib.util
 from pathlib import Path
 
-from chladni.meshing.nastran import write_assembly
-from chladni.model.plates import folded_panel
+from chladni.io.nastran import write_assembly
+from chladni_specimens.plates import folded_panel
 
 SCRIPT = Path(__file__).with_name("layout_search.py")
 

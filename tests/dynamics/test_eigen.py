@@ -6,12 +6,12 @@ import scipy.sparse as sp
 
 from chladni.dynamics import eigen
 from chladni.dynamics.eigen import normal_modes
-from chladni.dynamics.lanczos import block_lanczos
 from chladni.dynamics.modes import rigid_modes
 from chladni.dynamics.system import System
 from chladni.errors import AccuracyError, ModelError
 from chladni.fem.assemble import structure
-from chladni.model.plates import box
+from chladni.sparse.lanczos import block_lanczos
+from chladni_specimens.plates import box
 
 from .conftest import line, line_frequency
 

@@ -9,16 +9,21 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects import catalogue, material, mesh, points, sensors, sheet, somewhere
+from chladni.effects import catalogue, points
+from chladni.effects import discretisation as mesh
+from chladni.effects import movable_attachment as somewhere
+from chladni.effects import orthotropic_material as material
+from chladni.effects import sensor_fault as sensors
+from chladni.effects import shell_groups as sheet
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import gain, ordinary, scatter
-from chladni.effects.thickness import thickness_distribution
+from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly
-from chladni.model.plates import plate
 from chladni.model.refine import refined
-from chladni.updating.reduced import Reduced, evaluate
-from chladni.updating.workbench import workbench
+from chladni.updating.reduced_model import Reduced, evaluate
+from chladni.updating.reduced_problem import workbench
+from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
 FLEXIBLE = slice(6, 12)

@@ -17,7 +17,7 @@ from chladni.ema.correlation import (
     subspace_mac,
     wrapped,
 )
-from chladni.ema.pairing import pair
+from chladni.ema.mode_pairing import pair
 from chladni.errors import LabelError, ShapeError
 
 seeds = st.integers(0, 10_000)

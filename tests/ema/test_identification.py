@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.ema import fitting
+from chladni.ema import pole_fitting as fitting
 from chladni.ema.identification import DERIVATIVES, Identified, equalised, evaluate, identify
 from chladni.errors import FileError
 

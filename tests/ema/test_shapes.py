@@ -11,8 +11,8 @@ from chladni.dynamics.frf import FRF
 from chladni.dynamics.modes import ModalModel
 from chladni.ema.correlation import mac
 from chladni.ema.identification import DERIVATIVES, Identified, evaluate, identify
+from chladni.ema.pole_selection import Sweep
 from chladni.ema.realisation import realised
-from chladni.ema.selection import Sweep
 from chladni.ema.shapes import collinearity, lines_per_bandwidth, modal_model, shapes
 from chladni.errors import LabelError
 

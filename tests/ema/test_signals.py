@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from chladni.ema.signals import blocks, estimated, spectra, window
-from chladni.ema.uff import read_uff
 from chladni.errors import LabelError, ShapeError
+from chladni.io.uff.read_uff import read_uff
 
 RATE = 1000.0
 B, A = [0.0, 0.2, 0.1], [1.0, -1.7, 0.95]  # a damped resonance

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import chladni_envs  # noqa: F401
-from chladni.ema.pretest import (
+from chladni.errors import LabelError, ShapeError
+from chladni.planning import (
     Rules,
     Walk,
     best_layout,
@@ -17,10 +18,9 @@ from chladni.ema.pretest import (
     too_near,
     value,
 )
-from chladni.errors import LabelError, ShapeError
 from chladni_envs import agents
-from chladni_envs.selection import drawn
-from chladni_envs.specimens import plate
+from chladni_envs.parameter_selection import drawn
+from chladni_envs.small_specimens import plate
 
 SENSORS = "chladni/SensorPlacement-v0"
 

@@ -10,15 +10,15 @@ import pytest
 
 from chladni.bench.article import Front, measured
 from chladni.cli.diagnose import opened
-from chladni.cli.question import question
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
-from chladni.model.plates import STEEL
 from chladni.model.refine import _edges
-from chladni.study import concealed
 from chladni.updating.diagnosis import diagnose
 from chladni.updating.outcome import effect_entry, judged, scores
-from chladni.updating.prepare import prepare
+from chladni.updating.preparation import prepare
+from chladni.workflows.question_of_case import question
+from chladni_evidence import concealed
+from chladni_specimens.plates import STEEL
 
 pytestmark = [
     pytest.mark.slow,

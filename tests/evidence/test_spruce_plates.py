@@ -7,10 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from chladni.cli.app import application
-from chladni.meshing.nastran import write_assembly
-from chladni.model.plates import plate
+from chladni.io.nastran import write_assembly
 from chladni.model.properties import Isotropic
 from chladni.units import units
+from chladni_specimens.plates import plate
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "spruce_plates"
 WITHIN = {"E1": 0.15, "G12": 0.15, "E2": 0.20}  # the reference's own uncertainty is 2 to 4 %

@@ -8,14 +8,14 @@ robust layout was made for.
 import numpy as np
 import pytest
 
-from chladni.ema import pretest
+from chladni import planning as pretest
 from chladni.fem.assemble import structure
 from chladni.fem.locate import locate, rows_at
-from chladni.model.tailgate import tailgate
-from chladni.model.tailgate_design import TailgateDesign
 from chladni.planning import Wishes, plan
-from chladni.planning.draws import drawn, ensemble
-from chladni.planning.plan import recovered, seen_at, target_modes
+from chladni.planning.drawn_models import drawn, ensemble
+from chladni.planning.whole_plan import recovered, seen_at, target_modes
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.tailgate import tailgate
 
 pytestmark = pytest.mark.slow
 

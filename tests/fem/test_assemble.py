@@ -11,10 +11,10 @@ from chladni.errors import LabelError, ModelError
 from chladni.fem import shell
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties, rigid_motions
-from chladni.fem.gather import blocks, congruence
 from chladni.fem.shell_section import section_arrays
+from chladni.fem.sparse_assembly import blocks, congruence
 from chladni.model.assembly import Bushes, Masses
-from chladni.model.plates import STEEL, box, folded_panel, plate
+from chladni_specimens.plates import STEEL, box, folded_panel, plate
 
 RNG = np.random.default_rng(11)
 

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import spsolve
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Beams
-from chladni.model.plates import grid, merged, plate, sheet
 from chladni.model.properties import BeamSection, Isotropic, Part
+from chladni_specimens.plates import grid, merged, plate, sheet
 
 FILE = Path(__file__).resolve().parents[2] / "../shared/anchors/benchmarks.json"
 NAFEMS = Isotropic(E=200e9, nu=0.3, rho=8000.0)

@@ -10,8 +10,8 @@ from chladni.errors import ModelError
 from chladni.fem import derivative
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Average, Bushes, Masses, Scalars, Solids
-from chladni.model.plates import folded_panel
 from chladni.model.properties import Isotropic, Orthotropic, Part, SolidSection
+from chladni_specimens.plates import folded_panel
 
 STEPS = np.array([2e-2, 1e-2, 5e-3])
 GLUE = Isotropic(2e9, 0.42, 1200.0)

@@ -8,7 +8,7 @@ import pytest
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties, part_energies, rigid_motions, shell_energies
-from chladni.model.plates import STEEL, box, folded_panel, plate
+from chladni_specimens.plates import STEEL, box, folded_panel, plate
 
 
 def test_mass_and_centre_of_a_plate():

@@ -5,12 +5,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.fem.energy import (
-    beam_energies,
-    part_energies,
-    part_kinetic_energies,
-    solid_energies,
-)
+from chladni.fem.energy import beam_energies, part_energies, part_kinetic_energies, solid_energies
 from chladni.model.assembly import Assembly, Beams, Masses, Solids
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 

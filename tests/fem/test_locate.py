@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from chladni.fem.assemble import structure
 from chladni.fem.locate import locate, rows_at
-from chladni.model.plates import plate
+from chladni_specimens.plates import plate
 
 ROTATION = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 PLATE = plate(0.4, 0.3, 8, 6, 1.5e-3)

@@ -12,7 +12,7 @@ from chladni.fem.assemble import structure
 from chladni.fem.derivative import by_part
 from chladni.fem.shell_drilling import corner_twist
 from chladni.fem.shell_section import section_arrays
-from chladni.model.plates import box, plate
+from chladni_specimens.plates import box, plate
 
 
 @SHAPES

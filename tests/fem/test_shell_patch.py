@@ -9,8 +9,8 @@ from scipy.sparse.linalg import spsolve
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem import shell
 from chladni.fem.assemble import structure
-from chladni.model.plates import grid, plate, sheet
 from chladni.model.properties import Isotropic, Orthotropic
+from chladni_specimens.plates import grid, plate, sheet
 
 E, NU, T = 1e6, 0.25, 0.001
 INNER = np.array([[0.04, 0.02], [0.18, 0.03], [0.16, 0.08], [0.08, 0.08]])

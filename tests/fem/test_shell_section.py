@@ -8,8 +8,8 @@ import pytest
 from chladni.errors import ModelError
 from chladni.fem import shell
 from chladni.fem.shell_section import modulus_derivative, section_arrays
-from chladni.model.plates import STEEL, folded_panel, sheet
 from chladni.model.properties import Anisotropic, Isotropic, Orthotropic, ShellSection, SolidSection
+from chladni_specimens.plates import STEEL, folded_panel, sheet
 
 PLY = Orthotropic(140e9, 9e9, 0.3, 5e9, 4e9, 3e9, 1600.0)
 RNG = np.random.default_rng(7)

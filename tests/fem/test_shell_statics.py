@@ -13,8 +13,8 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from chladni.fem.assemble import structure
-from chladni.model.plates import grid, merged, sheet
 from chladni.model.properties import Isotropic
+from chladni_specimens.plates import grid, merged, sheet
 
 FILE = Path(__file__).resolve().parents[2] / "../shared/anchors/benchmarks.json"
 ALL = (1, 2, 3, 4, 5, 6)

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.ema import pretest
-from chladni.ema.sensors import read_sensors
+from chladni import planning as pretest
 from chladni.errors import ModelError, ShapeError
 from chladni.fem.assemble import structure
+from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
-from chladni.model.plates import box, folded_panel, plate
 from chladni.planning import Wishes, find_places, plan, sensors_csv, summary
-from chladni.planning.places import spread
-from chladni.planning.plan import target_modes
+from chladni.planning.sensor_candidates import spread
+from chladni.planning.whole_plan import target_modes
+from chladni_specimens.plates import box, folded_panel, plate
 
 UP = np.array([0.0, 0.0, 1.0])
 

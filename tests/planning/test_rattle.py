@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from chladni.ema.pretest import rattle_margin
-from chladni.model.mesher import grid
-from chladni.model.mesher_sheets import MAIN, Sheet
 from chladni.model.properties import Isotropic, Part, ShellSection
-from chladni.model.tailgate import of_sheets
+from chladni.planning import rattle_margin
 from chladni.planning.rattle import first_rattle, openings
+from chladni_specimens.mesher.flat_regions import grid
+from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.tailgate.tailgate import of_sheets
 
 STEEL = Isotropic(210e9, 0.3, 7850.0)
 FREQUENCY, DAMPING = np.array([20.0, 50.0]), np.array([0.01, 0.02])

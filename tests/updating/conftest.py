@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chladni.effects.ordinary import ordinary
-from chladni.model.plates import plate
 from chladni.updating.likelihood import Responses
-from chladni.updating.reduced import evaluate
-from chladni.updating.workbench import workbench
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import workbench
+from chladni_specimens.plates import plate
 
 TOP = 200.0
 

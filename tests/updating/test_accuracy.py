@@ -7,12 +7,12 @@ from numpy.testing import assert_allclose
 
 from chladni.effects import catalogue
 from chladni.effects.ordinary import ordinary
-from chladni.effects.thickness import thickness_distribution
+from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
-from chladni.model.plates import folded_panel
 from chladni.updating.accuracy import accuracy, products
-from chladni.updating.reduced import evaluate
-from chladni.updating.workbench import workbench
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import workbench
+from chladni_specimens.plates import folded_panel
 
 TOP = 300.0
 NAMES = ("thickness", "thinner", "stiffer", "thinning", "mass", "masses", "spring")

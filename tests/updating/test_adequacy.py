@@ -9,9 +9,9 @@ from scipy.stats import kstest
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, ranked
-from chladni.updating.calibration import Weighing, beside
-from chladni.updating.reduced import evaluate
-from chladni.updating.search import Trial, fitted
+from chladni.updating.hypothesis_fit import Trial, fitted
+from chladni.updating.map_fit import Weighing, beside
+from chladni.updating.reduced_model import evaluate
 
 SCALES = Weighing(1.413, 1.4e-3)
 

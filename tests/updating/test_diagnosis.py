@@ -7,9 +7,9 @@ import pytest
 
 from chladni.errors import ModelError
 from chladni.updating import diagnosis
-from chladni.updating.calibration import Status
 from chladni.updating.diagnosis import BEHIND, Trial, _finished, _tried
 from chladni.updating.likelihood import Responses
+from chladni.updating.map_fit import Status
 
 NULL = SimpleNamespace(S=100.0, fit=SimpleNamespace(x=np.ones(2)))
 

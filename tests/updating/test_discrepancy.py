@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.ordinary import ordinary
 from chladni.updating import discrepancy as dis
-from chladni.updating.calibration import Weighing, beside, fit
 from chladni.updating.discrepancy import columns, discrepancy, form, learned
-from chladni.updating.reduced import evaluate
-from chladni.updating.search import fitted
+from chladni.updating.hypothesis_fit import fitted
+from chladni.updating.map_fit import Weighing, beside, fit
+from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")

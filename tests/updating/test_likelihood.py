@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.catalogue import Setup, extra_support, point_mass
 from chladni.effects.ordinary import gain, ordinary
-from chladni.effects.sensors import sensor_fault
+from chladni.effects.sensor_fault import sensor_fault
 from chladni.updating.likelihood import Poles
-from chladni.updating.reduced import evaluate
+from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from chladni.effects.effect import Parameter
 from chladni.effects.ordinary import ordinary
 from chladni.effects.points import AtPoints
-from chladni.updating.calibration import Weighing
-from chladni.updating.reduced import evaluate
+from chladni.updating.map_fit import Weighing
+from chladni.updating.reduced_model import evaluate
 from chladni.updating.scan import baseline, direction_scores, point_scores, thickness_slopes
 
 WEIGHED = Weighing(1.45, 0.01)

@@ -8,13 +8,13 @@ import pytest
 
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary, scatter
-from chladni.effects.thickness import thickness_distribution
+from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.updating import outcome
-from chladni.updating.calibration import fit
 from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.hypothesis_fit import Trial, as_written
+from chladni.updating.map_fit import fit
 from chladni.updating.outcome import Scores
-from chladni.updating.reduced import evaluate
-from chladni.updating.search import Trial, as_written
+from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")

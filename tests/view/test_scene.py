@@ -6,11 +6,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.model.plates import folded_panel
 from chladni.view import paper, probe, scene
 from chladni.view.camera import best_view
 from chladni.view.canvas import Paint, draw
 from chladni.view.surface import Surface, surface
+from chladni_specimens.plates import folded_panel
 
 SEEN = surface(folded_panel(h=0.03))
 SHAPE = np.zeros_like(SEEN.points)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.model.test_calculix import WELDS, coupon
+from tests.specimens.test_calculix import WELDS, coupon
 
 from chladni.errors import ShapeError
 from chladni.model.assembly import Assembly, Solids
-from chladni.model.connections import spot_welds
-from chladni.model.plates import box, folded_panel, plate
 from chladni.view.camera import best_view, needed_views, visible
 from chladni.view.surface import Surface, skin, surface
+from chladni_specimens.joints.builders import spot_welds
+from chladni_specimens.plates import box, folded_panel, plate
 
 
 def block(n):

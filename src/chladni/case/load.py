@@ -13,15 +13,15 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
-from ..ema.keys import KeyFile, Section, read_keys
-from ..ema.sensors import read_sensors
 from ..ema.setup import Recording, TestSetup
-from ..ema.tables import read_recordings
 from ..errors import FileError, LabelError
-from ..meshing.nastran import Deck, assembly, read_deck
+from ..io.nastran import Deck, assembly, read_deck
+from ..io.tables.read_tables import read_recordings
+from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import UNITS, Units
-from .places import Places, grid_row, places
+from .sensor_places import Places, grid_row, places
+from .toml_sections import KeyFile, Section, read_keys
 
 FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
 EFFECTS = (

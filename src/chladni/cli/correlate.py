@@ -13,18 +13,18 @@ from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
 from ..ema.identification import Identified, identify
-from ..ema.pairing import Pairs, pair
+from ..ema.mode_pairing import Pairs, pair
 from ..errors import ChladniError, FileError
 from ..report.blocks import Block, Facts, Picture, Table
 from ..report.words import number, percent
-from .case_model import DAMPING, markers, model_frf, rows
+from ..workflows.case_model import DAMPING, markers, model_frf, rows
+from ..workflows.loaded_model import Model, is_case
 from .frf import REACH
 from .identify import firm
-from .model import Model, is_case
 from .run import Out, Run, started
 
 if TYPE_CHECKING:
-    from .figures import Shown
+    from ..report.figures import Shown
 
 _BANDS = 6
 
@@ -177,7 +177,7 @@ def summary(case: Case, found: Correlation) -> dict[str, Any]:
 
 
 def _page(job: Run, case: Case, model: Model, found: Correlation, d: dict[str, Any]) -> None:
-    from .figures import figures
+    from ..report.figures import figures
 
     off = [abs(m["deviation"]) for m in d["modes"]]
     mean = f"{number(100 * float(np.mean(off)), 2)} %" if off else "–"
@@ -195,7 +195,7 @@ def _page(job: Run, case: Case, model: Model, found: Correlation, d: dict[str, A
 
 
 def _shown(case: Case, model: Model, found: Correlation) -> "Shown":
-    from .figures import Shown
+    from ..report.figures import Shown
 
     curves, mac_of = {}, None
     if found.model is not None:

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from ..meshing.files import mesh_path
+from ..io.package_files import mesh_path
 from .diagnose import answer, opened
 from .run import Out, started
 

@@ -8,27 +8,27 @@ import typer
 from threadpoolctl import threadpool_limits
 
 from ..case import Case, load_case
-from ..case.repair import changes
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
-from ..meshing.nastran import assembly, read_deck, write_deck
+from ..io.nastran import assembly, read_deck, write_deck
+from ..io.nastran.edit.model_changes import changes
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..report.page import write_page
 from ..updating.diagnosis import Diagnosis, diagnose
 from ..updating.likelihood import Responses
 from ..updating.outcome import Models, as_dict, judged, models, rms
-from ..updating.prepare import prepare
+from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from .case_model import DAMPING, markers
+from ..workflows.case_model import DAMPING, markers
+from ..workflows.loaded_model import Model, is_case
+from ..workflows.question_of_case import question
 from .frf import modelled
-from .model import Model, is_case
-from .question import question
 from .run import Out, Run, command_line, started
 
 if TYPE_CHECKING:
-    from .figures import Shown
+    from ..report.figures import Shown
 
 
 def run(
@@ -94,7 +94,7 @@ def page(
     d: dict[str, Any], progress: Progress,
 ) -> None:  # fmt: skip
     """Pictures and report.html."""
-    from .figures import figures
+    from ..report.figures import figures
 
     progress("pictures", 0.0)
     drawn = figures(job.folder, d, shown(case, prepared, stages))
@@ -107,7 +107,7 @@ def page(
 
 def shown(case: Case, prepared: Prepared, stages: Models) -> "Shown":
     """What the pictures need: the mesh, the sensors, test and model responses."""
-    from .figures import Shown
+    from ..report.figures import Shown
 
     model = Model(case.path, case.assembly)
     curves: dict[str, FRF] = {}

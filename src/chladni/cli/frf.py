@@ -13,19 +13,18 @@ import typer
 from ..case import Case, load_case
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, Quantity, residual_flexibility
+from ..dynamics.frf import FRF, UNIT, Quantity, residual_flexibility
 from ..dynamics.modes import ModalModel
-from ..ema.tables_write import write_npz
 from ..errors import FileError, LabelError
+from ..io.tables.write_tables import write_npz
 from ..model.analysis import Analysis, Subcase
 from ..model.assembly import Assembly
 from ..report.blocks import Picture, Table
 from ..report.words import number
-from .case_model import model_frf
-from .model import DeckModels, Model, is_case, load_deck, load_model
+from ..workflows.case_model import model_frf
+from ..workflows.loaded_model import DeckModels, Model, is_case, load_deck, load_model
 from .run import Allow, Out, Run, Units, started
 
-UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
 _MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
 REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
 _SHOWN, _MOST = 12, 1200  # pictures; dofs a deck may ask for at once
@@ -219,7 +218,7 @@ def _columns(
     job: Run, models: DeckModels, cases: Sequence[Subcase], labels: Sequence[str]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """(frequencies, displacements) of every subcase, each under its own supports."""
-    from ..fem.respond import response as answer
+    from ..fem.deck_response import response as answer
 
     ends = [parse(text) for text in labels]
     dofs, signs = np.array([(point, c) for point, c, _ in ends]), [sign for *_, sign in ends]

@@ -6,16 +6,16 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ..dynamics.frf import FRF
+from ..dynamics.frf import FRF, UNIT
 from ..ema.identification import Identified, evaluate, identify
 from ..ema.setup import Poles, Recording
-from ..ema.tables_write import write_poles
 from ..errors import AccuracyError, FileError
+from ..io.tables.write_tables import write_poles
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
-from .frf import UNIT, limits
-from .model import is_case
-from .recordings import load_recordings
+from ..workflows.loaded_model import is_case
+from ..workflows.recordings_of import load_recordings
+from .frf import limits
 from .run import Out, Run, started
 
 _SHOWN = 6  # channels drawn

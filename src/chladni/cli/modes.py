@@ -9,7 +9,7 @@ import typer
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..report.blocks import Facts, Picture, Table
 from ..report.words import number
-from .model import Model, load_model
+from ..workflows.loaded_model import Model, load_model
 from .run import Allow, Out, Run, Units, started
 
 
@@ -75,7 +75,7 @@ def summary(model: Model, modal: ModalModel) -> dict[str, Any]:
 
 
 def _pictures(job: Run, model: Model, modal: ModalModel) -> None:
-    from ..meshing.vtu import write_vtu
+    from ..io.vtu import write_vtu
     from ..view.scene import montage
 
     motion = model.motion(modal.shapes)

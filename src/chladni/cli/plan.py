@@ -8,7 +8,7 @@ import typer
 from ..output import write_text
 from ..planning import Wishes, plan, sensors_csv, summary
 from ..progress import within
-from .model import load_model
+from ..workflows.loaded_model import load_model
 from .run import Out, Units, started
 
 
@@ -52,7 +52,7 @@ def run(
         mass=mass,
         draws=drawn,
     )
-    from ..planning.page import PICTURES, lead, notes, sections
+    from ..report.plan_page import PICTURES, lead, notes, sections
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)

@@ -10,10 +10,10 @@ import typer
 
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import FileError
-from ..meshing.clearance import Gaps, PairClearance, all_gaps, nearest, summary
+from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
-from .model import Model, load_model, on_faces
+from ..workflows.loaded_model import Model, load_model, on_faces
 from .run import Out, Run, Units, started
 
 

@@ -11,23 +11,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chladni_specimens.plates import box, folded_panel, plate
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.formed_thickness import forming_mesh
+from chladni_specimens.tailgate.skin import Skin
+from chladni_specimens.tailgate.tailgate import Specimen, tailgate_specimen
+
 from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
-from ..meshing.thickness import Mapped
+from ..geometry.thickness_mapping import Mapped
 from ..model.assembly import Assembly
-from ..model.hood import HoodDesign, hood_specimen
-from ..model.hood_formed import hood_forming_mesh
-from ..model.mesher_formed import FormedMesh
-from ..model.plates import box, folded_panel, plate
-from ..model.tailgate import Specimen, tailgate_specimen
-from ..model.tailgate_design import TailgateDesign
-from ..model.tailgate_formed import forming_mesh
-from ..model.tailgate_shape import Skin
+from ..model.formed_mesh import FormedMesh
 from ..output import write_text
 from ..report.blocks import Facts, Picture
 from ..report.words import number
 from ..units import units as unit_system
-from .model import on_faces
+from ..workflows.loaded_model import on_faces
 from .run import Out, Run, started
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    name: Annotated[str, typer.Argument(help="tailgate, hood, panel, box or plate.")],
+    name: Annotated[str, typer.Argument(help="tailgate, panel, box or plate.")],
     size: Annotated[float | None, typer.Option(help="Element size [mm].", min=0.1)] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE in SI (repeatable).")
@@ -44,9 +43,9 @@ def run(
     out: Out = None,
 ) -> None:
     """A generated structure: its deck, formed thickness (LS-DYNA), candidates for sensors."""
-    from ..meshing.dyna import write_keyword
-    from ..meshing.nastran import write_assembly
-    from ..meshing.thickness import map_thickness
+    from ..geometry.thickness_mapping import map_thickness
+    from ..io.dyna import write_keyword
+    from ..io.nastran import write_assembly
 
     system = unit_system(units)
     build = _builder(name)
@@ -68,7 +67,7 @@ def run(
 
 
 def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
-    from ..meshing.quality import check_mesh
+    from ..geometry.mesh_quality import check_mesh
     from ..planning import find_places
     from ..view import scene
     from ..view.surface import surface
@@ -125,7 +124,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _builder(name: str) -> Callable[[float | None, dict[str, Any]], Specimen]:
-    known = {"tailgate": _tailgate, "hood": _hood, "panel": _panel, "box": _box, "plate": _plate}
+    known = {"tailgate": _tailgate, "panel": _panel, "box": _box, "plate": _plate}
     if name not in known:
         raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
     return known[name]
@@ -135,13 +134,8 @@ def _tailgate(size: float | None, values: dict[str, Any]) -> Specimen:
     return tailgate_specimen(_made(TailgateDesign, _sized("size", size, values)))
 
 
-def _hood(size: float | None, values: dict[str, Any]) -> Specimen:
-    return hood_specimen(_made(HoodDesign, _sized("size", size, values)))
-
-
 _FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
     "tailgate": lambda values: forming_mesh(Skin.of(_made(TailgateDesign, values))),
-    "hood": lambda values: hood_forming_mesh(_made(HoodDesign, values)),
 }
 
 

@@ -21,8 +21,8 @@ def run(
     out: Out = None,
 ) -> None:
     """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
-    from ..study.concealed import EFFECTS, SPECIMENS
-    from ..study.score import confusion, summary
+    from chladni_evidence.concealed import EFFECTS, SPECIMENS
+    from chladni_evidence.score import confusion, summary
 
     first, _, last = seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal()):
@@ -67,12 +67,13 @@ def one(job: tuple[str, str, int, Path]) -> dict[str, Any]:
 
 
 def _one(name: str, effect: str, seed: int, place: Path) -> dict[str, Any]:
-    from ..study.concealed import SPECIMENS, made, write
-    from ..study.score import scored
+    from chladni_evidence.concealed import SPECIMENS, made, write
+    from chladni_evidence.score import scored
+
     from ..updating.diagnosis import diagnose
     from ..updating.outcome import effect_entry, judged, scores
-    from ..updating.prepare import prepare
-    from .question import question
+    from ..updating.preparation import prepare
+    from ..workflows.question_of_case import question
 
     folder = place / "cases" / f"{name}-{EFFECT_CODE.get(effect, effect)}-{seed}"
     seal = place / "sealed" / f"{folder.name}.json"

@@ -8,11 +8,11 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
-from .dissection import Fronts, analyse, pattern
-from .factor import Backend, Factor, factorise, inertia
-from .lanczos import Ritz, block_lanczos
+from ..sparse.dissection import Fronts, analyse, pattern
+from ..sparse.factor import Backend, Factor, factorise, inertia
+from ..sparse.lanczos import Ritz, block_lanczos
+from ..sparse.multifrontal import NotDefinite
 from .modes import ModalModel
-from .multifrontal import NotDefinite
 from .system import System
 
 _DENSE = 300  # dofs; below, LAPACK is as fast

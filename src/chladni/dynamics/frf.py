@@ -10,12 +10,13 @@ from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
 from ..errors import LabelError, ShapeError
-from .dissection import analyse, pattern
-from .factor import factorise
+from ..sparse.dissection import analyse, pattern
+from ..sparse.factor import factorise
 from .modes import ModalModel
 from .system import System
 
 Quantity = Literal["receptance", "mobility", "accelerance", "transmissibility"]
+UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from .factor import Factor, factorise
+from ..sparse.factor import Factor, factorise
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis

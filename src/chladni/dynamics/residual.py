@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from .factor import factorise
+from ..sparse.factor import factorise
 from .modes import ModalModel
 from .system import System
 

@@ -10,10 +10,10 @@ import scipy.sparse as sp
 from ..model.properties import Isotropic, Part, ShellSection
 from . import points
 from .effect import Effect
-from .material import orthotropic
+from .movable_attachment import NEIGHBOURS, ExtraSupport, Patch, PointMass, moved
 from .ordinary import PartScale, ordinary
-from .sheet import Sheet
-from .somewhere import NEIGHBOURS, ExtraSupport, Patch, PointMass, moved
+from .orthotropic_material import orthotropic
+from .shell_groups import Sheet
 
 NAMES = (
     "orthotropic-material",

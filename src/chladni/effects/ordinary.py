@@ -11,7 +11,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from .effect import ChannelChange, Effect, FieldChange, Parameter
-from .sheet import Sheet
+from .shell_groups import Sheet
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05}  # prior sd of ln(value / deck's value)
 

@@ -10,8 +10,18 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
-from .fitting import Data, Fit, Slope, polish
-from .selection import ORDERS, Rule, Sweep, extended, settled, start, swept, uncertainty, untwinned
+from .pole_fitting import Data, Fit, Slope, polish
+from .pole_selection import (
+    ORDERS,
+    Rule,
+    Sweep,
+    extended,
+    settled,
+    start,
+    swept,
+    uncertainty,
+    untwinned,
+)
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 

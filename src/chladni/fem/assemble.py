@@ -15,8 +15,8 @@ from ..dynamics.system import System
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from . import shell
-from .gather import EVERY, INERTIA, accumulate, blocks, congruence, with_rotations
 from .shell_section import SectionArrays, section_arrays
+from .sparse_assembly import EVERY, INERTIA, accumulate, blocks, congruence, with_rotations
 
 EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSPC
 PIECE = 1024  # shells whose matrices are in memory at a time

@@ -18,8 +18,8 @@ from . import shell, solid, spring
 from .assemble import Structure, _families
 from .average import average_derivative, average_weights, lever
 from .energy import only
-from .gather import blocks, congruence, with_rotations
 from .shell_section import modulus_derivative, section_arrays
+from .sparse_assembly import blocks, congruence, with_rotations
 
 SHELL = ("t", "E", "nu", "rho", "E1", "E2", "G12", "nu12")
 SOLID = ("E", "nu", "rho")

@@ -11,12 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dofs import COMPONENTS, rows
-from ..dynamics.factor import factorise
 from ..dynamics.frf import FRF, Residual, transfer
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError, ModelError
 from ..model.analysis import Analysis, Subcase
 from ..model.assembly import Assembly
+from ..sparse.factor import factorise
 from .assemble import Structure, _families, structure
 from .energy import rigid_motions
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .follow import Following
+from .following_frequencies import Following
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..meshing.clearance import Gaps, all_gaps
+from ..geometry.clearance import Gaps, all_gaps
 from ..model.assembly import Assembly
 
 WITHIN = 0.010  # sheets farther apart than this do not meet [m]
@@ -83,7 +83,7 @@ def first_rattle(
 ) -> Rattle:
     """F = min c 2ζω² / |φ_ir ψ_gr| over gaps g and modes r, for each candidate i.
 
-    Its value is :func:`chladni.ema.pretest.rattle_margin` at one newton; here with the culprit.
+    Its value is :func:`chladni.planning.rattle_margin` at one newton; here with the culprit.
 
     Parameters
     ----------

@@ -17,8 +17,8 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect
-from .reduced import Reduced, State, evaluate, log_fields, slices
-from .workbench import Workbench
+from .reduced_model import Reduced, State, evaluate, log_fields, slices
+from .reduced_problem import Workbench
 
 LIMIT = 5e-4  # relative frequency error of a basis that still serves
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid

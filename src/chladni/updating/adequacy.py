@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .calibration import Weighing, beside, unknowns
 from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
+from .hypothesis_fit import Trial
 from .likelihood import Responses
-from .search import Trial
+from .map_fit import Weighing, beside, unknowns
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300

@@ -7,13 +7,13 @@ from scipy.stats import norm, qmc
 
 from ..effects import catalogue
 from ..effects.effect import Effect
-from ..effects.sensors import sensor_fault
-from ..effects.thickness import thickness_distribution
+from ..effects.sensor_fault import sensor_fault
+from ..effects.thickness_distribution import thickness_distribution
 from ..errors import ModelError
+from .hypothesis_fit import Search, Trial
 from .likelihood import LN10, Poles, Responses
-from .reduced import evaluate
+from .reduced_model import evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
-from .search import Search, Trial
 
 NEAR = 60  # grids tried round each of the best places
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared

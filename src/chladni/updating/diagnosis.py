@@ -15,15 +15,15 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.effect import Effect
-from ..effects.somewhere import Somewhere
+from ..effects.movable_attachment import Somewhere
 from ..errors import ModelError
 from .adequacy import Adequacy, adequacy
-from .calibration import Status
 from .candidates import candidates, point_effect
 from .discrepancy import MEDIAN
+from .hypothesis_fit import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
 from .likelihood import Data, Poles, Responses
-from .reduced import evaluate
-from .search import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
+from .map_fit import Status
+from .reduced_model import evaluate
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing
 THRESHOLD_POLES = 25.0  # gain in -2 ln evidence below which poles name nothing

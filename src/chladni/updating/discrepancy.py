@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 import scipy.linalg as sl
 
-from .reduced import Reduced, State
+from .reduced_model import Reduced, State
 
 if TYPE_CHECKING:
     from .likelihood import Responses

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..ema.correlation import wrapped
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
-from .pairing import paired, price_alone, price_missed
-from .reduced import Reduced, State
+from .pole_assignment import paired, price_alone, price_missed
+from .reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
 POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}

@@ -9,15 +9,15 @@ import numpy as np
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..ema.correlation import mac
-from ..ema.pairing import pair
+from ..ema.mode_pairing import pair
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from .diagnosis import Diagnosis, tested, threshold, verdict
+from .hypothesis_fit import Search, Trial, as_written
 from .likelihood import Poles, Responses
 from .question import Prepared, Question
-from .reduced import State, evaluate
-from .search import Search, Trial, as_written
+from .reduced_model import State, evaluate
 
 FIRST = 8  # paired frequencies over which the rms is reported
 

@@ -10,9 +10,9 @@ from ..ema.identification import Identified
 from ..fem.assemble import Structure
 from ..fem.locate import rows_of
 from ..model.assembly import Assembly
-from .calibration import Weighing
+from .hypothesis_fit import Search
 from .likelihood import Poles, Responses
-from .search import Search
+from .map_fit import Weighing
 
 
 @dataclass(frozen=True, eq=False)

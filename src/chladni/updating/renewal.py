@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import scipy.sparse as sp
 
-from ..effects.material import OrthotropicMaterial
+from ..effects.orthotropic_material import OrthotropicMaterial
 from ..fem.assemble import structure
 from .accuracy import LIMIT, Accuracy, accuracy
+from .hypothesis_fit import Search, Trial, fitted
 from .likelihood import Responses
-from .prepare import nuisances, searched
+from .preparation import nuisances, searched
 from .question import Prepared, Question
-from .search import Search, Trial, fitted
-from .workbench import workbench
+from .reduced_problem import workbench
 
 
 def renewed(question: Question, prepared: Prepared, trial: Trial) -> tuple[Trial, str]:

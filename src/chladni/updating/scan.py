@@ -13,9 +13,9 @@ import numpy as np
 
 from ..effects.catalogue import Places
 from ..effects.effect import Effect, FieldChange, Parameter
-from .calibration import Weighing, unknowns
 from .likelihood import LN10, POWER, Data, Responses
-from .reduced import Reduced, State, evaluate
+from .map_fit import Weighing, unknowns
+from .reduced_model import Reduced, State, evaluate
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,119 @@
+"""A case folder or deck as the problem of an environment."""
+
+from pathlib import Path
+
+import numpy as np
+
+from chladni.case import load_case
+from chladni.effects.effect import Effect, Parameter
+from chladni.errors import FileError
+from chladni.planning import Linearised, Wishes, find_places
+from chladni.planning.rattle import openings
+from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
+from chladni.updating.likelihood import Responses
+from chladni.updating.preparation import prepare
+from chladni.updating.question import Prepared
+from chladni.updating.reduced_model import State, evaluate
+from chladni.workflows.loaded_model import load_model
+from chladni.workflows.question_of_case import question
+
+from .calibration_questions import Question as Calibration
+from .small_specimens import Specimen
+
+REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
+
+
+def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None = None) -> Specimen:
+    """Flat, reachable places found on the mesh and the first flexible modes along their normals.
+
+    With them goes what decides where to shake: a straight way to the place, and the clearances of
+    the mesh (:mod:`chladni.planning.rattle`).
+
+    Parameters
+    ----------
+    case : folder with a case.toml, that file, or a bare deck
+    modes : int          target modes, fewer if the model has fewer
+    candidates : int     places at most
+    units : str          unit system of a bare deck
+    """
+    model = load_model(Path(case), units)
+    places = find_places(model.assembly, candidates, unit=model.unit)
+    target, _, _ = target_modes(model.structure, Wishes(modes=modes))
+    mounts, moving = mounts_at(places), motion(model.structure, target)
+    labels, seen = mounts.labels[: len(places)], model.seen
+    gaps = openings(model.assembly, moving)
+    return Specimen(
+        places.points,
+        seen_at(places, mounts, moving)[: len(places)],
+        target.frequency,
+        target.damping,
+        labels,
+        outline=seen.points[seen.outline()],
+        access=places.straight,
+        gap_shapes=gaps.motion,
+        clearance=gaps.clearance,
+    )
+
+
+class Recorded:
+    """A case with FRFs, made ready for updating: residuals over x/sd of its ordinary effects.
+
+    Attributes
+    ----------
+    names : tuple of str      parameters, as "E of inner"
+    effects : tuple of Effect
+    score : Responses         what is compared, damping equalised
+    """
+
+    def __init__(self, case: str) -> None:
+        self.prepared = _prepared(case)
+        search = self.prepared.search
+        score = self.prepared.score
+        if not isinstance(score, Responses):
+            raise FileError(f"{case}: these environments compare FRFs; the case has none that can")
+        self.score = score
+        self.effects: tuple[Effect, ...] = tuple(
+            e for e in search.base if not any(e is n for n in search.nuisance)
+        )
+        pairs = [(e, p) for e in self.effects for p in e.parameters]
+        self.names = tuple(_name(e, p) for e, p in pairs)
+        self.mean = np.array([p.mean for _, p in pairs])
+        self.sd = np.array([p.sd for _, p in pairs])
+
+    def state(self, theta: np.ndarray, gradient: bool = False) -> State:
+        """The reduced model at x = mean + sd θ."""
+        model = self.prepared.search.bench.model
+        return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
+
+    def linearised(self) -> Linearised:
+        """Fitted and held-out residuals and their slopes at the prior mean."""
+        state = self.state(np.zeros(len(self.sd)), True)
+        r, J = self.score.residual(state, True)
+        h, H = self.score.only(self.prepared.held).residual(state, True)
+        return Linearised(r, J * self.sd, h, H * self.sd)
+
+    def calibration(self) -> Calibration:
+        """The fitted lines and channels; bounds at two prior standard deviations."""
+        lines = np.flatnonzero(self.score.use.any(axis=1))
+        outputs = np.flatnonzero(self.score.use.any(axis=0))
+
+        def fitted(values: np.ndarray) -> np.ndarray:
+            return np.asarray(values[np.ix_(lines, outputs)].reshape(len(lines), -1))
+
+        def predict(x: np.ndarray) -> np.ndarray:
+            return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))
+
+        frequency = self.score.s.imag[lines] / (2 * np.pi)
+        return Calibration(self.names, frequency, predict, fitted(self.score.values))
+
+
+def _name(effect: Effect, parameter: Parameter) -> str:
+    return f"{parameter.name}, {effect.text}" if effect.text else parameter.name
+
+
+def _prepared(path: str) -> Prepared:
+    """The case's first FRF, made ready for updating."""
+    case = load_case(path)
+    if not case.frfs:
+        raise FileError(f"{case.path}: no recording holds an FRF")
+    return prepare(question(case))

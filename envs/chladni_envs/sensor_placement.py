@@ -1,0 +1,139 @@
+"""Sensor placement: candidates are deleted, or sensors added, one a step."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+
+from chladni.errors import LabelError
+from chladni.planning import Candidates, Rules, Walk, candidates
+
+from . import drawing
+from .small_specimens import Specimen, plate
+
+Reset = tuple[np.ndarray, dict[str, Any]]
+Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
+
+
+def of_case(case: str, modes: int) -> Specimen:
+    """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
+    from .environment_cases import specimen  # loads the finite element part of the package only now
+
+    return specimen(case, modes)
+
+
+class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
+    """Reach a layout of ``n_sensors`` that tells the modes (or parameters) apart.
+
+    Observation
+        (n,) in [0, 1]: with moves = "delete" the effective independence of the candidates left,
+        with "add" the growth of log det F that each other would bring, over 30; 0 elsewhere.
+    Action
+        Position of the candidate to delete (or to add). ``action_masks()`` and
+        ``info["action_mask"]`` say which are legal: rules are obeyed, no mode is lost. An illegal
+        action changes nothing.
+    Reward
+        Change of log det F. The rewards of an episode add up to the score ``info["score"]``: log
+        det of the layout less that of the start (all candidates, or the faint prior). Layouts
+        compare by ``info["log_det"]``.
+    End
+        Terminated with ``n_sensors`` kept (or nothing legal left); truncated after four times as
+        many steps as are needed.
+
+    Parameters
+    ----------
+    phi : (n, p), (n_draws, n, p), (n_draws, n, k, p) or Candidates
+        Target shapes, see :func:`chladni.planning.candidates`; a plate by default.
+    n_sensors : int               by default five for four modes
+    moves : "delete" or "add"
+    points : (n, 2) or (n, 3)     places [m], for pictures
+    noise, prior, rules : as in :func:`chladni.planning.effective_independence`
+    unusable : float              share of candidates that, drawn anew at each reset, turn out
+                                  not to be usable
+    case : folder or deck         whose mesh gives candidates and modes (phi is then None)
+    modes : int                   number of target modes of a case
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(
+        self,
+        phi: np.ndarray | Candidates | None = None,
+        n_sensors: int | None = None,
+        *,
+        moves: Literal["delete", "add"] = "delete",
+        points: np.ndarray | None = None,
+        noise: np.ndarray | None = None,
+        prior: np.ndarray | None = None,
+        rules: Rules | None = None,
+        unusable: float = 0.0,
+        case: str | None = None,
+        modes: int = 24,
+        render_mode: str | None = None,
+    ) -> None:
+        self.outline: np.ndarray | None = None
+        if phi is None:
+            specimen = plate() if case is None else of_case(case, modes)
+            phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
+        self.candidates = candidates(phi, noise, prior)
+        n = len(self.candidates)
+        usual = min(n, -(-5 * self.candidates.unknowns // 4))
+        self.n_sensors = usual if n_sensors is None else n_sensors
+        if moves not in ("delete", "add"):
+            raise LabelError(f"moves {moves!r}; there are delete and add")
+        self.grow, self.rules, self.unusable = moves == "add", rules or Rules(), unusable
+        self.points, self.render_mode = points, render_mode
+        self.walk = self._walk(np.zeros(n, bool))  # refuses an impossible request at once
+        self.action_space = gym.spaces.Discrete(n)
+        self.observation_space = gym.spaces.Box(0.0, 1.0, (n,), dtype=np.float64)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Reset:
+        """Start from all candidates, or from none."""
+        super().reset(seed=seed)
+        n = len(self.candidates)
+        broken = np.zeros(n, bool)
+        if self.unusable:
+            broken[self.np_random.permutation(n)[: int(self.unusable * n)]] = True
+            broken &= ~self.rules.masks(n)[0]
+        self.walk = self._walk(broken)
+        self.start, self.steps = self.walk.log_det, 0
+        self.needed = abs(int(self.walk.kept.sum()) - self.n_sensors)
+        return self.walk.worth.copy(), self._info()
+
+    def step(self, action: np.int64) -> Step:
+        """Delete, or add, one candidate."""
+        self.steps += 1
+        legal = bool(self.mask[action])
+        reward = self.walk.move(int(action)) if legal else 0.0
+        info = self._info()
+        terminated = self.walk.done() or not self.mask.any()
+        truncated = not terminated and self.steps >= 4 * self.needed
+        return self.walk.worth.copy(), float(reward), bool(terminated), bool(truncated), info
+
+    def action_masks(self) -> np.ndarray:
+        """Legal actions (n,) bool."""
+        return self.mask.copy()
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """The layout as a picture (height, width, 3) uint8."""
+        if self.render_mode != "rgb_array":
+            return None
+        xy, lines = drawing.places(len(self.candidates), self.points, self.outline)
+        title = f"{int(self.walk.kept.sum())} sensors, log det {self.walk.log_det:.2f}"
+        return drawing.layout(xy, self.walk.kept, self.mask, title, lines)
+
+    def _walk(self, broken: np.ndarray) -> Walk:
+        rules = self.rules
+        if broken.any():
+            rules = replace(rules, forbidden=rules.masks(len(broken))[1] | broken)
+        return Walk(self.candidates, self.n_sensors, rules, self.grow)
+
+    def _info(self) -> dict[str, Any]:
+        self.mask = np.zeros(len(self.candidates), bool) if self.walk.done() else self.walk.may()
+        return {
+            "action_mask": self.mask.astype(np.int8),
+            "log_det": float(self.walk.log_det),
+            "score": float(self.walk.log_det - self.start),
+            "kept": self.walk.kept.copy(),
+        }

@@ -1,0 +1,128 @@
+"""The sheet's material: a grain, a rolling direction."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+
+from ..model.assembly import Assembly
+from ..model.properties import Isotropic, Orthotropic, ShellSection
+from .effect import WIDER, Effect, FieldChange, Parameter
+from .shell_groups import Sheet
+
+
+@dataclass(frozen=True, eq=False)
+class OrthotropicMaterial(Effect):
+    """E1, E2, G12 and nu12 in place of one isotropic E and nu.
+
+    x = ln(E1/E), ln(E2/E), ln(G12/G) and the logit of sqrt(nu12 nu21) / 0.6.
+    """
+
+    name = "orthotropic-material"
+    claim = "the sheet is stiffer along one direction than across it"
+
+    E: float = 0.0
+    nu: float = 0.3
+    positions: tuple[int, ...] = ()
+    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    begun: np.ndarray | None = None  # x that the structure's own material has already
+
+    def begun_at(self, x: np.ndarray) -> Self:
+        """The same effect on a structure that has the material of x."""
+        return replace(self, begun=x.copy())
+
+    def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
+        """(E1, E2, G12 [Pa], nu12) with nu12 = nu_m sqrt(E1/E2), nu_m the geometric mean."""
+        E1, E2 = self.E * np.exp(x[0]), self.E * np.exp(x[1])
+        G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
+        return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """E1, E2, G12 and nu12."""
+        rows = super().reported(x, sd)
+        nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * WIDER * sd[3]))[3] for s in (-1, 0, 1)]
+        last = {"name": "nu12", "value": nu[1], "unit": "-", "low": nu[0], "high": nu[2]}
+        return [*rows[:3], last]
+
+    def _logs(self, x: np.ndarray) -> np.ndarray:
+        """Ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
+        m = _mean_ratio(x[3])
+        base = np.log(1 - self.nu**2) - np.log(1 - m**2)
+        return np.array(
+            [x[0] + base, x[1] + base, (x[0] + x[1]) / 2 + base + np.log(m / self.nu), x[2]]
+        )
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """Ln factors of the four components of the plane stiffness."""
+        logs, h = self._logs(x) - (0.0 if self.begun is None else self._logs(self.begun)), 1e-6
+        slopes = np.stack(
+            [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
+        )
+        return tuple(
+            FieldChange(name, logs[k] * self.inside, np.outer(self.inside, slopes[k]))
+            for k, name in enumerate(("Q11", "Q22", "Q12", "Q66"))
+        )
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """The parts' isotropic sheet replaced by MAT8 with axis 1 along ``axis``."""
+        E1, E2, G12, nu12 = self.moduli(x)
+        parts = list(assembly.parts)
+        for k in self.positions:
+            parts[k] = parts[k].with_section(**_replaced(parts[k].section, E1, E2, G12, nu12))
+        shells = assembly.shells
+        inside = np.isin(shells.part, self.positions)[:, None]
+        shells = replace(shells, axis=np.where(inside, self.axis, shells.axis))
+        return replace(assembly.with_parts(tuple(parts)), shells=shells)
+
+
+def _mean_ratio(x: float) -> float:
+    """sqrt(nu12 nu21) in (0, 0.6), 0.6 / (1 + e^-x)."""
+    return float(0.6 / (1 + np.exp(-x)))
+
+
+def _replaced(
+    section: object, E1: float, E2: float, G12: float, nu12: float
+) -> dict[str, Orthotropic]:
+    """Membrane, bending and shear material of an orthotropic section, where it has them."""
+    if not isinstance(section, ShellSection):
+        return {}
+    out = {}
+    for name in ("membrane", "bending", "shear"):
+        old = getattr(section, name)
+        if old is not None:
+            G = old.transverse()[0, 0]
+            out[name] = Orthotropic(E1, E2, nu12, G12, G, G, old.rho, old.damping, old.id)
+    return out
+
+
+GRID = (-0.8, -0.3, 0.0, 0.3, 0.8)  # ln E1/E, ln E2/E where searches begin
+
+
+def orthotropic(sheet: Sheet, positions: tuple[int, ...], axis: np.ndarray) -> OrthotropicMaterial:
+    """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame."""
+    parts = sheet.structure.assembly.parts
+    section = parts[positions[0]].section
+    material = section.membrane or section.bending if isinstance(section, ShellSection) else None
+    if not isinstance(material, Isotropic):
+        raise TypeError(f"part {parts[positions[0]].name} is not isotropic")
+    nu = min(max(material.nu, 0.02), 0.55)
+    unknown = (
+        Parameter("E1", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
+        Parameter("E2", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
+        Parameter("G12", "Pa", 0.0, 0.7, material.shear_modulus, step=0.3, starts=(-0.3, 0.0, 0.3)),
+        Parameter("nu mean", "-", float(np.log(nu / (0.6 - nu))), 1.0, kind="linear", step=0.5),
+    )
+    names = tuple(parts[k].name for k in positions)
+    direction = "xyz"[int(np.argmax(np.abs(axis)))]
+    return OrthotropicMaterial(
+        unknown,
+        f"all of {', '.join(names)}, axis 1 along {direction}",
+        names,
+        replaces=tuple(f"{q} of {n}" for q in ("E", "t") for n in names),
+        E=material.E,
+        nu=material.nu,
+        positions=positions,
+        inside=np.isin(sheet.part, positions).astype(float),
+        axis=np.asarray(axis, float),
+    )

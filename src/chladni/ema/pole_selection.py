@@ -1,0 +1,262 @@
+"""Which poles a recording supports: order sweep, clusters, adding and deleting by χ².
+
+Sweep of orders and stable clusters: Van der Auweraer and Peeters (2004), J. Mech. Eng. 50(3);
+adding and deleting by the fall of χ² against its cost in parameters.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from .pole_fitting import Data, Fit, Slope, bounded, polish, relocated, solve, stacked
+
+ORDERS = (6, 10, 15, 22, 31, 42, 56)
+_VF_STEPS = 6
+BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Poles of every order tried: the stabilisation diagram.
+
+    Attributes
+    ----------
+    order : (k,) int      number of pole pairs of the fit each pole comes from
+    poles : (k,) complex  scaled as the data
+    gain : (k,)           rise of χ² without the pole
+    chi : (n_orders,)     rms of the whitened residual, by order
+    orders : (n_orders,) int
+    """
+
+    order: np.ndarray
+    poles: np.ndarray
+    gain: np.ndarray
+    chi: np.ndarray
+    orders: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """When a pole is worth its parameters."""
+
+    channels: int
+    lines: int
+    noise: float = 1.0  # χ² per degree of freedom that counts as noise
+    largest: float = 0.1  # damping ratio of the most damped pole
+    factor: float = 2.5
+    twin: float = 6.0
+
+    @property
+    def price(self) -> float:
+        """Fall of χ² a pole must bring: 2.5 for each parameter and 4 ln(lines) for the search."""
+        parameters = 2 * self.channels + 2
+        return self.noise * (self.factor * parameters + 4 * np.log(self.lines))
+
+    def after(self, data: Data, fit: Fit) -> Self:
+        """The rule with the misfit of this fit as noise: what is systematic buys no poles."""
+        freedom = max(data.samples - fit.x.size - 2 * len(fit.p), 1)
+        return replace(self, noise=max(self.noise, fit.chi2 / freedom))
+
+
+def compressed(data: Data, most: int = 8) -> Data:
+    """At most ``most`` real combinations of the channels, lines weighted alike for all.
+
+    Channels are scaled to one and every line to the rms over channels, so that small responses
+    count as large ones do.
+    """
+    used = data.w > 0
+    scale = np.sqrt((np.abs(data.y) ** 2).mean(axis=0))
+    y = np.where(used, data.y, 0) / np.maximum(scale, 1e-300)
+    g = 1 / np.sqrt(np.maximum((np.abs(y) ** 2).mean(axis=1), 1e-12))
+    _, _, V = np.linalg.svd(stacked(g[:, None] * y), full_matrices=False)
+    k = min(most, len(V))
+    g = np.where(used.any(axis=1), g, 0.0)
+    return Data(data.s, y @ V[:k].T, np.repeat(g[:, None], k, axis=1), data.q)
+
+
+def swept(data: Data, orders: tuple[int, ...] = ORDERS, largest: float = 0.1) -> Sweep:
+    """Vector fitting at growing order, until χ² no longer falls by what the poles cost."""
+    small = compressed(data)
+    f = np.abs(data.s)
+    order: list[int] = []
+    poles: list[complex] = []
+    gain: list[float] = []
+    chi: list[float] = []
+    done: list[int] = []
+    best = np.inf
+    for n in orders:
+        if n > len(f) // 6 and done:
+            break
+        n = min(n, max(2, len(f) // 6))
+        p = np.quantile(f, (np.arange(n) + 0.5) / n) * (-0.01 + 1j)
+        for _ in range(_VF_STEPS):
+            p = relocated(small, p)
+        fit, _ = solve(data, bounded(p, 10 * largest))
+        parameters = fit.x.size + 2 * len(p)
+        order += [n] * len(p)
+        poles += list(fit.p)
+        gain += list(fit.gain)
+        done.append(n)
+        chi.append(float(np.sqrt(fit.chi2 / max(data.samples - parameters, 1))))
+        score = fit.chi2 + 2 * parameters
+        if score > best and len(done) > 2 and chi[-1] < 1.2 * min(chi):
+            break
+        best = min(best, score)
+    return Sweep(np.array(order), np.array(poles), np.array(gain), np.array(chi), np.array(done))
+
+
+def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
+    """Numbers of poles of different orders that agree, one array a cluster, richest order first.
+
+    Each leading pole takes the nearest of every other order that lies within the sum of the two
+    half bandwidths.
+    """
+    p, order = sweep.poles, sweep.order
+    free = among.copy()
+    found = []
+    for k in np.argsort(-order, kind="stable"):
+        if not free[k]:
+            continue
+        reach = np.maximum(np.abs(p.real) + abs(p[k].real), 1e-4 * np.abs(p))
+        near = np.flatnonzero(free & (np.abs(p - p[k]) < reach))
+        each = [min(near[order[near] == n], key=lambda i: abs(p[i] - p[k])) for n in {*order[near]}]
+        free[each] = False
+        found.append(np.array(each))
+    return found
+
+
+def start(data: Data, sweep: Sweep, rule: Rule) -> np.ndarray:
+    """Poles to begin with: what pays in the richest order, and clusters the rest agree on."""
+    p, richest = sweep.poles, sweep.orders.max()
+    low, high = 0.9 * float(np.abs(data.s).min()), 1.1 * float(np.abs(data.s).max())
+    fits = (low < np.abs(p)) & (np.abs(p) < high) & (sweep.gain > rule.price)
+    fits &= -p.real / np.abs(p) < rule.largest
+    leading = [g for g in clusters(sweep, fits) if sweep.order[g[0]] == richest or len(g) > 2]
+    chosen = p[[g[0] for g in leading]]
+    small = compressed(data)
+    for _ in range(_VF_STEPS if len(chosen) else 0):
+        chosen = relocated(small, chosen)
+    return chosen
+
+
+def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 40) -> tuple[Fit, Slope]:
+    """Polish a little, take out what does not pay, again, until both are at rest.
+
+    A pole does not pay if χ² rises by less than its price without it. It is no mode if it has
+    left the band by three tenths, sits at the damping limit, or lies inside with a frequency less
+    sure than its bandwidth. Nearer than that a pole stands for what rings beyond: a crowd of modes
+    above the band is no constant, and what it leaves over would pass for modes inside.
+    """
+    fit, slope = polish(data, p, rule.largest, 0)
+    for _ in range(rounds):
+        before = fit.chi2
+        poor = _poor(data, fit, slope, rule.after(data, fit))
+        if len(poor):
+            fit, slope = polish(data, np.delete(fit.p, poor), rule.largest, 0)
+            continue
+        fit, slope = polish(data, fit.p, rule.largest, 2, rule.noise)
+        poor = _poor(data, fit, slope, rule.after(data, fit))
+        if before - fit.chi2 < max(rule.noise, 1e-4 * before) and len(poor) == 0:
+            break
+    return fit, slope
+
+
+def _poor(data: Data, fit: Fit, slope: Slope, rule: Rule) -> np.ndarray:
+    """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
+    low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())
+    size, half = np.abs(fit.p), np.abs(fit.p.real)
+    no_mode = (size < low / BEYOND) | (size > BEYOND * high) | (half > 0.98 * rule.largest * size)
+    inside = (low <= size) & (size <= high)
+    no_mode |= inside & (uncertainty(fit.p, slope, rule.noise)[0] > half)
+    gain = np.where(no_mode, 0.0, fit.gain)
+    out: list[int] = []
+    for k in np.lexsort((fit.gain, gain)):
+        if gain[k] >= rule.price:
+            break
+        if (np.abs(fit.p[out] - fit.p[k]) > 4 * np.minimum(half[out], half[k])).all():
+            out.append(int(k))
+    return np.array(out, dtype=int)
+
+
+def uncertainty(p: np.ndarray, slope: Slope, noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,)."""
+    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, noise)
+    k = 2 * np.arange(len(p))
+    a, b, d = C[k, k], C[k, k + 1], C[k + 1, k + 1]
+    size, x, y = np.abs(p), p.real, p.imag
+    of_size = x**2 * a + 2 * x * y * b + y**2 * d
+    of_zeta = y**4 * a - 2 * x * y**3 * b + x**2 * y**2 * d
+    return np.sqrt(np.maximum(of_size, 0)) / size, np.sqrt(np.maximum(of_zeta, 0)) / size**3
+
+
+def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tuple[Fit, Slope]:
+    """Poles added where the residual stands out, as long as each pays for itself."""
+    f = np.abs(data.s)
+    closed = np.zeros(len(f), bool)
+    misses = 0
+    for _ in range(tries):
+        local = _local(fit)
+        local[closed] = 0
+        k = int(local.argmax())
+        if closed.all() or misses > 3 or local[k] < 1.8 * np.median(local[~closed]):
+            break
+        better, its_slope = _with_pole(data, fit, f[k], rule) or (fit, slope)
+        now = rule.after(data, better)
+        if fit.chi2 - better.chi2 > now.price and len(_poor(data, better, its_slope, now)) == 0:
+            fit, slope, misses = better, its_slope, 0
+        else:
+            closed[max(0, k - 4) : k + 5] = True
+            misses += 1
+    return fit, slope
+
+
+def _with_pole(data: Data, fit: Fit, at: float, rule: Rule) -> tuple[Fit, Slope] | None:
+    """The fit with one pole more near this frequency; None where a look says it is not worth it."""
+    usual = float(np.median(-fit.p.real / np.abs(fit.p))) if len(fit.p) else 0.01
+    looks = []
+    for zeta in (0.5 * usual, 2 * usual):
+        p = bounded(np.append(fit.p, at * (-zeta + 1j)), rule.largest)
+        looks.append(solve(data, p)[0])
+    best = min(looks, key=lambda look: look.chi2)
+    if fit.chi2 - best.chi2 < 0.3 * rule.after(data, best).price:
+        return None
+    return polish(data, best.p, rule.largest, 8, rule.noise)
+
+
+def untwinned(data: Data, fit: Fit, slope: Slope, rule: Rule) -> tuple[Fit, Slope]:
+    """Twins made one: two poles in one bandwidth with the same shape are one mode, seen twice.
+
+    A slightly nonlinear or leaky resonance is fitted better by two poles than by one. The second
+    stays only if it brings ``rule.twin`` times its price after the first has been polished alone,
+    and takes away 40 % of what that leaves about the resonance: two real modes take nearly all.
+    """
+    refused: set[complex] = set()
+    while len(weaker := [k for k in _twins(fit) if complex(fit.p[k]) not in refused]):
+        left = np.delete(fit.p, weaker[0])
+        alone, its_slope = polish(data, left, rule.largest, 6, rule.noise)
+        rise = alone.chi2 - fit.chi2
+        about = np.abs(np.abs(data.s) - abs(fit.p[weaker[0]])) < 3 * abs(fit.p[weaker[0]].real)
+        rest = max(float((np.abs(alone.e[about]) ** 2).sum()), 1e-300)
+        left_over = np.sqrt((np.abs(fit.e[about]) ** 2).sum() / rest)
+        if rise < rule.twin * rule.after(data, alone).price or left_over > 0.6:
+            fit, slope = alone, its_slope
+        else:
+            refused.add(complex(fit.p[weaker[0]]))
+    return fit, slope
+
+
+def _twins(fit: Fit) -> list[int]:
+    """Weaker partners of pairs within a bandwidth whose residues are alike, weakest first."""
+    half, R = np.abs(fit.p.real), fit.residues
+    close = np.abs(fit.p[:, None] - fit.p) < 1.5 * np.maximum(half[:, None], half)
+    power = (np.abs(R) ** 2).sum(axis=1)
+    alike = np.abs(R.conj() @ R.T) ** 2 > 0.8 * power[:, None] * power
+    weaker = fit.gain[:, None] < fit.gain
+    pairs = (close & alike & weaker).any(axis=1)
+    return [int(k) for k in np.argsort(fit.gain) if pairs[k]]
+
+
+def _local(fit: Fit) -> np.ndarray:
+    """χ² around each line (n_f,): moving mean of five lines, all channels."""
+    return np.convolve((np.abs(fit.e) ** 2).mean(axis=1), np.ones(5) / 5, mode="same")

@@ -1,0 +1,1 @@
+"""Points on shells: nearest ones, edges, curvature, clearance, mapped thickness."""

@@ -1,0 +1,40 @@
+"""Cells of a mesh: their sides, their shape, the pieces they make."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+def corner_quality(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Least sine of a corner angle, min_k sin(θ_k), negative where a quad folds over (n,).
+
+    Points are (k, 2) or (k, 3); in space the angles are counted about the cell's mean normal.
+    Triangles are measured against the equilateral one, so that 1 is the best of both.
+    """
+    triangle = quads[:, 2] == quads[:, 3]
+    x = points[quads]
+    ahead, behind = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    ahead[triangle, 2] = x[triangle, 0] - x[triangle, 2]  # past the repeated node
+    if points.shape[1] == 2:
+        cross = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
+    else:
+        normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        cross = np.einsum("nki,ni->nk", np.cross(ahead, behind), normal)
+    size = np.linalg.norm(ahead, axis=-1) * np.linalg.norm(behind, axis=-1)
+    sine = cross / np.maximum(size, 1e-30)
+    sine[triangle, 3] = 1.0
+    return np.where(triangle, sine.min(axis=1) * 2 / np.sqrt(3), sine.min(axis=1))
+
+
+def edges_of(cells: np.ndarray) -> np.ndarray:
+    """All sides (k, 2) of the cells, smaller row first, repeated; collapsed ones left out."""
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1)
+
+
+def components(quads: np.ndarray, count: int) -> np.ndarray:
+    """Number (from 0) of the connected piece each of `count` points belongs to."""
+    a, b = edges_of(quads).T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])

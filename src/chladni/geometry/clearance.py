@@ -1,0 +1,223 @@
+"""Clearance between sheets, and how far the two sides move against each other in each mode.
+
+A facet lies up to h² κ/8 inside the curved sheet it stands for; a clearance is known no better
+than that on both sides, and a pair closer than its uncertainty is called touching.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..model.assembly import Assembly, Average, RigidBody
+from .curvature import part_curvature
+from .nearest import Surface
+from .thickness_mapping import shell_area
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Places of one part over against another.
+
+    Attributes
+    ----------
+    parts : (str, str)
+    rows : (k,) int          rows of points on the first part
+    opposite : (k, 3) int    rows of the triangle opposite
+    weight : (k, 3)          of these
+    normal : (k, 3)          unit, from the first part to the second
+    clearance : (k,)         distance less half of both thicknesses [m]
+    uncertainty : (k,)       h² κ/8 of both sides [m]
+    free : (k,) bool         farther than ``away`` from any joint
+    """
+
+    parts: tuple[str, str]
+    rows: np.ndarray
+    opposite: np.ndarray
+    weight: np.ndarray
+    normal: np.ndarray
+    clearance: np.ndarray
+    uncertainty: np.ndarray
+    free: np.ndarray
+
+    @property
+    def touching(self) -> np.ndarray:
+        """(k,) bool, True where the clearance is within its uncertainty."""
+        return self.clearance <= self.uncertainty
+
+    def relative_motion(self, shapes: np.ndarray) -> np.ndarray:
+        """Opening δ_r = n·(Σ w u_b - u_a) of each place in each shape: (k, r).
+
+        Parameters
+        ----------
+        shapes : (n_points, 3, r)   translations of all points of the assembly
+        """
+        other = np.einsum("kc,kcir->kir", self.weight, shapes[self.opposite])
+        return np.asarray(np.einsum("ki,kir->kr", self.normal, other - shapes[self.rows]))
+
+    def first_contact(
+        self,
+        shapes: np.ndarray,
+        frequency: np.ndarray,
+        damping: np.ndarray | float,
+        drive: np.ndarray,
+    ) -> np.ndarray:
+        """Force amplitude at resonance until a place closes, F = c 2ζω² / (|φ_f| |δ|): (k, r) [N].
+
+        Parameters
+        ----------
+        shapes : (n_points, 3, r)   mass-normalised [1/√kg]
+        frequency, damping : (r,)   [Hz], [-]
+        drive : (r,)                the shapes' motion at the exciter [1/√kg]
+        """
+        omega = 2 * np.pi * np.asarray(frequency)
+        per_force = np.abs(self.relative_motion(shapes) * drive) / (2 * damping * omega**2)
+        gap = np.maximum(self.clearance, 0.0)[:, None]
+        return np.asarray(gap / np.maximum(per_force, 1e-30))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sheets:
+    """What every pair of parts needs: thickness and facet error at the points, places of joints."""
+
+    thickness: np.ndarray
+    error: np.ndarray
+    joints: np.ndarray
+
+
+def _sheets(assembly: Assembly) -> _Sheets:
+    facet = shell_area(assembly)[:, None] * part_curvature(assembly) / 8
+    return _Sheets(
+        _nodal(assembly, assembly.shells.thickness),
+        _nodal(assembly, facet),
+        assembly.points[joint_points(assembly)],
+    )
+
+
+def joint_points(assembly: Assembly) -> np.ndarray:
+    """Rows of the points at which an RBE2 or RBE3 grips the sheets."""
+    bodies = {tie.independent for tie in assembly.rigid if isinstance(tie, RigidBody)}
+    means = {tie.reference for tie in assembly.rigid if isinstance(tie, Average)}
+    return np.array(sorted(bodies | means), dtype=int)
+
+
+def gaps(
+    assembly: Assembly, first: str, second: str, *, within: float = 0.010, away: float = 0.018
+) -> Gaps:
+    """All points of one part that lie within a distance of another."""
+    return _gaps(assembly, _sheets(assembly), (first, second), within, away)
+
+
+def _gaps(
+    assembly: Assembly, sheets: _Sheets, names: tuple[str, str], within: float, away: float
+) -> Gaps:
+    a, b = (Surface.of(assembly, name) for name in names)
+    rows = np.unique(a.nodes)
+    rows = rows[_in_box(assembly.points[rows], assembly.points[np.unique(b.nodes)], within)]
+    rows = rows if len(rows) else a.nodes[0, :1]
+    feet = b.feet(assembly.points[rows])
+    near = feet.distance <= within
+    rows, opposite, weight = rows[near], feet.nodes[near], feet.weight[near]
+    across = feet.place[near] - assembly.points[rows]
+    away_from = np.einsum("ki,ki->k", across, feet.normal[near]) < 0
+    t, error = (
+        v[rows] + (v[opposite] * weight).sum(axis=1) for v in (sheets.thickness, sheets.error)
+    )
+    shared = assembly.points[np.intersect1d(a.nodes, b.nodes)]  # a fold holds two parts together
+    joints = np.concatenate([sheets.joints, shared])
+    free = np.ones(len(rows), bool)
+    if len(joints):
+        free = cKDTree(joints).query(assembly.points[rows])[0] > away
+    return Gaps(
+        names,
+        rows,
+        opposite,
+        weight,
+        feet.normal[near] * np.where(away_from, -1.0, 1.0)[:, None],
+        feet.distance[near] - t / 2,
+        error,
+        free,
+    )
+
+
+def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
+    low, high = other.min(axis=0) - margin, other.max(axis=0) + margin
+    return np.asarray(np.all((points >= low) & (points <= high), axis=1))
+
+
+def _nodal(assembly: Assembly, corner: np.ndarray) -> np.ndarray:
+    """Mean at the points of values at the shells' corners."""
+    at, n = assembly.shells.nodes.ravel(), len(assembly.points)
+    count = np.bincount(at, minlength=n)
+    return np.asarray(np.bincount(at, corner.ravel(), minlength=n) / np.maximum(count, 1))
+
+
+@dataclass(frozen=True)
+class PairClearance:
+    """The nearest that two parts come.
+
+    Attributes
+    ----------
+    parts : (str, str)
+    least : float              clearance at the nearest place [m]
+    least_free : float         the same away from joints; inf where there is no such place [m]
+    uncertainty : float        at that place [m]
+    close : int                places away from joints with less than half a millimetre
+    touching : bool            somewhere away from joints within the uncertainty
+    place : (3,)               of the nearest place away from joints [m]
+    """
+
+    parts: tuple[str, str]
+    least: float
+    least_free: float
+    uncertainty: float
+    close: int
+    touching: bool
+    place: tuple[float, float, float]
+
+
+def all_gaps(
+    assembly: Assembly, *, within: float = 0.010, away: float = 0.018, both_ways: bool = False
+) -> tuple[Gaps, ...]:
+    """The places of all pairs of parts that come within a distance; from either part or both."""
+    names = [assembly.parts[p].name for p in np.unique(assembly.shells.part)]
+    sheets = _sheets(assembly)
+    pairs = permutations(names, 2) if both_ways else combinations(names, 2)
+    found = (_gaps(assembly, sheets, pair, within, away) for pair in pairs)
+    return tuple(g for g in found if len(g.rows))
+
+
+def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
+    """Least clearance of each point (n,) [m]; nan without a sheet near it, or by a joint."""
+    least = np.full(len(assembly.points), np.inf)
+    for g in gaps:
+        np.minimum.at(least, g.rows[g.free], g.clearance[g.free])
+    return np.where(np.isfinite(least), least, np.nan)
+
+
+def clearances(assembly: Assembly, within: float = 0.010) -> tuple[PairClearance, ...]:
+    """All pairs of parts that come within a distance of each other, nearest first."""
+    found = [summary(assembly, g) for g in all_gaps(assembly, within=within)]
+    return tuple(sorted(found, key=lambda pair: pair.least_free))
+
+
+def summary(assembly: Assembly, g: Gaps) -> PairClearance:
+    """What there is to say about a pair."""
+    free = np.flatnonzero(g.free)
+    if not len(free):
+        free_least, at = float("inf"), int(g.clearance.argmin())
+    else:
+        at = int(free[g.clearance[free].argmin()])
+        free_least = float(g.clearance[at])
+    x, y, z = assembly.points[g.rows[at]].tolist()
+    return PairClearance(
+        g.parts,
+        float(g.clearance.min()),
+        free_least,
+        float(g.uncertainty[at]),
+        int((g.clearance[free] < 0.5e-3).sum()),
+        bool(g.touching[free].any()),
+        (x, y, z),
+    )

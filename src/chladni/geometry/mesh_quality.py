@@ -1,0 +1,190 @@
+"""Checks of a shell mesh before anything is computed: element shape, edges, parts, normals."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..model.assembly import Assembly, Average, RigidBody
+from .cells import components, corner_quality, edges_of
+
+LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 20.0, 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class ElementQuality:
+    """Shape of every shell (n,).
+
+    Attributes
+    ----------
+    sine : least sine of a corner angle, 1 best, negative where folded
+    aspect : longest side by shortest
+    warp : distance of the corners from the mean plane by the mean side length
+    skew : 1 - |cos| of the mid-lines' angle; 1 is square
+    """
+
+    sine: np.ndarray
+    aspect: np.ndarray
+    warp: np.ndarray
+    skew: np.ndarray
+
+
+def element_quality(assembly: Assembly) -> ElementQuality:
+    """Shape measures of every shell."""
+    nodes, points = assembly.shells.nodes, assembly.points
+    x = points[nodes]
+    sides = np.linalg.norm(np.roll(x, -1, axis=1) - x, axis=2)
+    sides[nodes[:, 2] == nodes[:, 3], 2] = np.nan
+    normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    off = np.abs(np.einsum("nki,ni->nk", x - x.mean(axis=1, keepdims=True), normal)).max(axis=1)
+    off[nodes[:, 2] == nodes[:, 3]] = 0.0
+    a, b = x[:, 1] + x[:, 2] - x[:, 0] - x[:, 3], x[:, 2] + x[:, 3] - x[:, 0] - x[:, 1]
+    size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+    cosine = np.abs((a * b).sum(axis=1)) / np.maximum(size, 1e-30)
+    return ElementQuality(
+        corner_quality(points, nodes),
+        np.nanmax(sides, axis=1) / np.maximum(np.nanmin(sides, axis=1), 1e-12),
+        off / np.nanmean(sides, axis=1),
+        1 - cosine,
+    )
+
+
+@dataclass(frozen=True)
+class PartCheck:
+    """One part's mesh.
+
+    Attributes
+    ----------
+    shells, triangles : int
+    bad : int                shells beyond a limit of shape
+    worst_sine : float
+    free_edge : float        length of its free edges [m]
+    pieces : int             connected sheets
+    turned : int             edges across which the normals disagree
+    branched : int           edges of more than two shells
+    joined : bool            tied to any other part
+    """
+
+    part: str
+    shells: int
+    triangles: int
+    bad: int
+    worst_sine: float
+    free_edge: float
+    pieces: int
+    turned: int
+    branched: int
+    joined: bool
+
+
+@dataclass(frozen=True, eq=False)
+class MeshCheck:
+    """All parts, and which parts hang on nothing.
+
+    Attributes
+    ----------
+    parts : tuple of PartCheck
+    bad : (k,) int            ids of shells beyond a limit of shape
+    loose : tuple of str      parts not connected to the largest structure
+    """
+
+    parts: tuple[PartCheck, ...]
+    bad: np.ndarray
+    loose: tuple[str, ...]
+
+    @property
+    def fit(self) -> bool:
+        """Nothing loose, no folded shell, no normals turned."""
+        return not self.loose and all(p.worst_sine > 0 and not p.turned for p in self.parts)
+
+
+def free_edges(nodes: np.ndarray) -> np.ndarray:
+    """Sides (k, 2) of one cell only."""
+    sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
+    return np.asarray(sides[count == 1])
+
+
+def _directed(nodes: np.ndarray) -> np.ndarray:
+    sides = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return sides[sides[:, 0] != sides[:, 1]]
+
+
+def edge_faults(nodes: np.ndarray) -> tuple[int, int]:
+    """Edges whose two cells run the same way (normals disagree), edges of more than two cells."""
+    sides = _directed(nodes)
+    key, at, count = np.unique(
+        np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    ahead = np.bincount(at.ravel(), sides[:, 0] < sides[:, 1], minlength=len(key))
+    return int(np.sum((count == 2) & (ahead != 1))), int(np.sum(count > 2))
+
+
+def check_mesh(assembly: Assembly) -> MeshCheck:
+    """Shape, edges, normals and connection of every part with shells."""
+    quality = element_quality(assembly)
+    bad = (quality.sine < LEAST_SINE) | (quality.aspect > MOST_ASPECT) | (quality.warp > MOST_WARP)
+    piece = structure_pieces(assembly)
+    shells = assembly.shells
+    main = np.bincount(piece[shells.nodes[:, 0]]).argmax() if len(shells) else 0
+    parts, loose = [], []
+    for p in np.unique(shells.part):
+        rows = shells.part == p
+        check = _part(assembly, int(p), rows, bad, quality, piece)
+        parts.append(check)
+        if np.any(piece[shells.nodes[rows, 0]] != main):
+            loose.append(check.part)
+    return MeshCheck(tuple(parts), shells.ids[bad], tuple(loose))
+
+
+def _part(
+    assembly: Assembly,
+    part: int,
+    rows: np.ndarray,
+    bad: np.ndarray,
+    quality: ElementQuality,
+    piece: np.ndarray,
+) -> PartCheck:
+    nodes = assembly.shells.nodes[rows]
+    edges = free_edges(nodes)
+    length = np.linalg.norm(np.diff(assembly.points[edges], axis=1)[:, 0], axis=1).sum()
+    sheet = components(nodes, len(assembly.points))[nodes[:, 0]]
+    turned, branched = edge_faults(nodes)
+    others = assembly.shells.nodes[~rows, 0]
+    return PartCheck(
+        assembly.parts[part].name,
+        int(rows.sum()),
+        int((nodes[:, 2] == nodes[:, 3]).sum()),
+        int(bad[rows].sum()),
+        float(quality.sine[rows].min()),
+        float(length),
+        len(np.unique(sheet)),
+        turned,
+        branched,
+        bool(np.isin(piece[nodes[:, 0]], piece[others]).all()),
+    )
+
+
+def structure_pieces(assembly: Assembly) -> np.ndarray:
+    """Number of the connected piece each point belongs to, through elements and rigid links."""
+    pairs = [_chain(assembly.shells.nodes), _chain(assembly.beams.nodes)]
+    pairs += [_chain(s.nodes) for s in assembly.solids]
+    for family in (assembly.springs, assembly.bushes):
+        pairs.append(family.nodes[(family.nodes >= 0).all(axis=1)])
+    for tie in assembly.rigid:
+        if isinstance(tie, RigidBody):
+            pairs.append(np.array([(tie.independent, row) for row in tie.dependent]))
+        elif isinstance(tie, Average):
+            pairs.append(np.array([(tie.reference, row) for row, _, _ in tie.terms]))
+        else:
+            pairs.append(_chain(np.array([tie.nodes])))
+    a, b = np.vstack([p.reshape(-1, 2) for p in pairs]).astype(int).T
+    n = len(assembly.points)
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _chain(nodes: np.ndarray) -> np.ndarray:
+    """Pairs that link the nodes of each element."""
+    return np.stack([nodes[:, :-1], nodes[:, 1:]], axis=-1).reshape(-1, 2)

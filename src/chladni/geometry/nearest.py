@@ -1,0 +1,268 @@
+"""Where a joint meets a sheet: nearest shells of a part, feet on them, nodes that carry it.
+
+A warped quadrilateral is taken as two triangles on either diagonal; both triangles of each of the
+nearest quads are tried, because the quad whose centre is nearest need not hold the nearest point.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import LabelError, ModelError
+from ..model.assembly import Assembly
+
+NEAR = 12  # quads around a place whose triangles are tried
+IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
+
+Sheet = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Nearest places on a surface.
+
+    Attributes
+    ----------
+    shell : (k,)          rows of ``Surface.nodes``
+    place : (k, 3)        [m]
+    nodes : (k, 3)        rows of points of the triangle
+    weight : (k, 3)       barycentric weights of these nodes
+    distance : (k,)       [m]
+    normal : (k, 3)       of the triangle
+    """
+
+    shell: np.ndarray
+    place: np.ndarray
+    nodes: np.ndarray
+    weight: np.ndarray
+    distance: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Shells a joint may be tied to.
+
+    Attributes
+    ----------
+    name : str
+    points : (n, 3)     all points of the assembly [m]
+    nodes : (m, 4)      rows of points
+    rows : (m,)         rows of ``assembly.shells``
+    tree, owner :       places along the shells' longer middle lines, and whose they are
+    """
+
+    name: str
+    points: np.ndarray
+    nodes: np.ndarray
+    rows: np.ndarray
+    tree: cKDTree = field(repr=False)
+    owner: np.ndarray = field(repr=False)
+
+    @classmethod
+    def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
+        """A surface of its own, not of an assembly."""
+        tree, owner = _spread(points[nodes])
+        return cls(name, points, nodes, np.arange(len(nodes)), tree, owner)
+
+    @classmethod
+    def of(cls, assembly: Assembly, sheet: Sheet) -> Self:
+        """The shells of a part, or the shells with these rows."""
+        if isinstance(sheet, str | int):
+            part = assembly.part(sheet)
+            name, rows = assembly.parts[part].name, np.flatnonzero(assembly.shells.part == part)
+        else:
+            rows = np.asarray(sheet, dtype=int)
+            parts = np.unique(assembly.shells.part[rows])
+            name = " and ".join(assembly.parts[p].name for p in parts)
+        if not len(rows):
+            raise LabelError(f"{name or 'the selection'} has no shells to join to")
+        nodes = assembly.shells.nodes[rows]
+        tree, owner = _spread(assembly.points[nodes])
+        return cls(name, assembly.points, nodes, rows, tree, owner)
+
+    def feet(
+        self,
+        places: np.ndarray,
+        normal: np.ndarray | None = None,
+        cosine: float = 0.7,
+        near: int = NEAR,
+    ) -> Feet:
+        """The nearest point of the surface to each place (k, 3).
+
+        With a `normal` (k, 3) at each place, triangles turned away from it (|cos| below `cosine`)
+        do not count; where none is left the distance is infinite.
+        """
+        places = np.atleast_2d(np.asarray(places, dtype=float))
+        k, count = len(places), min(near, len(self.owner))
+        tried = self.owner[self.tree.query(places, count)[1].reshape(k, count)]
+        triangles = self.nodes[tried][..., _HALVES].reshape(k, 2 * count, 3)
+        x = self.points[triangles]
+        weight = barycentric_foot(places[:, None], x)
+        foot = np.einsum("kta,ktai->kti", weight, x)
+        distance = np.linalg.norm(foot - places[:, None], axis=-1)
+        facing = _unit(np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]))
+        if normal is not None:
+            away = np.abs(np.einsum("kti,ki->kt", facing, normal)) < cosine
+            distance = np.where(away, np.inf, distance)
+        row, best = np.arange(k), distance.round(12).argmin(axis=1)
+        return Feet(
+            tried[row, best // 2],
+            foot[row, best],
+            triangles[row, best],
+            weight[row, best],
+            distance[row, best],
+            facing[row, best],
+        )
+
+    def within(self, feet: Feet, places: np.ndarray, reach: float) -> None:
+        """Refuse places farther than `reach` from the surface.
+
+        Raises
+        ------
+        ModelError
+            Naming the worst place and its distance.
+        """
+        worst = int(feet.distance.argmax())
+        if feet.distance[worst] > reach:
+            x, y, z = 1e3 * np.atleast_2d(places)[worst]
+            raise ModelError(
+                f"a joint at ({x:.1f}, {y:.1f}, {z:.1f}) mm is {1e3 * feet.distance[worst]:.1f} mm "
+                f"from {self.name}, farther than {1e3 * reach:.1f} mm; move it or widen its reach"
+            )
+
+    def cells(self, feet: Feet) -> list[np.ndarray]:
+        """Nodes of each foot's shell; of its neighbours too where its own lie in a line."""
+        own = [np.unique(nodes) for nodes in self.nodes[feet.shell]]
+        return [self._with_ring(n) if _in_line(self.points[n]) else n for n in own]
+
+    def _with_ring(self, nodes: np.ndarray) -> np.ndarray:
+        return np.unique(self.nodes[np.isin(self.nodes, nodes).any(axis=1)])
+
+    def patch(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes and weights ∫ N_i dA / πR² of a disc about the surface's nearest point.
+
+        The disc is sampled at points of equal area; its nodes and weights tend to the disc's own
+        as the mesh is refined, and on a mesh coarser than the disc they are the shell's nodes.
+        """
+        centre = self.feet(place[None])
+        u, v = tangents(centre.normal[0])
+        feet = self.feet(centre.place + radius * (_DISC @ np.stack([u, v])))
+        nodes, at = np.unique(feet.nodes, return_inverse=True)
+        weight = np.bincount(at.ravel(), feet.weight.ravel()) / len(_DISC)
+        keep = weight > 1e-9
+        if keep.sum() < 3 or _in_line(self.points[nodes[keep]]):
+            nodes = self._with_ring(nodes)
+            return nodes, np.full(len(nodes), 1 / len(nodes))
+        return nodes[keep], weight[keep]
+
+
+def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray]:
+    """Places along the longer middle line of each cell (m, 4, 3), closer than the usual size.
+
+    A long cell's centre may be far from a point that the cell itself is near.
+    """
+    side = (x + np.roll(x, -1, axis=1)) / 2
+    ends = [(side[:, 0], side[:, 2]), (side[:, 1], side[:, 3])]
+    length = np.stack([np.linalg.norm(b - a, axis=1) for a, b in ends])
+    longer = length.argmax(axis=0)[:, None]
+    a, b = (np.where(longer == 0, p, q) for p, q in zip(*ends, strict=True))
+    usual = max(float(np.median(length)), 1e-9)
+    count = np.maximum(1, np.ceil(length.max(axis=0) / (1.5 * usual))).astype(int)
+    owner = np.repeat(np.arange(len(x)), count)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((step + 0.5) / count[owner])[:, None]
+    return cKDTree(a[owner] + t * (b - a)[owner]), owner
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30))
+
+
+_HALVES = np.array([(0, 1, 2), (0, 2, 3)])
+
+
+def _disc() -> np.ndarray:
+    """Points of equal area in the unit disc: the middle and three rings of 6, 12 and 18."""
+    rings = [np.zeros((1, 2))]
+    inner = 1.0
+    for count in (6, 12, 18):
+        outer = inner + count
+        radius = np.sqrt((inner + outer) / 2 / 37)
+        angle = 2 * np.pi * (np.arange(count) + 0.5) / count
+        rings.append(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+        inner = outer
+    return np.vstack(rings)
+
+
+_DISC = _disc()
+
+
+def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors (..., 3) with u x v = n."""
+    e = np.eye(3)[np.abs(normal).argmin(axis=-1)]
+    u = e - (e * normal).sum(axis=-1, keepdims=True) * normal
+    u = u / np.linalg.norm(u, axis=-1, keepdims=True)
+    return u, np.cross(normal, u)
+
+
+def barycentric_foot(p: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Weights (..., 3) of the point of triangles x (..., 3, 3) nearest to p (..., 3).
+
+    Inside, the projection; outside, the nearest point of the three sides (Ericson, Real-Time
+    Collision Detection, 5.1.5).
+    """
+    a, b, c = (x[..., k, :] for k in range(3))
+    n = np.cross(b - a, c - a)
+    nn = np.maximum((n * n).sum(-1), 1e-60)
+    w = np.stack(
+        [(np.cross(v - u, p - u) * n).sum(-1) / nn for u, v in ((b, c), (c, a), (a, b))], axis=-1
+    )
+    options = [w, *(_on_side(p, x, k) for k in range(3))]
+    feet = np.stack([np.einsum("...a,...ai->...i", o, x) for o in options])
+    far = np.linalg.norm(feet - p, axis=-1)
+    far[0] = np.where((w >= 0).all(-1) & (nn > 1e-50), far[0] - 1e-15, np.inf)
+    best = far.argmin(axis=0)
+    return np.take_along_axis(np.stack(options), best[None, ..., None], axis=0)[0]
+
+
+def _on_side(p: np.ndarray, x: np.ndarray, k: int) -> np.ndarray:
+    """Weights of the point of side k (from corner k to the next) nearest to p."""
+    u, v = x[..., k, :], x[..., (k + 1) % 3, :]
+    e = v - u
+    t = np.clip(((p - u) * e).sum(-1) / np.maximum((e * e).sum(-1), 1e-30), 0, 1)
+    w = np.zeros((*np.broadcast_shapes(p.shape[:-1], t.shape), 3))
+    w[..., k], w[..., (k + 1) % 3] = 1 - t, t
+    return w
+
+
+def _in_line(x: np.ndarray) -> bool:
+    extent = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
+    return len(x) < 3 or extent[1] < IN_LINE * extent[0]
+
+
+def nearest_parts(assembly: Assembly, places: np.ndarray, reach: float) -> list[tuple[int, int]]:
+    """Ids of the two parts nearest to each place.
+
+    Raises
+    ------
+    ModelError
+        Where fewer than two parts are within reach, naming the place.
+    """
+    present = np.unique(assembly.shells.part)
+    surfaces = [Surface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present]
+    far = np.stack([surface.feet(places).distance for surface in surfaces], axis=1)
+    order = np.argsort(far, axis=1, kind="stable")[:, :2]
+    if order.shape[1] < 2 or np.any(np.take_along_axis(far, order, 1)[:, 1] > reach):
+        second = np.sort(far, axis=1)[:, 1] if order.shape[1] == 2 else np.full(len(far), np.inf)
+        worst = int(second.argmax())
+        x, y, z = 1e3 * places[worst]
+        raise ModelError(
+            f"no second part within {1e3 * reach:.1f} mm of ({x:.1f}, {y:.1f}, {z:.1f}) mm: the "
+            f"next is {1e3 * second[worst]:.1f} mm away; move the joint or widen its reach"
+        )
+    ids = [assembly.parts[p].id for p in present]
+    return [(ids[a], ids[b]) for a, b in order.tolist()]

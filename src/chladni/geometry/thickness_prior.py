@@ -1,0 +1,130 @@
+"""Thickness guessed from curvature where no forming data exist, with the spread to expect.
+
+Thinning 1 - t/t₀ is a linear function of how bent the sheet is at a place and around it; it is
+learned from parts whose thickness was mapped. Pressing tools differ, so parts differ more than
+places: each part draws its own strength from a distribution whose spread is learned too, and
+leave-one-part-out errors say what the guess is worth on a part never seen.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import ModelError
+from ..model.assembly import Assembly
+from ..model.properties import ShellSection
+from .curvature import part_curvature
+from .thickness_mapping import shell_area
+
+HALF = 25.0  # curvature at which the feature κ/(κ + HALF) is one half [1/m]
+AROUND = 0.020  # radius of the neighbourhood [m]
+FEATURES = ("one", "bent", "bent around")
+
+
+@dataclass(frozen=True, eq=False)
+class ThinningModel:
+    """1 - t/t₀ = x·β (1 + e_part) + e_place.
+
+    Attributes
+    ----------
+    beta : (3,)            of FEATURES
+    part_spread : float    standard deviation of a part's strength, relative
+    place_spread : float   of a place within a part [-]
+    left_out : dict        part -> rms error of t/t₀ predicted from all others
+    trivial : dict         part -> rms error of t/t₀ when the gauge is kept
+    """
+
+    beta: np.ndarray
+    part_spread: float
+    place_spread: float
+    left_out: dict[str, float]
+    trivial: dict[str, float]
+
+
+def gauge(assembly: Assembly) -> np.ndarray:
+    """Thickness of the blank of every shell (n,): its section's [m]."""
+    out = []
+    for part in assembly.parts:
+        known = isinstance(part.section, ShellSection)
+        out.append(part.section.thickness if known else np.nan)  # type: ignore[union-attr]
+    return np.array(out, dtype=float)[assembly.shells.part]
+
+
+def features(assembly: Assembly) -> np.ndarray:
+    """One, κ/(κ + 25) of each shell and its mean within 20 mm on the same part (n, 3)."""
+    kappa = part_curvature(assembly).mean(axis=1)
+    bent = kappa / (kappa + HALF)
+    middle, area = assembly.points[assembly.shells.nodes].mean(axis=1), shell_area(assembly)
+    around = np.zeros(len(bent))
+    for part in np.unique(assembly.shells.part):
+        rows = np.flatnonzero(assembly.shells.part == part)
+        near = cKDTree(middle[rows]).query_ball_point(middle[rows], AROUND)
+        around[rows] = [np.average(bent[rows][k], weights=area[rows][k]) for k in near]
+    return np.column_stack([np.ones(len(bent)), bent, around])
+
+
+def learn(assembly: Assembly, parts: tuple[str, ...] = ()) -> ThinningModel:
+    """The model from the parts of an assembly with mapped thickness.
+
+    Raises
+    ------
+    ModelError
+        If fewer than three parts have a thickness other than their gauge's.
+    """
+    X, y = features(assembly), 1 - assembly.thickness() / gauge(assembly)
+    weight = shell_area(assembly)
+    named = [assembly.part(p) for p in parts] or np.unique(assembly.shells.part).tolist()
+    rows = {p: np.flatnonzero(assembly.shells.part == p) for p in named}
+    rows = {p: r for p, r in rows.items() if np.abs(y[r]).max() > 1e-4}
+    if len(rows) < 3:
+        raise ModelError(
+            f"{len(rows)} parts have mapped thickness; three or more are needed to learn from"
+        )
+    beta = _fit(X, y, weight, list(rows.values()))
+    strength = np.array([_strength(X[r] @ beta, y[r], weight[r]) for r in rows.values()])
+    within = np.concatenate(
+        [y[r] - s * (X[r] @ beta) for r, s in zip(rows.values(), strength, strict=True)]
+    )
+    left_out, trivial = {}, {}
+    for p, r in rows.items():
+        others = [q for k, q in rows.items() if k != p]
+        guess = np.clip(X[r] @ _fit(X, y, weight, others), 0, 0.5)
+        name = assembly.parts[p].name
+        left_out[name] = _rms(y[r] - guess, weight[r])
+        trivial[name] = _rms(y[r], weight[r])
+    every = np.concatenate(list(rows.values()))
+    spread = float(np.std(strength, ddof=1))
+    return ThinningModel(beta, spread, _rms(within, weight[every]), left_out, trivial)
+
+
+def _rms(error: np.ndarray, weight: np.ndarray) -> float:
+    return float(np.sqrt((weight * error**2).sum() / weight.sum()))
+
+
+def _fit(X: np.ndarray, y: np.ndarray, weight: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
+    """Weighted least squares with every part of the same total weight."""
+    r = np.concatenate(rows)
+    w = np.concatenate([weight[k] / weight[k].sum() for k in rows])
+    root = np.sqrt(w)[:, None]
+    return np.asarray(np.linalg.lstsq(root * X[r], root[:, 0] * y[r], rcond=1e-10)[0])
+
+
+def _strength(guess: np.ndarray, y: np.ndarray, weight: np.ndarray) -> float:
+    """Scale of the guess that fits a part best."""
+    return float((weight * guess * y).sum() / np.maximum((weight * guess**2).sum(), 1e-30))
+
+
+def predict(assembly: Assembly, model: ThinningModel) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation of every shell's thickness (n,) [m]: a prior for calibration."""
+    thinning = np.clip(features(assembly) @ model.beta, 0, 0.5)
+    t0 = gauge(assembly)
+    sd = np.hypot(model.part_spread * thinning, model.place_spread)
+    return t0 * (1 - thinning), t0 * sd
+
+
+def with_predicted(assembly: Assembly, model: ThinningModel) -> Assembly:
+    """The assembly with the predicted thickness on every shell."""
+    t, _ = predict(assembly, model)
+    shells = replace(assembly.shells, thickness=np.repeat(t[:, None], 4, axis=1))
+    return replace(assembly, shells=shells)

@@ -1,0 +1,341 @@
+"""Formed thickness in and out: LS-DYNA keyword files, VTU and CSV.
+
+A forming simulation hands over *NODE and *ELEMENT_SHELL_THICKNESS, two lines an element (LS-DYNA
+Keyword User's Manual, Vol. I). Shells without thicknesses of their own take their section's.
+Everything is converted to SI here.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from ..model.formed_mesh import FormedMesh
+from ..output import write_text
+from ..units import Units
+from ..units import units as units_named
+
+_WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
+_NODE_IDS = ("node", "nid", "id", "grid")
+_THICKNESS_NAMES = ("thickness", "t", "thk", "shell thickness")
+
+
+@dataclass
+class _Block:
+    """One keyword with its data lines and their numbers."""
+
+    keyword: str
+    form: str
+    source: Path
+    lines: list[str] = field(default_factory=list)
+    at: list[int] = field(default_factory=list)
+
+    def fault(self, row: int, what: str) -> FileError:
+        return FileError(f"{self.source}, line {self.at[row]}: {what} in *{self.keyword}")
+
+
+def _blocks(path: Path) -> Iterator[_Block]:
+    """The keyword blocks of a file and of those it includes."""
+    try:
+        text = path.read_text(encoding="latin-1")
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror}") from error
+    form, block = "", None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.startswith("$"):
+            continue
+        if line.startswith("*"):
+            if block is not None:
+                yield from _resolved(block)
+            name = line[1:].split()[0].upper() if line[1:].split() else ""
+            if name == "END":
+                return
+            if name == "KEYWORD":
+                form = _format(line.upper(), form)
+            here = name[-1] if name[-1:] in ("%", "+") else form
+            block = _Block(name.rstrip("%+-"), "" if name.endswith("-") else here, path)
+        elif block is not None:
+            block.lines.append(line)
+            block.at.append(number)
+    if block is not None:
+        yield from _resolved(block)
+
+
+def _format(line: str, default: str) -> str:
+    if "LONG=Y" in line or "LONG=S" in line:
+        return "+"
+    return "%" if "I10=Y" in line else default
+
+
+def _resolved(block: _Block) -> Iterator[_Block]:
+    """The block itself, or the blocks of the file it includes."""
+    if block.keyword != "INCLUDE":
+        yield block
+        return
+    for row, line in enumerate(block.lines):
+        if line.strip():
+            other = block.source.parent / line.strip()
+            if not other.is_file():
+                raise block.fault(row, f"no file {line.strip()!r}")
+            yield from _blocks(other)
+
+
+def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -> np.ndarray:
+    """The fields of some lines as numbers (n, fields); blank is zero."""
+    lines = [block.lines[r] for r in rows]
+    if any("," in line for line in lines):
+        words = np.array([_split(line, widths) for line in lines], dtype="U32")
+    else:
+        edges = np.r_[0, np.cumsum(widths)]
+        wide = np.array([line.ljust(edges[-1])[: edges[-1]] for line in lines], dtype="U")
+        chars = wide.view("U1").reshape(len(lines), edges[-1])
+        columns = [
+            np.ascontiguousarray(chars[:, a:b]).view(f"U{b - a}") for a, b in pairwise(edges)
+        ]
+        words = np.char.strip(np.column_stack([c.ravel().astype("U32") for c in columns]))
+    words[words == ""] = "0"
+    try:
+        return words.astype(kind)
+    except ValueError:
+        row, word = _first_bad(words, kind)
+        raise block.fault(int(rows[row]), f"{word!r} is no number") from None
+
+
+def _split(line: str, widths: Sequence[int]) -> list[str]:
+    """Fields of one line, free where it has commas, else fixed."""
+    if "," in line:
+        cells = [c.strip() for c in line.split(",")][: len(widths)]
+        return cells + [""] * (len(widths) - len(cells))
+    edges = np.r_[0, np.cumsum(widths)].tolist()
+    return [line[a:b].strip() for a, b in pairwise(edges)]
+
+
+def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
+    for row, line in enumerate(words):
+        for word in line:
+            try:
+                kind(word)
+            except ValueError:
+                return row, str(word)
+    return 0, str(words[0, 0])
+
+
+def _nodes(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
+    """Ids (n,) and places (n, 3) of all *NODE lines, by increasing id."""
+    ids, places = [np.zeros(0, np.int64)], [np.zeros((0, 3))]
+    for block in blocks:
+        if block.keyword == "NODE" and block.lines:
+            whole, real = _WIDTHS[block.form]
+            rows = np.arange(len(block.lines))
+            values = _table(block, rows, (whole, real, real, real), float)
+            ids.append(values[:, 0].astype(np.int64))
+            places.append(values[:, 1:])
+    number, order = np.unique(np.concatenate(ids), return_index=True)
+    return number, np.vstack(places)[order]
+
+
+def _cards(block: _Block) -> int:
+    """Lines per element of a shell block."""
+    options = block.keyword.split("_")[2:]
+    return 1 + ("THICKNESS" in options or "BETA" in options) + ("OFFSET" in options)
+
+
+def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 6) id, part, four node ids and (n, 4) thickness, zero where the section's holds."""
+    found, thickness = [np.zeros((0, 6), np.int64)], [np.zeros((0, 4))]
+    for block in blocks:
+        if not block.keyword.startswith("ELEMENT_SHELL") or not block.lines:
+            continue
+        cards, (whole, real) = _cards(block), _WIDTHS[block.form]
+        if len(block.lines) % cards:
+            raise block.fault(-1, f"{len(block.lines)} lines are not {cards} per element")
+        first = np.arange(0, len(block.lines), cards)
+        values = _table(block, first, (whole,) * 10, int)
+        if np.any(higher := values[:, 6:].any(axis=1)):
+            raise block.fault(int(first[higher][0]), "a shell with mid-side nodes")
+        found.append(values[:, :6])
+        has = "THICKNESS" in block.keyword
+        t = _table(block, first + 1, (real,) * 4, float) if has else np.zeros((len(first), 4))
+        thickness.append(t)
+    return np.vstack(found), np.vstack(thickness)
+
+
+def _names(blocks: list[_Block]) -> tuple[dict[int, str], dict[int, int]]:
+    """Title and section of each part."""
+    names, sections = {}, {}
+    for block in blocks:
+        if block.keyword == "PART":
+            for k in range(0, len(block.lines) - 1, 2):
+                id_, section = _table(block, np.array([k + 1]), (10, 10), int)[0].tolist()
+                names[id_], sections[id_] = block.lines[k].strip(), section
+    return names, sections
+
+
+def _section_thickness(blocks: list[_Block]) -> dict[int, float]:
+    """Thickness at the first node of every shell section."""
+    out = {}
+    for block in blocks:
+        if block.keyword.startswith("SECTION_SHELL"):
+            titled = block.keyword.endswith("TITLE")
+            cards = 3 if titled else 2
+            for k in range(int(titled), len(block.lines) - 1, cards):
+                id_ = int(_table(block, np.array([k]), (10,), int)[0, 0])
+                out[id_] = float(_table(block, np.array([k + 1]), (10,), float)[0, 0])
+    return out
+
+
+def read_keyword(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
+    """Nodes, shells and their thickness of an LS-DYNA keyword file, in SI.
+
+    Raises
+    ------
+    FileError
+        Naming file and line where a number cannot be read, a node is missing or a shell has no
+        thickness.
+    """
+    path, unit = Path(path), units_named(units) if isinstance(units, str) else units
+    blocks = list(_blocks(path))
+    ids, places = _nodes(blocks)
+    shells, t = _shells(blocks)
+    if not len(ids) or not len(shells):
+        raise FileError(f"{path} has {len(ids)} nodes and {len(shells)} shells; both are needed")
+    nodes = shells[:, 2:].copy()
+    nodes[:, 3] = np.where(nodes[:, 3] == 0, nodes[:, 2], nodes[:, 3])
+    rows = np.minimum(np.searchsorted(ids, nodes), len(ids) - 1)
+    if np.any(lost := (ids[rows] != nodes).any(axis=1)):
+        raise FileError(f"{path}: shell {shells[lost][0, 0]} names a node that is not in *NODE")
+    names, sections = _names(blocks)
+    t = _with_sections(path, shells, t, sections, _section_thickness(blocks))
+    return FormedMesh(ids, places * unit.length, rows, shells[:, 1], t * unit.length, names)
+
+
+def _with_sections(
+    path: Path,
+    shells: np.ndarray,
+    t: np.ndarray,
+    sections: dict[int, int],
+    gauges: dict[int, float],
+) -> np.ndarray:
+    """Thickness (n, 4) with a section's where the element has none."""
+    gauge = np.array([gauges.get(sections.get(int(p), -1), 0.0) for p in shells[:, 1]])
+    t = np.where(t > 0, t, gauge[:, None])
+    if np.any(bare := (t <= 0).any(axis=1)):
+        raise FileError(
+            f"{path}: shell {shells[bare][0, 0]} ({bare.sum()} in all) has no thickness of its own "
+            "and no *SECTION_SHELL to take it from"
+        )
+    return t
+
+
+def write_keyword(path: Path | str, mesh: FormedMesh, units: str | Units = "mm-t-s") -> Path:
+    """Write *NODE, *PART and *ELEMENT_SHELL_THICKNESS, to 0.1 µm in mm."""
+    unit = units_named(units) if isinstance(units, str) else units
+    return write_text(path, "\n".join(_keyword_lines(mesh, unit)) + "\n")
+
+
+def _keyword_lines(mesh: FormedMesh, unit: Units) -> Iterator[str]:
+    yield "*KEYWORD"
+    yield f"$ unit system {unit.name}"
+    for id_, name in sorted(mesh.names.items()):
+        yield f"*PART\n{name}\n{id_:10d}{id_:10d}{0:10d}"
+    yield "*NODE"
+    digits = max(0, int(np.ceil(np.log10(unit.length / 1e-7) - 1e-9)))
+    for id_, (x, y, z) in zip(mesh.ids.tolist(), (mesh.points / unit.length).tolist(), strict=True):
+        yield f"{id_:8d}{x:16.{digits}f}{y:16.{digits}f}{z:16.{digits}f}"
+    yield "*ELEMENT_SHELL_THICKNESS"
+    ids = mesh.ids[mesh.cells].tolist()
+    rows = zip(mesh.part.tolist(), ids, (mesh.thickness / unit.length).tolist(), strict=True)
+    for k, (part, nodes, t) in enumerate(rows, start=1):
+        yield f"{k:8d}{part:8d}" + "".join(f"{n:8d}" for n in nodes)
+        yield "".join(f"{v:16.{digits}f}" for v in t)
+    yield "*END"
+
+
+def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
+    """Formed thickness from a keyword file (.k, .key, .dyn, .dynain, .asc), a VTU or a CSV.
+
+    A mesh file (whatever meshio reads) holds the thickness as point or cell data; a CSV has the
+    columns node, x, y, z, thickness and no cells.
+    """
+    path = Path(path)
+    unit = units_named(units) if isinstance(units, str) else units
+    if path.suffix.lower() == ".csv":
+        return _read_csv(path, unit)
+    if path.suffix.lower() in (".vtu", ".vtk", ".msh", ".xdmf", ".ply"):
+        return _read_mesh(path, unit)
+    return read_keyword(path, unit)
+
+
+def _read_csv(path: Path, unit: Units) -> FormedMesh:
+    """Points with thickness, no cells."""
+    try:
+        data = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path} is no table of numbers: {error}") from error
+    names = {name.lower(): name for name in data.dtype.names or ()}
+    t = next((names[n] for n in _THICKNESS_NAMES if n in names), None)
+    if t is None or not {"x", "y", "z"} <= set(names):
+        raise FileError(f"{path} has columns {', '.join(names)}; x, y, z and thickness are due")
+    data = np.atleast_1d(data)
+    points = np.column_stack([data[names[c]] for c in "xyz"])
+    id_ = next((names[n] for n in _NODE_IDS if n in names), None)
+    ids = data[id_].astype(np.int64) if id_ else np.arange(1, len(points) + 1)
+    none = np.zeros((0, 4), np.int64)
+    return FormedMesh(
+        ids,
+        points * unit.length,
+        none,
+        none[:, 0],
+        np.zeros((0, 4)),
+        nodal=data[t] * unit.length,
+    )
+
+
+def _read_mesh(path: Path, unit: Units) -> FormedMesh:
+    """Quads and triangles of a mesh file with nodal or elemental thickness."""
+    import meshio
+
+    try:
+        mesh = meshio.read(path)
+    except (OSError, ValueError, meshio.ReadError) as error:
+        raise FileError(f"{path} cannot be read as a mesh: {error}") from error
+    cells, t, part = [], [], []
+    for k, block in enumerate(mesh.cells):
+        if block.type in ("quad", "triangle"):
+            nodes = block.data if block.type == "quad" else block.data[:, [0, 1, 2, 2]]
+            cells.append(nodes)
+            t.append(_thickness_of(path, mesh, k, nodes))
+            part.append(_part_of(mesh, k, len(nodes)))
+    if not cells:
+        raise FileError(f"{path} has no quads and no triangles")
+    points = np.column_stack([mesh.points, np.zeros((len(mesh.points), 3 - mesh.points.shape[1]))])
+    return FormedMesh(
+        np.arange(1, len(points) + 1),
+        points * unit.length,
+        np.vstack(cells).astype(np.int64),
+        np.concatenate(part),
+        np.vstack(t) * unit.length,
+    )
+
+
+def _thickness_of(path: Path, mesh: object, block: int, nodes: np.ndarray) -> np.ndarray:
+    """Thickness at the corners of a block of cells (n, 4), in the file's unit."""
+    at_points = {k.lower(): v for k, v in mesh.point_data.items()}  # type: ignore[attr-defined]
+    at_cells = {k.lower(): v for k, v in mesh.cell_data.items()}  # type: ignore[attr-defined]
+    for name in _THICKNESS_NAMES:
+        if name in at_points:
+            return np.asarray(at_points[name], dtype=float).ravel()[nodes]
+        if name in at_cells:
+            return np.repeat(np.asarray(at_cells[name][block], float).reshape(-1, 1), 4, axis=1)
+    known = ", ".join([*at_points, *at_cells]) or "no data at all"
+    raise FileError(f"{path} has no field called thickness; it has {known}")
+
+
+def _part_of(mesh: object, block: int, count: int) -> np.ndarray:
+    data = {k.lower(): v for k, v in mesh.cell_data.items()}  # type: ignore[attr-defined]
+    if "part" in data:
+        return np.asarray(data["part"][block]).astype(np.int64).ravel()
+    return np.ones(count, np.int64)

@@ -1,0 +1,1 @@
+"""Changes to a deck: only the lines that hold what changed."""

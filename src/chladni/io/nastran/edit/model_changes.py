@@ -1,0 +1,238 @@
+"""The changes that turn one assembly's deck into another's: what was repaired, and only that."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from ....errors import ModelError
+from ....model.assembly import Assembly, Shells
+from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, ShellSection
+from ....units import UNITS, Units
+from .. import Add, Deck, Replace, SetColumns, SetField
+from .changes import Change
+from .laminate_changes import laminate_changes, laminated
+
+_MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
+
+
+def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
+    """Edits of the deck: materials, laminates, thickness, masses, springs to ground that differ.
+
+    Raises
+    ------
+    ModelError
+        If the two differ in something no card here can say.
+    """
+    units = units or UNITS["SI"]
+    out: list[Change] = []
+    free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
+    out += _materials(deck, before, after, units, free)
+    out += laminate_changes(deck, before, after, units, free)
+    out += _thickness(deck, before, after, units)
+    cards = [*_masses(before, after, units), *_springs(before, after, units)]
+    if cards:
+        out.append(Add(cards, "put in by the diagnosis"))
+    return out
+
+
+def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]:
+    """(position of the part, field of the section, material) of all that name a material."""
+    stacked = laminated(deck, assembly)
+    for k, part in enumerate(assembly.parts):
+        if k in stacked:
+            continue
+        for name in _MID if isinstance(part.section, ShellSection) else ("material",):
+            if (material := getattr(part.section, name)) is not None:
+                yield k, name, material
+
+
+def _materials(
+    deck: Deck, before: Assembly, after: Assembly, units: Units, free: Iterator[int]
+) -> list[Change]:
+    """Cards of materials changed; where only some users of one changed, a card of their own."""
+    known = {(k, name): m for k, name, m in _uses(deck, before)}
+    users: dict[int, dict[Material, list[tuple[int, str]]]] = {}
+    for k, name, material in _uses(deck, after):
+        if (old := known.get((k, name))) is None:
+            raise ModelError(f"part {after.parts[k].name} has a {name} material the deck has not")
+        kinds = users.setdefault(old.id, {})
+        now = next((m for m in (old, *kinds) if _equal(m, material)), material)
+        kinds.setdefault(now, []).append((k, name))
+    out: list[Change] = []
+    for id, kinds in users.items():
+        for now, at in kinds.items():
+            old = known[at[0]]
+            if now is old:
+                continue
+            if len(kinds) == 1:
+                out += _edited(deck, id, old, now, units)
+                continue
+            new = next(free)
+            out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
+            out += [SetField("PSHELL", after.parts[k].id, _MID[name], new) for k, name in at]
+    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
+    return out + (_axes(deck, before, after) if grain else [])
+
+
+def _equal(a: Material, b: Material) -> bool:
+    """The same numbers."""
+    if isinstance(a, Anisotropic) and isinstance(b, Anisotropic):
+        same = np.array_equal(a.Q, b.Q) and np.array_equal(a.G, b.G)
+        return same and (a.rho, a.damping, a.id) == (b.rho, b.damping, b.id)
+    return a == b
+
+
+def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> list[Change]:
+    """One card's values, or another card in its place."""
+    if isinstance(now, Orthotropic) and isinstance(was, Isotropic):
+        return [Replace("MAT1", id, _card(now, units))]
+    if isinstance(now, Anisotropic) and id in _ids(deck, "MAT2"):
+        return list(_stiffness(id, was, now, units))
+    if type(was) is not type(now) or isinstance(now, Anisotropic):
+        kinds = f"{type(was).__name__} to {type(now).__name__}"
+        raise ModelError(f"{deck.path}: material {id} cannot be changed from {kinds}")
+    return list(_numbers(id, was, now, units))
+
+
+def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Change]:
+    """Fields of MAT1 or MAT8 whose values differ."""
+    names = {"rho": ("RHO", units.density)}
+    if isinstance(now, Isotropic):
+        kind = "MAT1"
+        names |= {"E": ("E", units.stress), "G": ("G", units.stress), "nu": ("NU", 1.0)}
+    else:
+        kind = "MAT8"
+        names |= {k: (k.upper(), units.stress) for k in ("E1", "E2", "G12", "G1z", "G2z")}
+        names["nu12"] = ("NU12", 1.0)
+    for name, (field, unit) in names.items():
+        a, b = getattr(was, name), getattr(now, name)
+        if a is not None and b is not None and not np.isclose(a, b, rtol=1e-9, atol=0):
+            yield SetField(kind, id, field, b / unit)
+
+
+def _stiffness(id: int, was: Material, now: Anisotropic, units: Units) -> Iterator[Change]:
+    """G11 to G33 and RHO of a MAT2."""
+    for i, j in zip(*np.triu_indices(3), strict=True):
+        if not np.isclose(was.plane_stress()[i, j], now.Q[i, j], rtol=1e-9, atol=0):
+            yield SetField("MAT2", id, f"G{i + 1}{j + 1}", float(now.Q[i, j] / units.stress))
+    if not np.isclose(was.rho, now.rho, rtol=1e-9, atol=0):
+        yield SetField("MAT2", id, "RHO", now.rho / units.density)
+
+
+def _card(m: Material, units: Units) -> list[float | int | str | None]:
+    """MAT1 or MAT8."""
+    s, rho = units.stress, m.rho / units.density or None
+    if isinstance(m, Isotropic):
+        G = None if m.G is None else m.G / s
+        return ["MAT1", m.id, m.E / s, G, m.nu, rho, None, None, m.damping or None]
+    if not isinstance(m, Orthotropic):
+        raise ModelError(f"an Anisotropic material {m.id} of some of its parts cannot be changed")
+    moduli: list[float | int | str | None] = [m.E1 / s, m.E2 / s, m.nu12, m.G12 / s]
+    moduli += [m.G1z / s or None, m.G2z / s or None]
+    return ["MAT8", m.id, *moduli, rho, *[None] * 8, m.damping or None]
+
+
+def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
+    """A coordinate system whose x is the grain, named by the shells it turned."""
+    moved = np.flatnonzero(np.any(before.shells.axis != after.shells.axis, axis=1))
+    if not len(moved):
+        return []
+    x = after.shells.axis[moved[0]]
+    x = x / np.linalg.norm(x)
+    z = np.eye(3)[int(np.argmin(np.abs(x)))]
+    z = z - x * (x @ z)
+    z = z / np.linalg.norm(z)
+    cid = 1 + max(
+        (i for kind in deck.cards if kind[:4] == "CORD" for i in _cids(deck, kind)), default=900
+    )
+    out: list[Change] = [Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "grain of the sheet")]
+    for kind, chosen in _by_kind(after.shells, moved):
+        if len(chosen):
+            out += [SetField(kind, int(i), "THETA", cid) for i in after.shells.ids[chosen]]
+    return out
+
+
+def _ids(deck: Deck, kind: str) -> list[int]:
+    if kind not in deck.cards:
+        return []
+    words = deck[kind].words(1).tolist()
+    return [int(w) for w in words if w.isdigit()]
+
+
+def _cids(deck: Deck, kind: str) -> list[int]:
+    """Ids of coordinate systems; a CORD1 card holds two."""
+    second = deck[kind].words(5).tolist() if kind[4] == "1" else []
+    return [*_ids(deck, kind), *(int(w) for w in second if w.isdigit())]
+
+
+def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    tri = shells.triangle[rows]
+    return [("CQUAD4", rows[~tri]), ("CTRIA3", rows[tri])]
+
+
+def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[Change]:
+    """PSHELL T where a whole part scales, T1 to T4 where it does not."""
+    out: list[Change] = []
+    ratio = after.shells.thickness / before.shells.thickness
+    stacked = laminated(deck, before)
+    for k, part in enumerate(after.parts):
+        if k in stacked:
+            continue
+        mine = np.flatnonzero(after.shells.part == k)
+        if not len(mine) or not isinstance(part.section, ShellSection):
+            continue
+        was = before.parts[k].section
+        assert isinstance(was, ShellSection)
+        if np.allclose(ratio[mine], 1, rtol=0, atol=1e-9):
+            continue
+        plain = np.allclose(before.shells.thickness[mine], was.thickness, rtol=1e-9)
+        if plain and np.ptp(ratio[mine]) < 1e-9:
+            t = was.thickness * ratio[mine[0], 0] / units.length
+            out.append(SetField("PSHELL", part.id, "T", float(t)))
+            continue
+        touched = mine[np.abs(ratio[mine] - 1).max(axis=1) > 1e-9]
+        for kind, rows in _by_kind(after.shells, touched):
+            n = 4 if kind == "CQUAD4" else 3
+            if len(rows):
+                fields = tuple(f"T{c + 1}" for c in range(n))
+                t = after.shells.thickness[rows, :n] / units.length
+                out.append(SetColumns(kind, after.shells.ids[rows], fields, t))
+    return out
+
+
+def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CONM2 of every mass that was added, offset where it sits beside its grid."""
+    first = _free_id(after)
+    for k in range(len(before.masses), len(after.masses)):
+        M = after.masses.matrix[k]
+        m = M[0, 0]
+        arm = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m
+        x, y, z = arm
+        T = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+        if not np.allclose(M, m * T.T @ T, rtol=1e-9, atol=1e-9 * m):
+            raise ModelError("a mass with inertia of its own was added; CONM2 here has none")
+        card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.mass]
+        yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
+
+
+def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CELAS2 of every spring that was added."""
+    s, n = after.springs, len(before.springs)
+    first = _free_id(after) + len(after.masses)
+    unit = units.force / units.length
+    for k in range(n, len(s)):
+        grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
+        yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
+
+
+def _free_id(assembly: Assembly) -> int:
+    """An element id above all that are used."""
+    families: list[Any] = [
+        assembly.shells, assembly.beams, assembly.springs, assembly.dampers, assembly.bushes,
+        assembly.masses, assembly.scalar_masses, *assembly.solids,
+    ]  # fmt: skip
+    rigid = max((r.id for r in assembly.rigid), default=0)
+    return 1 + max(rigid, *(int(f.ids.max(initial=0)) for f in families))

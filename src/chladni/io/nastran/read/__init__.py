@@ -1,0 +1,1 @@
+"""From cards to an assembly and to what the deck asks for."""

@@ -1,0 +1,93 @@
+"""Which parts of a model hang together."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ....errors import ModelError
+from ....model.assembly import Assembly, Average, Beams, Equation, RigidBody, Shells, Solids
+
+
+def components(model: Assembly) -> np.ndarray:
+    """Number (n,) of the connected component of every point, over all elements and rigid links.
+
+    The largest (most points) is 0; a point that nothing uses is a component of its own.
+    """
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *_pairs(model)])
+    pairs = pairs[(pairs >= 0).all(axis=1)]
+    n = len(model.ids)
+    graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    order = np.argsort(-np.bincount(label), kind="stable")
+    return np.asarray(np.argsort(order)[label])
+
+
+def _pairs(model: Assembly) -> Iterator[np.ndarray]:
+    """Pairs of points (k, 2) that something joins."""
+    groups = [model.shells.nodes, model.beams.nodes, *(s.nodes for s in model.solids)]
+    for nodes in groups:
+        yield np.concatenate([nodes[:, [0, k]] for k in range(1, nodes.shape[1])])
+    for joints in (model.springs, model.dampers, model.scalar_masses, model.bushes):
+        yield joints.nodes.reshape(-1, 2)
+    star = [(rows[0], r) for rows in map(_tied, model.rigid) for r in rows[1:]]
+    yield np.array(star, np.int64).reshape(-1, 2)
+
+
+def _tied(tie: RigidBody | Average | Equation) -> list[int]:
+    """Points of a rigid link."""
+    if isinstance(tie, Equation):
+        return list(tie.nodes)
+    if isinstance(tie, Average):
+        return [tie.reference, *(t[0] for t in tie.terms), *(m[0] for m in tie.moved)]
+    return [tie.independent, *tie.dependent]
+
+
+def refuse_loose(model: Assembly, source: str) -> None:
+    """Refuse a part of the model that hangs on nothing, by name.
+
+    A component with elements passes if it is the largest such, or is held: by a support, or by
+    a spring to the ground.
+
+    Raises
+    ------
+    ModelError
+        Naming the loose component's parts and one of its grids.
+    """
+    label = components(model)
+    stiff = _with_elements(model, label)
+    if len(stiff) < 2:
+        return
+    held = set(label[model.supports[:, 0]].tolist()) | _grounded(model, label)
+    for number in stiff[1:]:
+        if number not in held:
+            points = np.flatnonzero(label == number)
+            raise ModelError(
+                f"{source}: {_names(model, points)} hangs on nothing: {len(points)} points, "
+                f"grid {model.ids[points[0]]} among them, are joined to neither "
+                f"{_names(model, np.flatnonzero(label == stiff[0]))} nor a support"
+            )
+
+
+def _with_elements(model: Assembly, label: np.ndarray) -> list[int]:
+    """Components that hold shells, solids or beams, the largest first."""
+    groups = [model.shells.nodes, model.beams.nodes, *(s.nodes for s in model.solids)]
+    return sorted({int(k) for nodes in groups for k in np.unique(label[nodes[:, 0]])})
+
+
+def _grounded(model: Assembly, label: np.ndarray) -> set[int]:
+    """Components with a spring or bush whose other end is the ground."""
+    nodes = np.concatenate([model.springs.nodes, model.bushes.nodes])
+    ends = nodes[(nodes < 0).any(axis=1)].max(axis=1, initial=-1)
+    return set(label[ends].tolist())
+
+
+def _names(model: Assembly, points: np.ndarray) -> str:
+    """Names of the parts with elements on these points."""
+    inside = np.zeros(len(model.ids), bool)
+    inside[points] = True
+    families: list[Shells | Beams | Solids] = [model.shells, model.beams, *model.solids]
+    parts = sorted({int(p) for f in families for p in f.part[inside[f.nodes[:, 0]]]})
+    names = [f"part {model.parts[p].name!r}" for p in parts]
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

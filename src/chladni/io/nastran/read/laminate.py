@@ -1,0 +1,78 @@
+"""Classical laminate theory: a PCOMP stack smeared to one section (Jones, chapter 4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....model.properties import Material
+
+
+@dataclass(frozen=True)
+class Ply:
+    """One layer: material, thickness [m], angle from material axis 1 [deg]."""
+
+    material: Material
+    thickness: float
+    angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class Smeared:
+    """Equivalent moduli: Q_m = A/t, Q_b = 12 D/t³, Q_c = B/t², G (2, 2), density."""
+
+    thickness: float
+    membrane: np.ndarray
+    bending: np.ndarray
+    coupling: np.ndarray
+    shear: np.ndarray
+    rho: float
+
+
+def smear(plies: list[Ply]) -> Smeared:
+    """A, B, D = ∫ Q̄ (1, z, z²) dz about the middle of the stack."""
+    t = np.array([ply.thickness for ply in plies])
+    z = np.concatenate([[0], np.cumsum(t)]) - t.sum() / 2
+    Q = np.array([_turned(ply.material.plane_stress(), ply.angle) for ply in plies])
+    A, B, D = (np.einsum("k,kij->ij", np.diff(z**power) / power, Q) for power in (1, 2, 3))
+    T = float(t.sum())
+    rho = float(sum(ply.material.rho * ply.thickness for ply in plies) / T)
+    G = np.diag([_shear_modulus(plies, z, Q[:, k, k], k) for k in (0, 1)])
+    return Smeared(T, A / T, 12 * D / T**3, B / T**2, G, rho)
+
+
+def _turned(Q: np.ndarray, angle: float) -> np.ndarray:
+    """Q̄ = T⁻¹ Q T⁻ᵀ for a ply turned by an angle in degrees (Jones 2.79)."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    T = np.array(
+        [[c * c, s * s, -2 * c * s], [s * s, c * c, 2 * c * s], [c * s, -c * s, c * c - s * s]]
+    )
+    return np.asarray(T @ Q @ T.T)
+
+
+def _transverse(ply: Ply, k: int) -> float:
+    """Transverse shear modulus of a ply along laminate axis k."""
+    c, s = np.cos(np.radians(ply.angle)), np.sin(np.radians(ply.angle))
+    G = ply.material.transverse()
+    return float(G[0, 0] * (c, s)[k] ** 2 + G[1, 1] * (s, c)[k] ** 2)
+
+
+def _shear_modulus(plies: list[Ply], z: np.ndarray, E: np.ndarray, k: int) -> float:
+    """Mean modulus of equal shear energy: 1/(G t) = ∫ g²/G dz / D², g = -∫ E (z - z̄) dz.
+
+    The parabolic shear stress of each ply in cylindrical bending (MSC Nastran Quick Reference,
+    PCOMP remarks); a ply without transverse modulus counts as rigid in shear.
+    """
+    t = np.diff(z)
+    neutral = (E * np.diff(z**2) / 2).sum() / (E * t).sum()
+    D = (E * np.diff((z - neutral) ** 3) / 3).sum()
+    flexibility, g0 = 0.0, 0.0
+    points, weights = np.polynomial.legendre.leggauss(3)
+    for j, ply in enumerate(plies):
+        a, b = z[j] - neutral, z[j + 1] - neutral
+        x = (a + b) / 2 + (b - a) / 2 * points
+        g = g0 - E[j] * (x**2 - a**2) / 2
+        G = _transverse(ply, k)
+        if G > 0:
+            flexibility += (b - a) / 2 * (weights @ g**2) / G
+        g0 -= E[j] * (b**2 - a**2) / 2
+    return float(D**2 / flexibility / t.sum()) if flexibility > 0 else 0.0

@@ -1,0 +1,229 @@
+"""Shell elements: corners, thickness, material direction, offset."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ....model.assembly import Shells, Solids
+from ....model.properties import ShellSection
+from ..text.table import Cards
+from .context import Context
+from .sections import Parts
+
+_QUADS = ("CQUAD4", "CQUADR", "CQUAD1", "CQUAD2")
+_TRIANGLES = ("CTRIA3", "CTRIAR", "CTRIA1", "CTRIA2")
+NORMAL = 1e-6  # length of what is left of a unit vector laid on an element: it stands normal to it
+
+
+def shells(ctx: Context, parts: Parts) -> Shells:
+    """All shells, quadrilaterals first."""
+    found = [_quads(ctx, parts, c) for c in ctx.deck.present(*_QUADS)]
+    found += [_triangles(ctx, parts, c) for c in ctx.deck.present(*_TRIANGLES)]
+    if not found:
+        return Shells()
+    names = ("ids", "nodes", "part", "thickness", "axis", "offset")
+    return Shells(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+
+
+def _quads(ctx: Context, parts: Parts, cards: Cards) -> Shells:
+    nodes = ctx.rows(cards, cards.ids(3, 4))
+    legacy = cards.name in ("CQUAD1", "CQUAD2")
+    return _made(ctx, parts, cards, nodes, 7, None if legacy else 8, None if legacy else 10)
+
+
+def _triangles(ctx: Context, parts: Parts, cards: Cards) -> Shells:
+    nodes = ctx.rows(cards, cards.ids(3, 3))
+    nodes = nodes[:, [0, 1, 2, 2]]
+    legacy = cards.name in ("CTRIA1", "CTRIA2")
+    return _made(ctx, parts, cards, nodes, 6, None if legacy else 7, None if legacy else 10)
+
+
+def _made(
+    ctx: Context,
+    parts: Parts,
+    cards: Cards,
+    nodes: np.ndarray,
+    theta: int,
+    zoffs: int | None,
+    tflag: int | None,
+) -> Shells:
+    """Elements of one kind; the fields that hold THETA, ZOFFS and TFLAG."""
+    X = ctx.places[nodes]
+    corners = 3 if cards.name in _TRIANGLES else 4
+    normal = _normals(ctx, cards, nodes[:, :corners])
+    pid = cards.integers(2)
+    pid = np.where(pid == 0, cards.integers(1), pid)
+    part = parts.of("shell", cards, pid)
+    offset = np.zeros(len(cards)) if zoffs is None else cards.reals(zoffs, 0.0) * ctx.scale.length
+    return Shells(
+        cards.integers(1),
+        nodes,
+        part,
+        _thickness(ctx, parts, cards, part, tflag, corners),
+        _axis(ctx, cards, X, normal, theta),
+        offset + np.array(parts.shift)[part],
+    )
+
+
+def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 3) of faces (n, 3 or 4); coincident corners and zero area are refused."""
+    X = ctx.places[corners]
+    same = (np.diff(np.sort(corners, axis=1), axis=1) == 0).any(axis=1)
+    if np.any(same):
+        i = int(np.argmax(same))
+        raise cards.refuse(i, f"a corner is named twice, grids {ctx.ids[corners[i]].tolist()}")
+    first, second = ((0, 2), (1, 3)) if corners.shape[1] == 4 else ((0, 1), (0, 2))
+    d1, d2 = (X[:, b] - X[:, a] for a, b in (first, second))
+    normal = np.cross(d1, d2)
+    size = np.linalg.norm(normal, axis=1)
+    span = np.ptp(X, axis=1).max(axis=1)
+    flat = ~(size > 1e-10 * span**2) | ~np.isfinite(size)
+    sides = np.linalg.norm(X - np.roll(X, -1, axis=1), axis=2)
+    flat |= (sides < 1e-9 * span[:, None]).any(axis=1)
+    if np.any(flat):
+        i = int(np.argmax(flat))
+        raise cards.refuse(i, f"its area is zero; grids {ctx.ids[corners[i]].tolist()}")
+    return np.asarray(normal / size[:, None])
+
+
+def _thickness(
+    ctx: Context, parts: Parts, cards: Cards, part: np.ndarray, tflag: int | None, corners: int
+) -> np.ndarray:
+    """Corner thickness (n, 4): Ti, or T of the property; TFLAG 1: Ti are fractions of T."""
+    nominal = np.array([getattr(p.section, "thickness", np.nan) for p in parts.made])[part]
+    if tflag is None:
+        return np.repeat(nominal[:, None], 4, axis=1)
+    own = cards.block(tflag + 1, corners, np.nan)
+    laminate = np.isin(part, [k for k, p in enumerate(parts.made) if _smeared(p.section)])
+    own[laminate] = np.nan
+    fraction = (cards.integers(tflag, 0) == 1)[:, None]
+    own = np.where(fraction, own * nominal[:, None], own * ctx.scale.length)
+    t = np.where(np.isnan(own), nominal[:, None], own)
+    if np.any(bad := ~(t.mean(axis=1) > 0) | (t < 0).any(axis=1)):
+        i = int(np.argmax(bad))
+        missing = np.isnan(t[i]).any()
+        why = (
+            "neither it nor its property gives a thickness" if missing else "its thickness is zero"
+        )
+        raise cards.refuse(i, why)
+    return t if corners == 4 else t[:, [0, 1, 2, 2]]
+
+
+def _smeared(section: object) -> bool:
+    """True for a laminate, whose thickness the elements cannot change."""
+    shear = getattr(section, "shear", None)
+    return getattr(section, "shear_ratio", 0) == 1.0 and hasattr(shear, "Q")
+
+
+def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int) -> np.ndarray:
+    """Material axis 1 (n, 3): THETA from side G1-G2, or x of system MCID, laid on the element."""
+    words, system = cards.words(k), _by_system(cards, k)
+    side = X[:, 1] - X[:, 0]
+    side = side - np.einsum("ni,ni->n", side, normal)[:, None] * normal
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    if np.all(system | (words == b"")):
+        axis = side
+    else:
+        angle = np.zeros(len(cards))
+        angle[~system] = np.radians(cards.take(~system).reals(k, 0.0))
+        across = np.cross(normal, side)
+        axis = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * across
+    if np.any(system):
+        axis = axis.copy()
+        axis[system] = _from_systems(ctx, cards.take(system), X[system], normal[system], k)
+    return np.asarray(axis)
+
+
+def _by_system(cards: Cards, k: int) -> np.ndarray:
+    """(n,) bool, True where field k is an integer: MCID, not THETA."""
+    return np.array([w.isdigit() for w in cards.words(k).tolist()], bool)
+
+
+def _from_systems(
+    ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int
+) -> np.ndarray:
+    """Axis x (or radial) of coordinate systems at element centres, laid on the elements (n, 3).
+
+    Where x is normal to the element, y (which then lies in it) takes its place.
+    """
+    flat, size = _laid(ctx, cards, X, normal, k)
+    first = np.where(size[:, 0] < NORMAL, 1, 0)
+    at = np.arange(len(cards))
+    return np.asarray(flat[at, first] / size[at, first, None])
+
+
+def _laid(
+    ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Axes x and y of each element's system without their normal part (n, 2, 3), their lengths."""
+    cid, centre = cards.integers(k), X.mean(axis=1)
+    axes = np.zeros((len(cards), 2, 3))
+    for c in np.unique(cid):
+        mine = np.flatnonzero(cid == c)
+        frame = ctx.frames.get(int(c), cards, int(mine[0]))
+        axes[mine] = frame.at(centre[mine])[:, :2]
+    flat = axes - np.einsum("nai,ni->na", axes, normal)[..., None] * normal[:, None]
+    return flat, np.linalg.norm(flat, axis=2)
+
+
+def second_axes(ctx: Context) -> Iterator[str]:
+    """Shells whose material axis 1 is y of their MCID, one sentence a kind of card."""
+    for names, corners in ((_QUADS, 4), (_TRIANGLES, 3)):
+        for every in ctx.deck.present(*names):
+            k = corners + 3
+            cards = every.take(_by_system(every, k))
+            if not len(cards):
+                continue
+            nodes = ctx.rows(cards, cards.ids(3, corners))
+            _, size = _laid(ctx, cards, ctx.places[nodes], _normals(ctx, cards, nodes), k)
+            if len(found := np.flatnonzero(size[:, 0] < NORMAL)):
+                i = int(found[0])
+                yield (
+                    f"{cards.where(i)}: {cards.name} {cards.integers(1)[i]} and "
+                    f"{len(found) - 1} others lie across x of their MCID; "
+                    "its y is their material axis 1"
+                )
+
+
+def filled_thickness(parts: Parts, shells: Shells) -> None:
+    """A property without T gets the mean of its elements' corner thicknesses."""
+    for k, part in enumerate(parts.made):
+        if isinstance(part.section, ShellSection) and np.isnan(part.section.thickness):
+            mean = float(shells.thickness[shells.part == k].mean())
+            parts.made[k] = part.with_section(thickness=mean)
+
+
+_SOLIDS = {"CHEXA": 8, "CPENTA": 6, "CTETRA": 4}
+
+
+def solids(ctx: Context, parts: Parts) -> tuple[Solids, ...]:
+    """Solids by kind; those with nodes on their edges are refused."""
+    out = []
+    for name, count in _SOLIDS.items():
+        for cards in ctx.deck.present(name):
+            more = [cards.words(k) != b"" for k in range(count + 3, cards.width() + 1)]
+            if more and np.any(many := np.any(more, axis=0)):
+                i = int(np.argmax(many))
+                raise cards.refuse(
+                    i, f"has more than {count} nodes; mid-side nodes are not supported"
+                )
+            nodes = ctx.rows(cards, cards.ids(3, count))
+            _check_solid(ctx, cards, nodes)
+            part = parts.of("solid", cards, cards.integers(2))
+            out.append(Solids(cards.integers(1), nodes, part))
+    return tuple(out)
+
+
+def _check_solid(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
+    """Refuse a node named twice and a body without volume."""
+    same = (np.diff(np.sort(nodes, axis=1), axis=1) == 0).any(axis=1)
+    if np.any(same):
+        i = int(np.argmax(same))
+        raise cards.refuse(i, f"a node is named twice, grids {ctx.ids[nodes[i]].tolist()}")
+    X = ctx.places[nodes]
+    span = np.ptp(X, axis=1).max(axis=1)
+    spread = X - X.mean(axis=1)[:, None]
+    thin = np.linalg.svd(spread, compute_uv=False)[:, 2]
+    if np.any(bad := ~(thin > 1e-9 * span)):
+        i = int(np.argmax(bad))
+        raise cards.refuse(i, f"its volume is zero; grids {ctx.ids[nodes[i]].tolist()}")

@@ -1,0 +1,328 @@
+"""Springs, dampers, scalar masses, bushes, concentrated masses."""
+
+import numpy as np
+
+from ....model.assembly import Bushes, Masses, Scalars
+from ..text.table import Cards
+from .context import Context, Scale
+
+Values = dict[int, tuple[float, float]]
+
+
+def _work(scale: Scale, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
+    """Unit of length per unit of each dof: the scale of a translation, 1 for a rotation."""
+    return np.where((component > 3) & ~scalar, 1.0, scale.length)
+
+
+def _pairs(ctx: Context, names: tuple[str, ...], unit: float, damped: bool) -> list[Scalars]:
+    """Scalar elements: name1 with a property, 2 with its value, 3 and 4 between scalar points."""
+    out = []
+    for k, name in enumerate(names):
+        for cards in ctx.deck.present(name):
+            value, loss = _values(ctx, cards, k, damped)
+            ends = _ends(ctx, cards, points_only=k > 1)
+            out.append(_scalars(ctx, cards, ends, value * unit, loss))
+    return out
+
+
+def _ends(
+    ctx: Context, cards: Cards, points_only: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(rows (n, 2), components (n, 2), is a scalar point (n, 2)); a blank grid is the ground."""
+    first = (3, 4) if points_only else (3, 5)
+    nodes = np.stack([ctx.rows(cards, cards.integers(k, 0), ground=True) for k in first], axis=1)
+    scalar = (nodes >= 0) & ctx.scalar[nodes]
+    component = np.ones_like(nodes)
+    if not points_only:
+        component = np.stack([cards.integers(k, 0) for k in (4, 6)], axis=1)
+        component = np.where(scalar | (nodes < 0), np.maximum(component, 1), component)
+    if np.any(bad := ((component < 1) | (component > 6)).any(axis=1)):
+        raise cards.refuse(int(np.argmax(bad)), "a component is not one of 1 to 6")
+    if np.any(bad := (nodes < 0).all(axis=1)):
+        raise cards.refuse(int(np.argmax(bad)), "both ends are blank; it joins nothing")
+    return nodes, component, scalar
+
+
+def _scalars(
+    ctx: Context,
+    cards: Cards,
+    ends: tuple[np.ndarray, np.ndarray, np.ndarray],
+    value: np.ndarray,
+    loss: np.ndarray,
+) -> Scalars:
+    """K u_a u_b is work: the unit of K depends on what the two dofs are."""
+    nodes, component, scalar = ends
+    unit = _work(ctx.scale, component, scalar)
+    unit = np.where(nodes < 0, unit[:, ::-1], unit)
+    return Scalars(cards.integers(1), nodes, component, value / (unit[:, 0] * unit[:, 1]), loss)
+
+
+def _values(ctx: Context, cards: Cards, k: int, damped: bool) -> tuple[np.ndarray, np.ndarray]:
+    """(value, loss factor) of each element, from its card (kinds 2, 4) or its property."""
+    if k % 2:
+        loss = cards.reals(7, 0.0) if damped and k == 1 else np.zeros(len(cards))
+        return cards.reals(2), loss
+    known = _properties(ctx, "P" + cards.name[1:-1])
+    pid = cards.integers(2, 0)
+    pid = np.where(pid == 0, cards.integers(1), pid)
+    for i, p in enumerate(pid.tolist()):
+        if p not in known:
+            there = ", ".join(map(str, sorted(known)[:8])) or "none"
+            raise cards.refuse(i, f"there is no P{cards.name[1:-1]} {p}; there are {there}")
+    found = np.array([known[p] for p in pid.tolist()])
+    return found[:, 0], found[:, 1] if damped else np.zeros(len(cards))
+
+
+def _properties(ctx: Context, name: str) -> Values:
+    """PELAS, PDAMP, PMASS: several on a card."""
+    step = 4 if name == "PELAS" else 2
+    out: Values = {}
+    for cards in ctx.deck.present(name):
+        for k in range(1, cards.width() + 1, step):
+            has = np.flatnonzero(cards.words(k) != b"")
+            some = cards.take(has)
+            loss = some.reals(k + 2, 0.0) if step == 4 else np.zeros(len(has))
+            triple = zip(some.integers(k).tolist(), some.reals(k + 1), loss, strict=True)
+            for i, (pid, value, g) in enumerate(triple):
+                if pid in out:
+                    raise some.refuse(i, f"the id {pid} is already taken")
+                out[pid] = (float(value), float(g))
+    return out
+
+
+def _joined(found: list[Scalars]) -> Scalars:
+    if not found:
+        return Scalars()
+    names = ("ids", "nodes", "component", "value", "damping")
+    return Scalars(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+
+
+def springs(ctx: Context) -> Scalars:
+    """CELAS1 to CELAS4."""
+    s = ctx.scale
+    names = ("CELAS1", "CELAS2", "CELAS3", "CELAS4")
+    return _joined(_pairs(ctx, names, s.force * s.length, damped=True))
+
+
+def dampers(ctx: Context) -> Scalars:
+    """CDAMP1 to CDAMP4."""
+    s = ctx.scale
+    names = ("CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4")
+    return _joined(_pairs(ctx, names, s.force * s.length * s.time, damped=False))
+
+
+def scalar_masses(ctx: Context) -> Scalars:
+    """CMASS1 to CMASS4."""
+    s = ctx.scale
+    names = ("CMASS1", "CMASS2", "CMASS3", "CMASS4")
+    return _joined(_pairs(ctx, names, s.inertia * s.length**2, damped=False))
+
+
+def masses(ctx: Context) -> Masses:
+    """CONM1 and CONM2."""
+    found = [_conm2(ctx, c) for c in ctx.deck.present("CONM2")]
+    found += [_conm1(ctx, c) for c in ctx.deck.present("CONM1")]
+    if not found:
+        return Masses()
+    names = ("ids", "node", "matrix")
+    return Masses(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+
+
+def skew(x: np.ndarray) -> np.ndarray:
+    """[x]× (n, 3, 3): [x]× v = x × v."""
+    zero = np.zeros(len(x))
+    rows = [[zero, -x[:, 2], x[:, 1]], [x[:, 2], zero, -x[:, 0]], [-x[:, 1], x[:, 0], zero]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def point_mass(m: np.ndarray, x: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """M = [[m 1, -m [x]×], [m [x]×, I - m [x]×²]] of masses off their nodes (n, 6, 6)."""
+    M = np.zeros((len(m), 6, 6))
+    X = skew(x)
+    M[:, :3, :3] = m[:, None, None] * np.eye(3)
+    M[:, 3:, :3] = m[:, None, None] * X
+    M[:, :3, 3:] = -m[:, None, None] * X
+    M[:, 3:, 3:] = inertia - m[:, None, None] * (X @ X)
+    return M
+
+
+def _mass_frames(ctx: Context, cards: Cards, node: np.ndarray, cid: np.ndarray) -> np.ndarray:
+    """Unit vectors (n, 3, 3) of each mass's system at its node; -1 is basic."""
+    out = np.broadcast_to(np.eye(3), (len(cid), 3, 3)).copy()
+    for c in np.unique(cid[cid > 0]):
+        mine = np.flatnonzero(cid == c)
+        frame = ctx.frames.get(int(c), cards, int(mine[0]))
+        out[mine] = frame.at(ctx.places[node[mine]])
+    return out
+
+
+def _conm2(ctx: Context, cards: Cards) -> Masses:
+    """CONM2: mass, offset X in system CID (-1: X is the place itself), inertia about the mass."""
+    node = ctx.rows(cards, cards.integers(2))
+    _no_scalar(ctx, cards, node)
+    cid = cards.integers(3, 0)
+    T, L = _mass_frames(ctx, cards, node, cid), ctx.scale.length
+    m, x = cards.reals(4, 0.0) * ctx.scale.inertia, cards.block(5, 3, 0.0)
+    if np.any(m < 0):
+        raise cards.refuse(int(np.argmax(m < 0)), "the mass is negative")
+    x = np.where((cid == -1)[:, None], x - ctx.places[node], x) * L
+    I11, I21, I22, I31, I32, I33 = cards.block(9, 6, 0.0).T * ctx.scale.inertia * L**2
+    rows = [[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]]
+    inertia = np.moveaxis(np.array(rows), 2, 0)
+    x = np.einsum("ni,nij->nj", x, T)
+    inertia = np.einsum("nia,nij,njb->nab", T, inertia, T)
+    return Masses(cards.integers(1), node, point_mass(m, x, inertia))
+
+
+def _conm1(ctx: Context, cards: Cards) -> Masses:
+    """CONM1: the 6 x 6 matrix itself, lower triangle row by row, in system CID."""
+    node = ctx.rows(cards, cards.integers(2))
+    _no_scalar(ctx, cards, node)
+    T = _mass_frames(ctx, cards, node, cards.integers(3, 0))
+    M = np.zeros((len(cards), 6, 6))
+    i, j = np.tril_indices(6)
+    M[:, i, j] = M[:, j, i] = cards.block(4, 21, 0.0) * ctx.scale.inertia
+    unit = np.array([1.0] * 3 + [ctx.scale.length] * 3)
+    M *= unit[:, None] * unit
+    R = np.zeros((len(cards), 6, 6))
+    R[:, :3, :3] = R[:, 3:, 3:] = T
+    return Masses(cards.integers(1), node, np.einsum("nia,nij,njb->nab", R, M, R))
+
+
+def _no_scalar(ctx: Context, cards: Cards, node: np.ndarray) -> None:
+    if np.any(bad := ctx.scalar[node]):
+        i = int(np.argmax(bad))
+        raise cards.refuse(i, f"{ctx.ids[node[i]]} is a scalar point, which has no six dofs")
+
+
+def bushes(ctx: Context) -> Bushes:
+    """CBUSH with PBUSH, CVISC with PVISC."""
+    found = [_cbush(ctx, c) for c in ctx.deck.present("CBUSH")]
+    found += [_cvisc(ctx, c) for c in ctx.deck.present("CVISC")]
+    if not found:
+        return Bushes()
+    names = ("ids", "nodes", "frame", "place", "stiffness", "viscous", "loss")
+    return Bushes(*(np.concatenate([getattr(f, name) for f in found]) for name in names))
+
+
+def _pbush(ctx: Context) -> dict[int, dict[str, np.ndarray]]:
+    """{PID: {"K": (6,), "B": (6,), "GE": (6,)}} as the cards have them, keys in any order."""
+    out: dict[int, dict[str, np.ndarray]] = {}
+    for cards in ctx.deck.present("PBUSH"):
+        for i, pid in enumerate(cards.unique()):
+            card = cards.single(i)
+            words = card.fields(0)
+            out[int(pid)] = rows = {}
+            for k in range(2, len(words) + 1, 8):
+                key = words[k - 1]
+                if key not in ("K", "B", "GE", "RCV", "M", "T", "", "ALPHA", "TREF", "COINL"):
+                    raise card.refuse(0, f"{key!r} is not one of K, B, GE, RCV, M")
+                if key in ("K", "B", "GE"):
+                    rows[key] = _stiffest(card, k)
+            if "GE" in rows and np.count_nonzero(rows["GE"]) == 1 and rows["GE"][0]:
+                rows["GE"] = np.full(6, rows["GE"][0])  # GE1 alone stands for all
+    return out
+
+
+def _stiffest(card: Cards, k: int) -> np.ndarray:
+    """Six values after a key; RIGID counts as a very stiff spring."""
+    words = [card.words(k + j)[0] for j in range(1, 7)]
+    if b"RIGID" in words:
+        raise card.refuse(0, "RIGID is not supported; give the stiffness as a number")
+    return card.block(k + 1, 6, 0.0)[0]
+
+
+def _cbush(ctx: Context, cards: Cards) -> Bushes:
+    known, s = _pbush(ctx), ctx.scale
+    pid = cards.integers(2, 0)
+    pid = np.where(pid == 0, cards.integers(1), pid)
+    if missing := [i for i, p in enumerate(pid.tolist()) if p not in known]:
+        there = ", ".join(map(str, sorted(known)[:8])) or "none"
+        raise cards.refuse(missing[0], f"there is no PBUSH {pid[missing[0]]}; there are {there}")
+    first = ctx.rows(cards, cards.integers(3))
+    second = ctx.rows(cards, cards.integers(4, 0), ground=True)
+    nodes = np.stack([first, second], axis=1)
+    work = np.array([s.force / s.length] * 3 + [s.force * s.length] * 3)
+    K, B, GE = (
+        np.array([known[p].get(key, np.zeros(6)) for p in pid.tolist()]) for key in ("K", "B", "GE")
+    )
+    frame = np.array([_bush_frame(ctx, cards, i, nodes[i], K[i] + B[i]) for i in range(len(cards))])
+    place = _bush_place(ctx, cards, nodes) * s.length
+    return Bushes(cards.integers(1), nodes, frame, place, K * work, B * work * s.time, GE)
+
+
+def _bush_frame(
+    ctx: Context, cards: Cards, i: int, nodes: np.ndarray, used: np.ndarray
+) -> np.ndarray:
+    """Element frame: system CID, else x from end to end and y towards v (or G0)."""
+    here, words = ctx.places[nodes[0]], [cards.word(i, k) for k in (5, 6, 7, 8)]
+    if words[3]:
+        return ctx.system_at(cards, i, cards.integer(i, 8), here)
+    along = np.zeros(3) if nodes[1] < 0 else ctx.places[nodes[1]] - here
+    if np.linalg.norm(along) * ctx.scale.length < 1e-12 or nodes[1] < 0:
+        along = np.zeros(3)
+    v = _direction(ctx, cards, i, nodes[0], words)
+    if not np.any(along):
+        if v is None or words[0].isdigit():
+            if np.ptp(used[:3]) == 0 and np.ptp(used[3:]) == 0:
+                return np.eye(3)  # the same in every frame
+            raise cards.refuse(i, "its ends coincide, so it needs a coordinate system CID")
+        along, v = v, None
+    if v is None:
+        if np.any(used[[1, 2, 4, 5]]) and not np.any(words[:3]) and nodes[1] >= 0:
+            raise cards.refuse(i, "it has lateral stiffness but neither orientation nor CID")
+        v = np.eye(3)[np.argmin(np.abs(along))]
+    z = np.cross(along, v)
+    if not np.linalg.norm(z) > 1e-9 * np.linalg.norm(along) * np.linalg.norm(v):
+        raise cards.refuse(i, "its orientation vector is along its axis or zero")
+    frame = np.array([along, np.cross(z, along), z])
+    return np.asarray(frame / np.linalg.norm(frame, axis=1)[:, None])
+
+
+def _direction(
+    ctx: Context, cards: Cards, i: int, node: int, words: list[str]
+) -> np.ndarray | None:
+    """Orientation vector of a bush in the basic frame; None where none is given."""
+    if not any(words[:3]):
+        return None
+    if words[0].isdigit() and not words[1] and not words[2]:
+        return np.asarray(ctx.places[ctx.row(cards, i, int(words[0]))] - ctx.places[node])
+    return np.asarray(cards.single(i).block(5, 3, 0.0)[0] @ ctx.frame_at(node))
+
+
+def _bush_place(ctx: Context, cards: Cards, nodes: np.ndarray) -> np.ndarray:
+    """Where the spring sits: at the fraction S from A to B, or at S1-S3 in system OCID."""
+    A = ctx.places[nodes[:, 0]]
+    B = np.where((nodes[:, 1] < 0)[:, None], A, ctx.places[nodes[:, 1]])
+    s, ocid = cards.reals(9, 0.5), cards.integers(10, -1)
+    place = A + s[:, None] * (B - A)
+    for i in np.flatnonzero(ocid >= 0):
+        one = cards.single(int(i))
+        frame = ctx.frames.get(int(ocid[i]), cards, int(i))
+        place[i] = frame.place(one.block(11, 3, 0.0))[0]
+    return place
+
+
+def _cvisc(ctx: Context, cards: Cards) -> Bushes:
+    """CVISC: an axial and a torsional dashpot from end to end."""
+    pvisc = ctx.deck["PVISC"]
+    known = {int(p): i for i, p in enumerate(pvisc.unique())}
+    rates = np.stack([pvisc.reals(2, 0.0), pvisc.reals(3, 0.0)], axis=1)
+    nodes = ctx.rows(cards, cards.ids(3, 2))
+    X, s, n = ctx.places[nodes], ctx.scale, len(cards)
+    viscous, frames = np.zeros((n, 6)), np.zeros((n, 3, 3))
+    for i, pid in enumerate(cards.integers(2).tolist()):
+        if pid not in known:
+            raise cards.refuse(i, f"there is no PVISC {pid}")
+        viscous[i, [0, 3]] = rates[known[pid]]
+        x = X[i, 1] - X[i, 0]
+        if not np.any(x):
+            raise cards.refuse(i, "its length is zero")
+        z = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
+        frame = np.array([x, np.cross(z, x), z])
+        frames[i] = frame / np.linalg.norm(frame, axis=1)[:, None]
+    work = np.array([s.force / s.length] * 3 + [s.force * s.length] * 3) * s.time
+    none = np.zeros((n, 6))
+    return Bushes(
+        cards.integers(1), nodes, frames, X.mean(axis=1) * s.length, none, viscous * work, none
+    )

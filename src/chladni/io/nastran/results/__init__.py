@@ -1,0 +1,1 @@
+"""Punch and OP2 files."""

@@ -1,0 +1,1 @@
+"""A deck as text: its files, lines, cards and fields, read without loss."""

@@ -1,0 +1,1 @@
+"""Tables in and out: FRFs, poles, sensors."""

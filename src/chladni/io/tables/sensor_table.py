@@ -1,0 +1,98 @@
+"""The table of sensors and exciters: where each sits, which way it points, what it weighs (SI)."""
+
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from ...dofs import COMPONENTS
+from ...ema.setup import Role, Sensor
+from ...errors import FileError
+from .read_tables import Table, read_table
+
+_OPTIONAL = (
+    *("grid", "x", "y", "z", "direction", "nx", "ny", "nz"),
+    *("role", "mass", "position_sd"),
+)
+
+
+def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
+    """Sensors and exciters from CSV; the grammar is that of DESIGN §7.
+
+    A row without grid and place sits at the node of its label; one without direction points as
+    its label says.
+    """
+    table = read_table(Path(path), ("label",), _OPTIONAL)
+    sensors = tuple(_sensor(table, k) for k in range(len(table.line)))
+    seen: dict[tuple[str, str], int] = {}
+    for k, sensor in enumerate(sensors):
+        if (key := (sensor.label, sensor.role)) in seen:
+            raise FileError(
+                f"{table.path.name}, line {table.line[k]}: {sensor.role} {sensor.label} is "
+                f"already in line {seen[key]}"
+            )
+        seen[key] = table.line[k]
+    return sensors
+
+
+def _sensor(table: Table, k: int) -> Sensor:
+    where = f"{table.path.name}, line {table.line[k]}"
+    cell = {name: column[k] for name, column in table.columns.items()}
+    number = lambda name, empty: table.number(name, k, empty) if name in table else empty  # noqa: E731
+    label = cell["label"]
+    role = cell.get("role", "").lower() or "output"
+    if role not in get_args(Role):
+        raise FileError(f"{where}: role {role!r}; there are output and input")
+    xyz = np.array([number(c, np.nan) for c in "xyz"])
+    normal = np.array([number(c, np.nan) for c in ("nx", "ny", "nz")])
+    grid = number("grid", np.nan)
+    if np.isnan(xyz).any() and not np.isnan(xyz).all():
+        raise FileError(f"{where}: a place needs x, y and z")
+    if np.isfinite(grid) and np.isfinite(xyz).all():
+        raise FileError(f"{where}: both a grid and a place x, y, z; one of them decides")
+    mass, sd = number("mass", 0.0), number("position_sd", 0.0)
+    if mass < 0 or sd < 0:
+        raise FileError(f"{where}: mass {mass:g} kg and position_sd {sd:g} m cannot be negative")
+    given = normal if np.isfinite(normal).any() else cell.get("direction", "")
+    place = xyz if np.isfinite(xyz).all() else None
+    if np.isnan(grid) and place is None:
+        grid = _node(label, where)
+    return Sensor(
+        label=label,
+        grid=int(grid) if np.isfinite(grid) else None,
+        place=place,
+        direction=direction(given if isinstance(given, np.ndarray) else given or label, where),
+        role=role,  # type: ignore[arg-type]
+        mass=mass,
+        position_sd=sd,
+    )
+
+
+def _node(label: str, where: str) -> float:
+    node = label.partition(":")[0]
+    if node == "base":
+        return np.nan
+    if not node.isdigit():
+        raise FileError(f"{where}: {label!r} names no node; give a grid or x, y, z")
+    return float(node)
+
+
+def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
+    """Unit vector of '+Z', '-X', '412:+Z' or of three numbers; None for 'n', the normal.
+
+    >>> direction("3:-X", "here")
+    array([-1.,  0.,  0.])
+    """
+    if isinstance(text, np.ndarray):
+        length = float(np.linalg.norm(text))
+        if not np.isfinite(length) or length == 0:
+            raise FileError(f"{where}: nx, ny, nz = {text.tolist()} is no direction")
+        return np.asarray(text / length)
+    way = text.rpartition(":")[2].strip().upper()
+    if way == "N":
+        return None
+    sign = -1.0 if way.startswith("-") else 1.0
+    axis = way.lstrip("+-")
+    if axis not in COMPONENTS[:3]:
+        raise FileError(f"{where}: direction {text!r}; write +X, -X, +Y, -Y, +Z, -Z or n")
+    return np.asarray(sign * np.eye(3)[COMPONENTS.index(axis)])

@@ -1,0 +1,68 @@
+"""Recordings as tables out: what `tables` reads, every digit kept."""
+
+import csv
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from ...dynamics.frf import FRF
+from ...ema.setup import Poles
+
+
+def write_npz(path: str | Path, frf: FRF) -> None:
+    """FRF as NPZ (the arrays `read_npz` takes)."""
+    arrays: dict[str, Any] = dict(
+        frequency_hz=frf.frequency,
+        values=frf.values,
+        outputs=np.array(frf.outputs),
+        inputs=np.array(frf.inputs),
+        quantity=np.array(frf.quantity),
+    )
+    for name in ("coherence", "variance"):
+        if getattr(frf, name) is not None:
+            arrays[name] = getattr(frf, name)
+    _replace(path, "wb", lambda file: np.savez_compressed(file, **arrays))
+
+
+def write_csv(path: str | Path, frf: FRF) -> None:
+    """FRF as CSV, one row per line and channel, every digit kept."""
+    extra = [name for name in ("coherence", "variance") if getattr(frf, name) is not None]
+
+    def rows(file: IO) -> None:
+        writer = csv.writer(file)
+        writer.writerow(["frequency_hz", "output", "input", "real", "imag", *extra])
+        for j, input in enumerate(frf.inputs):
+            for i, output in enumerate(frf.outputs):
+                columns = [frf.values[:, i, j].real, frf.values[:, i, j].imag]
+                columns += [getattr(frf, name)[:, i, j] for name in extra]
+                for f, *row in zip(frf.frequency, *columns, strict=True):
+                    writer.writerow([repr(float(f)), output, input, *(repr(float(v)) for v in row)])
+
+    _replace(path, "w", rows)
+
+
+def write_poles(path: str | Path, poles: Poles) -> None:
+    """Poles as CSV; what is unknown stays an empty cell."""
+
+    def rows(file: IO) -> None:
+        writer = csv.writer(file)
+        writer.writerow(["mode", "frequency_hz", "frequency_sd_hz", "damping", "state"])
+        text = lambda v: "" if np.isnan(v) else repr(float(v))  # noqa: E731
+        table = (poles.mode, poles.frequency, poles.frequency_sd, poles.damping, poles.state)
+        for mode, f, sd, zeta, state in zip(*table, strict=True):
+            writer.writerow([int(mode), repr(float(f)), text(sd), text(zeta), state])
+
+    _replace(path, "w", rows)
+
+
+def _replace(path: str | Path, mode: str, write: Callable[[IO], object]) -> None:
+    """Write beside the file and move into place, so that no half file is ever found."""
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    text: dict[str, Any] = {} if "b" in mode else {"encoding": "utf-8", "newline": ""}
+    with partial.open(mode, **text) as file:
+        write(file)
+    os.replace(partial, path)

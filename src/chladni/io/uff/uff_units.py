@@ -1,0 +1,118 @@
+"""What the numbers of a universal file mean: unit systems (dataset 164), labels, quantities."""
+
+import re
+from dataclasses import dataclass
+
+from ...errors import FileError
+
+# code of dataset 164: (metre per file length, newton per file force)
+_POUND, _KILOGRAM_FORCE = 4.4482216152605, 9.80665
+_SYSTEMS = {
+    1: (1.0, 1.0),
+    2: (0.3048, _POUND),
+    3: (1.0, _KILOGRAM_FORCE),
+    4: (0.3048, 0.138254954376),  # poundal
+    5: (1e-3, 1e-3),
+    6: (1e-2, 1e-2),
+    7: (0.0254, _POUND),
+    8: (1e-3, _KILOGRAM_FORCE),
+}
+_LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "ft": 0.3048}
+_FORCE = {"n": 1.0, "mn": 1e-3, "kn": 1e3, "lbf": _POUND, "lb": _POUND, "kgf": _KILOGRAM_FORCE}
+_RESPONSE = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Metre and newton per unit of the file."""
+
+    length: float = 1.0
+    force: float = 1.0
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """The quantity of a record (None: not said) and the factor that turns it into SI."""
+
+    quantity: str | None
+    factor: float
+
+
+def file_units(header: dict) -> FileUnits:
+    """Dataset 164: the named system, or for a user's own (code 9) the factors written there."""
+    known = _SYSTEMS.get(int(header["units_code"]))
+    if known:
+        return FileUnits(*known)
+    return FileUnits(1 / (header["length"] or 1.0), 1 / (header["force"] or 1.0))
+
+
+def _bare(label: str) -> str:
+    """'(M/S^2)/N' -> 'm/s2/n'."""
+    text = re.sub(r"[\s()\[\]]|\*\*|\^", "", label).replace("²", "2").lower()
+    text = re.sub(r"sec|(?<=/)s\*s", lambda m: "s2" if "*" in m[0] else "s", text)
+    return "" if text in ("none", "null", "-", "1") else text
+
+
+def numerator(label: str) -> tuple[str | None, float]:
+    """(quantity, factor to SI) of 'mm/s^2', 'g', 'in'; (None, 1) where it is no motion.
+
+    >>> numerator("g")
+    ('accelerance', 9.80665)
+    """
+    text = _bare(label)
+    if text in ("g", "gn"):
+        return "accelerance", _GRAVITY
+    for tail, quantity in (("/s2", "accelerance"), ("/s/s", "accelerance"), ("/s", "mobility")):
+        if text.endswith(tail) and text[: -len(tail)] in _LENGTH:
+            return quantity, _LENGTH[text[: -len(tail)]]
+    return ("receptance", _LENGTH[text]) if text in _LENGTH else (None, 1.0)
+
+
+def ratio(label: str) -> tuple[str | None, float | None, float | None]:
+    """(quantity, length factor, force factor) of a unit label such as '(m/s^2)/N'; None: not said.
+
+    >>> ratio("mm/s/N")
+    ('mobility', 0.001, 1.0)
+    >>> ratio("g/g")
+    ('transmissibility', 9.80665, 9.80665)
+    """
+    text = _bare(label)
+    quantity, factor = numerator(text)
+    if quantity:
+        return quantity, factor, None
+    head, slash, tail = text.rpartition("/")
+    quantity, factor = numerator(head)
+    if slash and quantity and tail in _FORCE:
+        return quantity, factor, _FORCE[tail]
+    for cut in range(len(text)):  # motion over motion: every slash may be the bar
+        if text[cut] == "/":
+            above, below = numerator(text[:cut]), numerator(text[cut + 1 :])
+            if above[0] and above[0] == below[0]:
+                return "transmissibility", above[1], below[1]
+    return None, None, None
+
+
+def meaning(record: dict, units: FileUnits, where: str) -> Meaning:
+    """Quantity and SI factor of an FRF record: unit labels first, then data types and dataset 164.
+
+    Raises
+    ------
+    FileError
+        If the label and the data type contradict each other.
+    """
+    typed = _RESPONSE.get(record["ordinate_spec_data_type"])
+    motion_below = record["orddenom_spec_data_type"] in _RESPONSE
+    if record["func_type"] == 5 or (typed and motion_below):
+        return Meaning("transmissibility", 1.0)
+    said, length, force = ratio(record["ordinate_axis_units_lab"])
+    if said and typed and said not in (typed, "transmissibility"):
+        raise FileError(
+            f"{where}: the data type says {typed}, the unit label "
+            f"{record['ordinate_axis_units_lab']!r} says {said}; state the quantity in the case"
+        )
+    below = _FORCE.get(_bare(record["orddenom_axis_units_lab"]))
+    if said == "transmissibility":
+        return Meaning(said, length / force if length and force else 1.0)
+    force = force or below or units.force
+    return Meaning(said or typed, (length or units.length) / force)

@@ -1,0 +1,168 @@
+"""Universal files out: header, units, nodes, then one dataset 58 for each FRF and coherence.
+
+The text of dataset 58 is laid out here because pyuff's own writer takes quadratic time in the
+number of records, keeps six digits of an uneven abscissa and raises on an optional key left out.
+Format: SDRC universal file dataset 58; columns stay apart by a blank, so that readers by column
+and readers by blanks both find the numbers.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ...dofs import parse
+from ...dynamics.frf import FRF
+from ...errors import FileError, LabelError
+
+_RESPONSE = {"receptance": 8, "mobility": 11, "accelerance": 12, "transmissibility": 12}
+_UNIT = {
+    "receptance": ("m", "N"),
+    "mobility": ("m/s", "N"),
+    "accelerance": ("m/s^2", "N"),
+    "transmissibility": ("m/s^2", "m/s^2"),
+}
+
+
+def write_uff(
+    path: str | Path,
+    frf: FRF,
+    nodes: Mapping[int, np.ndarray] | None = None,
+    title: str = "NONE",
+    binary: bool = False,
+) -> None:
+    """FRF (and coherence) as datasets 151, 164, 2411 and 58, or 58b where ``binary``; SI.
+
+    Text keeps 13 digits of the values and 8 of the frequencies, 58b keeps every bit.
+
+    Parameters
+    ----------
+    path : file, replaced if there
+    frf : FRF          labels as 412:+Z; 412:n is written as a scalar, base:+Z as node 0
+    nodes : {node: (3,)}  places [m]
+    """
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    partial.unlink(missing_ok=True)
+    try:
+        _write_head(partial, nodes or {}, title)
+        with partial.open("ab") as file:
+            for block in _blocks(frf, title, binary):
+                file.write(block)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
+    """Header, units and nodes, in pyuff's hand."""
+    import pyuff
+
+    head = dict(type=151, model_name=title, description="NONE", db_app="chladni", program="chladni")
+    units = dict(type=164, units_code=1, units_description="SI", temp_mode=1, length=1.0, force=1.0)
+    sets = [head, units | dict(temp=1.0, temp_offset=273.15)]
+    if nodes:
+        xyz = np.array([nodes[n] for n in nodes], float)
+        zero = np.zeros(len(xyz), int)
+        frame = dict(def_cs=zero, disp_cs=zero, color=zero + 1)
+        x, y, z = xyz.T
+        sets.append(dict(type=2411, node_nums=np.array(list(nodes)), x=x, y=y, z=z, **frame))
+    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+
+
+def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
+    """One dataset 58 a channel, then its coherence."""
+    for j, input in enumerate(frf.inputs):
+        for i, output in enumerate(frf.outputs):
+            dofs = (_code(output), _code(input))
+            yield _dataset(frf, dofs, frf.values[:, i, j], 4, title, binary)
+            if frf.coherence is not None:
+                yield _dataset(frf, dofs, frf.coherence[:, i, j], 6, title, binary)
+
+
+def _code(dof: str) -> tuple[int, int]:
+    """(node, direction code) of a label."""
+    node, _, way = dof.partition(":")
+    try:
+        if node == "base":
+            return 0, parse(f"1:{way}")[1] * parse(f"1:{way}")[2]
+        if way == "n":
+            return int(node), 0
+        point, component, sign = parse(dof)
+    except (LabelError, ValueError) as error:
+        raise FileError(f"label {dof!r} has no place in a universal file: {error}") from error
+    return point, component * sign
+
+
+def _dataset(
+    frf: FRF,
+    dofs: tuple[tuple[int, int], tuple[int, int]],
+    y: np.ndarray,
+    function: int,
+    title: str,
+    binary: bool,
+) -> bytes:
+    """One record: head, numbers, end mark."""
+    even = _even(frf.frequency) and not binary
+    head = _head(frf, dofs, y, function, title, even)
+    if not binary:
+        return (f"    -1\n    58{'':74}\n" + head + _text(frf.frequency, y, even)).encode()
+    bits = _columns(frf.frequency, y).astype("<f8").tobytes()  # 1: little-endian, 2: IEEE
+    mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
+    return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"
+
+
+def _head(
+    frf: FRF,
+    dofs: tuple[tuple[int, int], tuple[int, int]],
+    y: np.ndarray,
+    function: int,
+    title: str,
+    even: bool,
+) -> str:
+    """Records 1 to 11."""
+    (out, out_way), (ref, ref_way) = dofs
+    f = frf.frequency
+    start, step = (f[0], (f[-1] - f[0]) / (len(f) - 1)) if even else (0.0, 0.0)
+    above, below = _UNIT[frf.quantity] if function == 4 else ("NONE", "NONE")
+    kinds = (_RESPONSE[frf.quantity], 13 if below == "N" else 12) if function == 4 else (0, 0)
+    lines = [f"{title[:80]:80}"] + [f"{'NONE':80}"] * 4
+    lines += [
+        f"{function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}{ref:10d}"
+        f"{ref_way:4d}",
+        f"{6 if np.iscomplexobj(y) else 4:10d}{len(y):10d}{int(even):10d}{start:13.5e}{step:13.5e}"
+        f"{0:13.5e}",
+    ]
+    axes = ((18, "Frequency", "Hz"), (kinds[0], "NONE", above), (kinds[1], "NONE", below))
+    for kind, name, unit in (*axes, (0, "NONE", "NONE")):
+        lines.append(f"{kind:10d}{0:5d}{0:5d}{0:5d} {name:20} {unit:20}")
+    return "\n".join(lines) + "\n"
+
+
+def _even(f: np.ndarray) -> bool:
+    """Whether first line and step, in the six digits the head has, give every line back."""
+    if len(f) < 2:
+        return False
+    step = (f[-1] - f[0]) / (len(f) - 1)
+    start, step = float(f"{f[0]:13.5e}"), float(f"{step:13.5e}")
+    return bool(np.allclose(start + step * np.arange(len(f)), f, rtol=1e-12, atol=0.0))
+
+
+def _columns(f: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Abscissa, real part and, where complex, imaginary part of every line."""
+    parts = (f, y.real, y.imag) if np.iscomplexobj(y) else (f, y)
+    return np.column_stack(parts)
+
+
+def _text(f: np.ndarray, y: np.ndarray, even: bool) -> str:
+    """Record 12 in double precision: 4E20.12, E13.5 2E20.12 or 2(E13.5 E20.12)."""
+    table = _columns(f, y)
+    if even:
+        row, flat = ("%20.12e",) * 4, table[:, 1:].ravel()
+    else:
+        row, flat = ("%13.7e", *("%20.12e",) * (table.shape[1] - 1)), table.ravel()
+        row = row * 2 if len(row) == 2 else row
+    whole, rest = divmod(len(flat), len(row))
+    form = ("".join(row) + "\n") * whole + "".join(row[:rest]) + "\n" * bool(rest)
+    return form % tuple(flat) + "    -1\n"

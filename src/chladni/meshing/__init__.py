@@ -1,1 +1,0 @@
-"""Mesh tooling: decks, thickness mapping, curvature, quality."""

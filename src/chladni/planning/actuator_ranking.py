@@ -1,0 +1,165 @@
+"""Where to shake: every candidate's condition number (thesis table 2), drive point and rattle."""
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+
+import numpy as np
+
+from ..dynamics.frf import Quantity
+from ..errors import ShapeError
+from .gramians import condition, controllability_gramian, hankel_values, observability_gramian
+
+
+@dataclass(frozen=True, eq=False)
+class Shaking:
+    """What is needed to judge any set of actuators: gramians add up over actuators.
+
+    Attributes
+    ----------
+    each : (n, 2r, 2r)     controllability gramian of every candidate alone
+    observed : (2r, 2r)    observability gramian of the sensors
+    """
+
+    each: np.ndarray
+    observed: np.ndarray
+
+    def condition(self, actuators: np.ndarray) -> float:
+        """σ_max/σ_min of the Hankel values, all these actuators at work."""
+        W = self.each[np.asarray(actuators, dtype=np.int64)].sum(axis=0)
+        return float(condition(hankel_values(W, self.observed)))
+
+    def conditions(self) -> np.ndarray:
+        """σ_max/σ_min of every candidate alone (n,)."""
+        return condition(hankel_values(self.each, self.observed))
+
+
+def shaking(
+    frequency: np.ndarray,
+    damping: np.ndarray | float,
+    phi_sensors: np.ndarray,
+    phi_candidates: np.ndarray,
+    quantity: Quantity = "receptance",
+) -> Shaking:
+    """Gramians of sensors (m, r) and of every actuator candidate (n, r)."""
+    zeta = np.broadcast_to(np.asarray(damping, dtype=float), np.shape(frequency))
+    each = np.stack([controllability_gramian(frequency, zeta, b[None]) for b in phi_candidates])
+    return Shaking(each, observability_gramian(frequency, zeta, phi_sensors, quantity))
+
+
+def best_actuators(
+    shaker: Shaking, count: int, allowed: np.ndarray | None = None, *, exhaustive: int = 2000
+) -> np.ndarray:
+    """The ``count`` allowed actuators of the lowest condition number together (sorted).
+
+    Every combination is tried up to ``exhaustive`` of them; beyond, one actuator after the other
+    and then exchange, one for one.
+    """
+    n = len(shaker.each)
+    among = np.flatnonzero(np.ones(n, bool) if allowed is None else allowed)
+    if not 1 <= count <= len(among):
+        raise ShapeError(f"{count} actuators were asked for, {len(among)} candidates are allowed")
+    if comb(len(among), count) <= exhaustive:
+        sets = [np.array(s) for s in combinations(among, count)]
+        return sets[int(np.argmin([shaker.condition(s) for s in sets]))]
+    found = np.zeros(0, dtype=np.int64)
+    for _ in range(count):
+        found = _joined(shaker, found, np.setdiff1d(among, found))
+    return np.sort(_exchanged(shaker, found, among))
+
+
+def _joined(shaker: Shaking, found: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The actuators and the one of the others that lowers the condition number most."""
+    W = shaker.each[found].sum(axis=0) + shaker.each[others]
+    best = int(np.argmin(condition(hankel_values(W, shaker.observed))))
+    return np.r_[found, others[best]]
+
+
+def _exchanged(shaker: Shaking, found: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """The actuators after swaps, one for one, until none lowers the condition number."""
+    now, better = shaker.condition(found), True
+    while better:
+        better = False
+        for k in range(len(found)):
+            new = _joined(shaker, np.delete(found, k), np.setdiff1d(among, np.delete(found, k)))
+            if (after := shaker.condition(new)) < now * (1 - 1e-9):
+                found, now, better = new, after, True
+    return found
+
+
+def driving_point_residue(frequency: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """Residue φ_ir² / (2 ω_r) of each mode at each candidate as its own driving point (n, r).
+
+    Its mean over the modes says how well a place drives, its least how surely it drives all.
+    """
+    return np.asarray(np.asarray(phi) ** 2 / (4 * np.pi * np.asarray(frequency)))
+
+
+def rattle_margin(
+    frequency: np.ndarray,
+    damping: np.ndarray | float,
+    phi: np.ndarray,
+    gap_shapes: np.ndarray,
+    clearance: np.ndarray,
+    force: float,
+) -> np.ndarray:
+    """Clearance over the greatest relative motion when each candidate is driven; < 1 rattles (n,).
+
+    At the resonance of mode r a force F at i closes gap g by |φ_ir ψ_gr| F / (2 ζ_r ω_r²).
+
+    Parameters
+    ----------
+    phi : (n, r)            shapes at the actuator candidates [1/√kg]
+    gap_shapes : (g, r)     relative motion of the two sides of each gap along its normal [1/√kg]
+    clearance : (g,)        [m]
+    force : amplitude [N]
+    """
+    omega = 2 * np.pi * np.asarray(frequency)
+    peak = force / (2 * np.asarray(damping) * omega**2)
+    closing = np.einsum("ir,gr,r->igr", np.abs(phi), np.abs(gap_shapes), peak).max(axis=2)
+    with np.errstate(divide="ignore"):
+        margin = np.where(closing > 0, np.asarray(clearance) / closing, np.inf)
+    return np.asarray(margin.min(axis=1, initial=np.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class ActuatorRanking:
+    """Candidates for the shaker, the best first; those vetoed come last.
+
+    Attributes
+    ----------
+    order : (n,) int
+    condition : (n,)     Hankel condition number of each candidate (by candidate, not by rank)
+    residue : (n,)       least over mean driving-point residue of its modes
+    margin : (n,)        rattle margin, inf where no gap was given
+    allowed : (n,) bool  accessible, and free of rattle
+    """
+
+    order: np.ndarray
+    condition: np.ndarray
+    residue: np.ndarray
+    margin: np.ndarray
+    allowed: np.ndarray
+
+
+def ranked_actuators(
+    shaker: Shaking,
+    frequency: np.ndarray,
+    phi: np.ndarray,
+    *,
+    margin: np.ndarray | None = None,
+    access: np.ndarray | None = None,
+) -> ActuatorRanking:
+    """Candidates by condition number; no access or a rattle margin below 1 is a veto."""
+    n = len(phi)
+    margin = np.full(n, np.inf) if margin is None else margin
+    allowed = (np.ones(n, bool) if access is None else np.asarray(access, bool)) & (margin >= 1)
+    kappa = shaker.conditions()
+    residue = driving_point_residue(frequency, phi)
+    return ActuatorRanking(
+        np.lexsort((kappa, ~allowed)),
+        kappa,
+        residue.min(axis=1) / np.maximum(residue.mean(axis=1), 1e-300),
+        margin,
+        allowed,
+    )

@@ -1,0 +1,113 @@
+"""Models with drawn thickness: what a layout must serve when the deck is not quite the article.
+
+Every draw is a reduced model over the deck's own modes far beyond the band and the modes of a few
+drawn models solved in full, so fifty draws cost little more than one.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import rigid_modes
+from ..dynamics.reduction import orthonormal
+from ..effects.ordinary import PartScale, ordinary
+from ..effects.shell_groups import sheet
+from ..errors import ModelError
+from ..fem.assemble import Structure, structure
+from ..progress import Progress, silent
+from ..updating.reduced_model import Reduced, evaluate, reduce
+
+REACH = 2.0  # the basis holds the deck's modes up to this many times the highest target
+CLIP = 2.0  # standard deviations beyond which nothing is drawn
+FULL = 2  # drawn models solved in full for the basis
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """A model whose parts' thickness may be drawn.
+
+    Attributes
+    ----------
+    model : Reduced
+    effects : tuple of PartScale   thickness of each part
+    rigid : int                    rigid modes, which every draw has too
+    """
+
+    model: Reduced
+    effects: tuple[PartScale, ...]
+    rigid: int
+
+    @property
+    def basis(self) -> np.ndarray:
+        """Vectors (n_free, k) in which :func:`drawn` gives shapes."""
+        return self.model.basis
+
+
+def ensemble(built: Structure, top: float, spread: float, progress: Progress = silent) -> Ensemble:
+    """Make a structure ready for draws of thickness.
+
+    Parameters
+    ----------
+    top : highest target frequency [Hz]
+    spread : standard deviation of the logarithm of each part's thickness
+    """
+    progress("models with drawn thickness", 0.0)
+    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
+    modal = normal_modes(built.system, band=REACH * top, points=where)
+    cloth = sheet(built, 1)
+    parts = np.unique(cloth.part).tolist()
+    effects = tuple(ordinary(cloth, "t", [p], spread) for p in parts)
+    blocks = [modal.shapes]
+    rng = np.random.default_rng(0)
+    for k in range(FULL):
+        progress(f"drawn model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
+        blocks.append(_solved(built, effects, random(rng, len(parts), spread), 1.1 * top))
+    basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
+    return Ensemble(reduce(cloth, basis), effects, int(rigid_modes(modal).sum()))
+
+
+def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:
+    """Log factors of the parts' thickness, normal and clipped at two standard deviations."""
+    return np.asarray(spread * rng.standard_normal(n_parts).clip(-CLIP, CLIP))
+
+
+def _solved(
+    built: Structure, effects: tuple[PartScale, ...], x: np.ndarray, top: float
+) -> np.ndarray:
+    """Mode shapes up to a frequency of a model drawn at x."""
+    drawn = with_thickness(built, effects, x)
+    where = drawn.assembly.points[drawn.assembly.rows(drawn.system.dofs[:, 0])]
+    shapes = normal_modes(drawn.system, band=top, points=where).shapes
+    if len(shapes) != len(built.system.dofs):
+        raise ModelError("a part's thickness changed which degrees of freedom are free")
+    return shapes
+
+
+def with_thickness(built: Structure, effects: tuple[PartScale, ...], x: np.ndarray) -> Structure:
+    """The structure assembled anew with the thickness of each part times e^x."""
+    shells, scale = built.assembly.shells, np.zeros(len(built.assembly.parts))
+    for effect, value in zip(effects, x, strict=True):
+        scale[list(effect.positions)] = value
+    t = shells.thickness * np.exp(scale)[shells.part][:, None]
+    return structure(replace(built.assembly, shells=replace(shells, thickness=t)))
+
+
+def drawn(
+    models: Ensemble, seen: np.ndarray, modes: int, count: int, spread: float, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (count, r) [Hz] and shapes (count, m, r) of models with drawn thickness.
+
+    Parameters
+    ----------
+    seen : (m, k)   the basis as the candidates see it
+    modes : flexible modes r of each
+    """
+    rng, keep = np.random.default_rng(seed), slice(models.rigid, models.rigid + modes)
+    frequency, shapes = [], []
+    for _ in range(count):
+        x = random(rng, len(models.effects), spread)
+        state = evaluate(models.model, models.effects, x, gradient=False)
+        frequency.append(np.sqrt(np.maximum(state.lam[keep], 0.0)) / (2 * np.pi))
+        shapes.append(seen @ state.phi[:, keep])
+    return np.stack(frequency), np.stack(shapes)

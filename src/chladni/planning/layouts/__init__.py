@@ -1,0 +1,1 @@
+"""Sensor layouts: information, deletion, exchange, searches, rules."""

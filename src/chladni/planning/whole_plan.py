@@ -1,0 +1,360 @@
+"""From a structure to a test plan (thesis 4.1): sensors with direction, shaker, cords, lines."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..dofs import label
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import ModalModel, rigid_modes
+from ..ema.correlation import auto_mac
+from ..errors import ModelError
+from ..fem.assemble import Structure, structure
+from ..model.assembly import Assembly
+from ..progress import Progress, silent, within
+from .actuator_ranking import ActuatorRanking, best_actuators, ranked_actuators, shaking
+from .drawn_models import drawn, ensemble
+from .gramians import gramian_quotient, modal_rank, observability_gramian
+from .layouts.deletion import deletion, effective_independence, greedy, qr_ranking
+from .layouts.distinct import distinct
+from .layouts.exchange import exchange
+from .layouts.information import candidates, value
+from .layouts.layout_quality import Move, loaded_frequency, overlap, visibility, with_visible_modes
+from .layouts.layout_rules import Rules, too_near
+from .rattle import Openings, Rattle, first_rattle, openings
+from .sensor_candidates import Places, find_places
+
+SPARE = 6  # modes computed beyond those wanted, so that the sweep sees what lies above
+BLIND = 0.25  # of the floor: what no place sees better than this is not aimed at
+TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting block
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the test is to be; lengths in metres.
+
+    Attributes
+    ----------
+    sensors : uniaxial accelerometers at hand
+    modes : target modes; None: those below ``top``, or 24, or 4/5 of the sensors
+    top : highest frequency of interest [Hz]
+    damping : expected damping ratio of every mode
+    candidates : places looked at
+    spacing : least distance between two sensors [m]
+    alike : two modes may look alike at the sensors (AutoMAC) up to this; 1: as they come
+    actuators : shakers that are to work together
+    force : amplitude of a shaker at which nothing may rattle [N]
+    floor : least visibility of a mode: largest motion a sensor sees over the largest anywhere
+    mass : of one sensor [kg]
+    draws, spread : models drawn with every part's thickness uncertain by this share (1 sd);
+                    the layout then serves all of them
+    seed : of the draws
+    """
+
+    sensors: int = 30
+    modes: int | None = None
+    top: float | None = None
+    damping: float = 0.01
+    candidates: int = 300
+    spacing: float = 0.0
+    alike: float = 0.15
+    actuators: int = 1
+    force: float = 5.0
+    floor: float = 0.2
+    mass: float = 0.005
+    draws: int = 0
+    spread: float = 0.1
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """A place and a direction in which a sensor may measure: rows of ``phi`` of a :class:`Plan`.
+
+    Attributes
+    ----------
+    ids : (m,) int          grids, or numbers of centres as in :class:`Places`
+    place : (m,) int        position among the places
+    points, directions : (m, 3)
+    labels : tuple of str   412:+Z along an axis, else 412:n
+    normal : (m,) bool      glued flat; False: on a block, along the sheet
+    side : (m,)             +1, -1: on which side of the surface normal
+    """
+
+    ids: np.ndarray
+    place: np.ndarray
+    points: np.ndarray
+    directions: np.ndarray
+    labels: tuple[str, ...]
+    normal: np.ndarray
+    side: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A test plan; arrays over modes are over the flexible target modes.
+
+    Attributes
+    ----------
+    places : Places
+    modal : ModalModel            target modes, damping as wished
+    first : int                   number of the first of them in the deck (rigid modes before it)
+    mounts : Mount                every candidate: normals first, then directions on blocks
+    phi : (m, r)                  target shapes at the mounts
+    aimed : (r,) bool             modes a sensor glued flat sees at all: the layout is for them
+    layout : (n_sensors,) int     mounts, the most informative first
+    moves : tuple of Move         sensors given up so that a mode is seen
+    visible_before, visible : (r,)  before and after the moves
+    log_det : {method: value}     of the layouts of several methods, before the moves
+    sweep : ((modes, overlap), ...)  share of the layout kept when the sweep takes more modes
+    actuators : ActuatorRanking   over the normals, each alone; without a straight way to the
+                                  place, or where it rattles below the wished force: vetoed
+    rattle : Rattle               at the normals
+    openings : Openings           where sheets may meet
+    together : (k,) int           the shakers that drive all modes most evenly together
+    observable : (rank, states)
+    quotient : float              of the observability gramian (thesis 4.1.1)
+    auto_mac : (r, r)             at the sensors
+    loaded : (r,)                 frequencies with the sensors' mass on [Hz]
+    hangers : (k,) int            grids, the quietest first
+    quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
+    """
+
+    wishes: Wishes
+    places: Places
+    modal: ModalModel
+    first: int
+    mounts: Mount
+    phi: np.ndarray
+    aimed: np.ndarray
+    layout: np.ndarray
+    moves: tuple[Move, ...]
+    visible_before: np.ndarray
+    visible: np.ndarray
+    log_det: dict[str, float]
+    sweep: tuple[tuple[int, float], ...]
+    actuators: ActuatorRanking
+    rattle: Rattle
+    openings: Openings
+    together: np.ndarray
+    observable: tuple[int, int]
+    quotient: float
+    auto_mac: np.ndarray
+    loaded: np.ndarray
+    hangers: np.ndarray
+    quiet: np.ndarray
+
+
+def plan(
+    assembly: Assembly,
+    wishes: Wishes | None = None,
+    *,
+    built: Structure | None = None,
+    unit: str = "m",
+    progress: Progress = silent,
+) -> Plan:
+    """Candidates on the mesh, effective independence and exchange, visibility, shaker, cords.
+
+    Parameters
+    ----------
+    built : the assembled structure, where it is at hand
+    unit : "" where the deck's unit of length is not known
+    """
+    wishes = wishes or Wishes()
+    progress("places a sensor can sit at", 0.05)
+    places = find_places(assembly, wishes.candidates, unit=unit)
+    progress("modes", 0.2)
+    built = built or structure(assembly)
+    modal, above, first = target_modes(built, wishes)
+    mounts = mounts_at(places)
+    moving = motion(built, above)
+    phi = seen_at(places, mounts, moving)
+    progress("sensors", 0.6)
+    r, normal = len(modal), mounts.normal
+    largest = np.linalg.norm(moving, axis=1).max(axis=0)
+    visible = visibility(phi[normal], largest) >= BLIND * wishes.floor
+    aimed, largest = visible[:r], largest[:r]
+    flat = phi[normal, :r][:, aimed]
+    draws = flat
+    if wishes.draws:
+        stage = within(progress, 0.6, 0.75)
+        models = ensemble(built, float(modal.frequency[-1]), wishes.spread, stage)
+        basis = seen_at(places, mounts, recovered(built, models.basis))[normal]
+        _, draws = drawn(models, basis, r, wishes.draws, wishes.spread, wishes.seed)
+        draws = draws[:, :, aimed]
+    ranked, log_det = _layout(draws, mounts, wishes)
+    layout, moves = with_visible_modes(
+        phi[:, :r], ranked, largest, floor=wishes.floor, rules=_near(mounts, wishes)
+    )
+    progress("shaker and cords", 0.8)
+    f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
+    shaker = shaking(f[aimed], zeta[aimed], seen[:, aimed], flat)
+    observed = observability_gramian(f, zeta, seen)
+    gaps = openings(assembly, moving[:, :, :r])
+    rattle = first_rattle(f, zeta, phi[normal, :r], gaps)
+    ranking = ranked_actuators(
+        shaker, f[aimed], flat, margin=rattle.force / wishes.force, access=places.straight
+    )
+    enough = ranking.allowed.sum() >= wishes.actuators
+    hangers, quiet = hang_points(moving[:, :, :r], places)
+    three = places.moving(moving, mounts.place[layout])[..., :r]
+    return Plan(
+        wishes,
+        places,
+        modal,
+        first,
+        mounts,
+        phi[:, :r],
+        aimed,
+        layout,
+        moves,
+        visibility(phi[ranked, :r], largest),
+        visibility(seen, largest),
+        log_det,
+        mode_sweep(phi[normal][:, visible], wishes.sensors, int(aimed.sum())),
+        ranking,
+        rattle,
+        gaps,
+        best_actuators(shaker, wishes.actuators, ranking.allowed if enough else None),
+        (modal_rank(f, seen), 2 * r),
+        gramian_quotient(observed, f),
+        auto_mac(seen),
+        loaded_frequency(f, three, wishes.mass),
+        hangers,
+        quiet,
+    )
+
+
+def target_modes(built: Structure, wishes: Wishes) -> tuple[ModalModel, ModalModel, int]:
+    """Target modes, these and some above, and the number of rigid modes before them."""
+    due = wishes.modes or min(24, 4 * wishes.sensors // 5)
+    n = len(built.system.dofs)
+    where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
+    modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
+    rigid = int(rigid_modes(modal).sum())
+    above = modal.sel(slice(rigid, None)).with_damping(wishes.damping)
+    below = np.flatnonzero(above.frequency <= (wishes.top or np.inf))
+    if not len(below):
+        raise ModelError(
+            f"no flexible mode below {wishes.top:g} Hz; the first is at {above.frequency[0]:.4g} Hz"
+        )
+    return above.sel(slice(0, min(due, len(below)))), above, rigid
+
+
+def motion(built: Structure, modal: ModalModel) -> np.ndarray:
+    """Translation of every point (n_points, 3, r)."""
+    return recovered(built, modal.shapes)
+
+
+def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
+    """Translation of every point (n_points, 3, k) in vectors over the free dofs (n_free, k)."""
+    u = built.T @ vectors
+    return np.asarray(u.reshape(len(built.assembly.points), 6, -1)[:, :3])
+
+
+def seen_at(places: Places, mounts: Mount, moving: np.ndarray) -> np.ndarray:
+    """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
+    at = places.moving(moving, mounts.place)
+    return np.asarray(np.einsum("mir,mi->mr", at, mounts.directions))
+
+
+def mounts_at(places: Places) -> Mount:
+    """Normals of all places, then the two axes of the basic frame most along each sheet."""
+    place, directions = [np.arange(len(places))], [places.normals]
+    across = np.argsort(np.abs(places.normals), axis=1)[:, :2]
+    for k in range(2):
+        axes = np.eye(3)[across[:, k]]
+        good = np.abs(np.einsum("ij,ij->i", axes, places.normals)) < TANGENT
+        place.append(np.flatnonzero(good))
+        directions.append(axes[good])
+    at, along = np.concatenate(place), np.concatenate(directions)
+    ids = places.ids[at]
+    return Mount(
+        ids,
+        at,
+        places.points[at],
+        along,
+        tuple(_labels(ids, along)),
+        np.arange(len(at)) < len(places),
+        places.side[at],
+    )
+
+
+def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
+    """412:+Z where the direction is an axis, else 412:n."""
+    axis = np.abs(directions).argmax(axis=1)
+    value = directions[np.arange(len(ids)), axis]
+    return [
+        label(int(i), int(a) + 1, 1 if v > 0 else -1) if abs(v) > 1 - 1e-6 else f"{i}:n"
+        for i, a, v in zip(ids, axis, value, strict=True)
+    ]
+
+
+def _near(mounts: Mount, wishes: Wishes) -> Rules:
+    """Sensors keep their distance; one grid bears one sensor."""
+    near = too_near(mounts.points, max(wishes.spacing, 1e-9))
+    return Rules(near=near)
+
+
+def _layout(phi: np.ndarray, mounts: Mount, wishes: Wishes) -> tuple[np.ndarray, dict[str, float]]:
+    """The layout, ranked, and log det of the layouts of several methods."""
+    c = candidates(phi)
+    rules = Rules(near=too_near(mounts.points[mounts.normal], wishes.spacing))
+    rules = rules if wishes.spacing > 0 else Rules()
+    efi = deletion(c, wishes.sensors, rules=rules).ranked
+    best = kept = exchange(c, efi, rules=rules)
+    layouts = {
+        "greedy": greedy(c, wishes.sensors, rules=rules),
+        "effective independence": efi,
+        "with exchange": kept,
+    }
+    if wishes.alike < 1:
+        layouts["with modes told apart"] = best = distinct(
+            c, kept, ceiling=wishes.alike, rules=rules
+        )
+    if wishes.spacing == 0 and c.rows.shape[0] == 1:
+        layouts = {"pivoted QR": qr_ranking(c.rows[0])[: wishes.sensors], **layouts}
+    ranked = deletion(c, wishes.sensors, rules=_only(best, len(c))).ranked
+    return ranked, {name: value("D", c.fisher(k)) for name, k in layouts.items()}
+
+
+def _only(kept: np.ndarray, n: int) -> Rules:
+    """Rules that leave no choice but the kept."""
+    forbidden = np.ones(n, bool)
+    forbidden[kept] = False
+    return Rules(forbidden=forbidden)
+
+
+def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:
+    """Share of the layout that stays when more modes are targeted (thesis 4.1, figure 8).
+
+    Each entry is (modes, overlap of its layout with that of the entry before).
+    """
+    most = min(n_sensors, phi.shape[1])
+    counts = sorted({*np.linspace(max(2, target // 3), most, 7).astype(int).tolist(), target})
+    layouts = {}
+    for count in counts:
+        layouts[count] = effective_independence(phi[:, :count], n_sensors)
+    pairs = pairwise(counts)
+    return tuple((b, overlap(layouts[b], layouts[a])) for a, b in pairs)
+
+
+def hang_points(
+    moving: np.ndarray, places: Places, count: int = 4, first: int = 5
+) -> tuple[np.ndarray, np.ndarray]:
+    """Grids that move least in the first modes, well apart: near nodes, where cords add least.
+
+    Returns the grids and their rms motion, each mode over its largest anywhere; ``moving`` is the
+    motion of all points (n_points, 3, r).
+    """
+    size = np.linalg.norm(moving[:, :, :first], axis=1)
+    quiet = np.sqrt(((places.moving(size) / size.max(axis=0)) ** 2).mean(axis=1))
+    quiet[~places.is_grid] = np.inf  # a case names hangers by grid
+    reach = 0.3 * float(np.linalg.norm(np.ptp(places.points, axis=0)))
+    chosen: list[int] = []
+    for k in np.argsort(quiet, kind="stable"):
+        away = np.linalg.norm(places.points[chosen] - places.points[k], axis=1)
+        if len(chosen) < count and np.all(away >= reach) and np.isfinite(quiet[k]):
+            chosen.append(int(k))
+    return places.ids[chosen], quiet[chosen]

@@ -1,0 +1,247 @@
+"""A plan as a page: pictures of the layout and of what it sees, tables, sentences."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..fem.assemble import Structure
+from ..planning.plan_summary import AVERAGES, PER_BANDWIDTH
+from ..planning.whole_plan import Plan, motion
+from ..view import plots, scene
+from ..view.surface import Surface
+from .blocks import Facts, Items, Picture, Section, Table, Text
+from .words import number
+
+PICTURES = {
+    "sensors.png": "the layout",
+    "shaker.png": "where to shake and where to hang",
+    "auto_mac.png": "AutoMAC at the sensors",
+    "modes.png": "the modes the sensors see least",
+}
+
+
+def lead(result: dict[str, Any]) -> str:
+    """The plan in two sentences."""
+    f = [m["frequency_hz"] for m in result["modes"]]
+    shake = ", ".join(a["label"] for a in result["actuators_together"])
+    unseen = [str(m["mode"]) for m in result["modes"] if not m["seen"]]
+    text = (
+        f"{len(result['sensors'])} sensors tell {len(f)} modes from {number(f[0])} to "
+        f"{number(f[-1])} Hz apart; shake at {shake}."
+    )
+    return text + (f" Hardly seen: mode {', '.join(unseen)}." if unseen else "")
+
+
+def notes(found: Plan) -> list[str]:
+    """What was decided on the way, and what to mind."""
+    refused = [f"{count} grids {why}" for why, count in found.places.refused.items()]
+    centres = int((~found.places.is_grid).sum())
+    out = [
+        f"{len(found.places)} places were looked at, spread over all flat surfaces that can be "
+        f"reached; left out: {', '.join(refused)}."
+    ]
+    if centres:
+        out.append(
+            f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
+            "keeps off the edges; sensors.csv gives their x, y, z."
+        )
+    shift = np.abs(found.loaded / found.modal.frequency - 1).max()
+    if shift > 0.005:
+        out.append(
+            f"The sensors' mass moves frequencies by up to {100 * shift:.1f} %: put their mass "
+            "into the model before comparing."
+        )
+    if not found.aimed.all():
+        blind = ", ".join(str(found.first + 1 + k) for k in np.flatnonzero(~found.aimed))
+        out.append(
+            f"No sensor glued flat sees mode {blind}, which moves along the sheets or where no "
+            "sensor fits, and no shaker at a normal drives it well; the layout was made for the "
+            "others, and a sensor on a block was moved to it where that helps."
+        )
+    out += _rattle_notes(found)
+    if found.wishes.draws:
+        out.append(
+            f"The layout serves {found.wishes.draws} models with the thickness of every part drawn "
+            f"with a standard deviation of {100 * found.wishes.spread:g} %."
+        )
+    return out
+
+
+def _rattle_notes(found: Plan) -> list[str]:
+    """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
+    out, force = [], found.wishes.force
+    if rattling := int((found.rattle.force < force).sum()):
+        out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
+    if blocked := int((~found.places.straight).sum()):
+        out.append(f"To {blocked} places no straight rod leads: they are for sensors only.")
+    if not found.actuators.allowed[found.together].all():
+        out.append(
+            "The shakers named are vetoed too: nothing better is left. Lower the force (--force)."
+        )
+    if found.openings.touching:
+        pairs = ", ".join(f"{a} and {b}" for a, b in found.openings.touching)
+        out.append(
+            f"Away from their joints the mesh lets touch: {pairs}. Their gap is less than the "
+            "facets leave in doubt, so when they rattle is not foretold: listen to them first."
+        )
+    return out
+
+
+def sections(
+    found: Plan, result: dict[str, Any], seen: Surface, built: Structure, folder: Path
+) -> list[Section]:
+    """The page; its pictures (:data:`PICTURES`) are written into the folder."""
+    return [
+        Section("Sensors", _sensors(found, result, seen, folder / "sensors.png")),
+        Section("Modes", _modes(found, result, seen, built, folder)),
+        Section("Shaker and cords", _shaker(found, result, seen, folder / "shaker.png")),
+        Section("Lines and duration", [Text([_test(result["test"])])]),
+    ]
+
+
+def _sensors(
+    found: Plan, result: dict[str, Any], seen: Surface, path: Path
+) -> list[Picture | Table | Facts | Items]:
+    outputs = [_marker(s, str(s["rank"])) for s in result["sensors"]]
+    shakers = [_marker(a, "shaker") for a in result["actuators_together"]]
+    picture = scene.sensors(path, seen, outputs, shakers)
+    rows = [
+        (str(s["rank"]), s["label"], *_where(s), _vector(s["direction"]), s["mounted"])
+        for s in result["sensors"]
+    ]
+    table = Table(
+        ("rank", "label", "grid", "place [m]", "direction", "mounted"),
+        rows,
+        words=("label", "place [m]", "direction", "mounted"),
+        caption="The most informative first; the last is the one to give up for something else. "
+        "A place without a grid is the centre of a shell.",
+    )
+    moves = [
+        f"Mode {m['mode']} was hardly seen ({number(m['before'], 2)} of its largest motion): the "
+        f"sensor at {m['given_up']} moves to {m['taken']} ({number(m['after'], 2)})."
+        for m in result["moves"]
+    ]
+    return [
+        Picture(picture, "Sensors by rank (blue), shaker (red)."),
+        table,
+        Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
+        Items(moves or ["No sensor had to move for a mode to be seen."]),
+    ]
+
+
+def _where(mount: dict[str, Any]) -> tuple[str, str]:
+    grid = "" if mount["grid"] is None else str(mount["grid"])
+    return grid, _vector(mount["point_m"])
+
+
+def _marker(mount: dict[str, Any], text: str) -> scene.Marker:
+    x, y, z = (float(v) for v in mount["point_m"])
+    a, b, c = (float(v) for v in mount["direction"])
+    return scene.Marker((x, y, z), (a, b, c), text)
+
+
+def _modes(
+    found: Plan, result: dict[str, Any], seen: Surface, built: Structure, folder: Path
+) -> list[Table | Picture]:
+    shift = found.loaded / found.modal.frequency - 1
+    rows = [
+        (
+            str(m["mode"]),
+            number(m["frequency_hz"], 5),
+            number(m["visibility"], 2),
+            "yes" if m["seen"] else "hardly",
+            "yes" if m["seen_by_normals"] else "no, moves along the sheets",
+            f"{100 * shift[k]:.2f} %",
+        )
+        for k, m in enumerate(result["modes"])
+    ]
+    table = Table(
+        ("mode", "Hz", "visibility", "seen", "seen by normals", "shift by sensors"),
+        rows,
+        words=("seen", "seen by normals"),
+        caption="Visibility: largest motion a sensor sees over the largest anywhere.",
+    )
+    sweep = [(str(n), f"{100 * share:.0f} %") for n, share in found.sweep]
+    steps = Table(
+        ("target modes", "layout kept"),
+        sweep,
+        caption="Share of the sensors that stays when so many modes are targeted instead of those "
+        "in the row above.",
+    )
+    names = [str(m["mode"]) for m in result["modes"]]
+    mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
+    least = _least_seen(found, seen, built, folder / "modes.png")
+    return [table, Picture(least, "Those the sensors see least."), Picture(mac), steps]
+
+
+def _least_seen(found: Plan, seen: Surface, built: Structure, path: Path) -> Path:
+    faint = np.sort(np.argsort(found.visible, kind="stable")[:12])
+    shown = found.modal.sel(faint)
+    numbers = [found.first + 1 + int(k) for k in faint]
+    return scene.montage(path, seen, motion(built, shown), shown.frequency, numbers=numbers)
+
+
+def _shaker(
+    found: Plan, result: dict[str, Any], seen: Surface, path: Path
+) -> list[Facts | Table | Picture]:
+    best = [_marker(a, str(k + 1)) for k, a in enumerate(result["actuators"][:10])]
+    rows = [
+        (
+            str(k + 1),
+            a["label"],
+            *_where(a),
+            number(a["condition"]),
+            number(a["least_over_mean_residue"], 2),
+            _rattling(a),
+            "no" if a["vetoed"] else "yes",
+            "yes" if a["is_sensor"] else "",
+        )
+        for k, a in enumerate(result["actuators"][:10])
+    ]
+    s = result["scores"]
+    facts = [
+        ("Observability", f"rank {s['observability_rank']} of {s['states']}"),
+        ("Quotient of the observability gramian", number(s["gramian_quotient"])),
+        ("Cords at grids", ", ".join(str(g) for g in result["hangers"])),
+    ]
+    caption = (
+        "Condition: greatest over least Hankel singular value, the lower the better. Least "
+        "residue: driving-point residue of the mode driven worst, over the mean. Rattles from: "
+        "force at resonance at which two sheets first meet. Allowed: a straight rod leads there, "
+        f"and nothing rattles at {found.wishes.force:g} N."
+    )
+    columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
+    words = ("rattles from", "allowed", "also a sensor")
+    table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
+    cords = [_hanger(found, int(g)) for g in result["hangers"]]
+    picture = scene.sensors(path, seen, cords, best, ("cord", "shaker, by rank"))
+    return [Facts(facts), Picture(picture, "Ten best shaker places (red), cords (blue)."), table]
+
+
+def _rattling(actuator: dict[str, Any]) -> str:
+    if actuator["rattles_between"] is None:
+        return "none foretold"
+    a, b = actuator["rattles_between"]
+    return f"{number(actuator['rattles_from_n'], 2)} N: {a} / {b}"
+
+
+def _hanger(found: Plan, grid: int) -> scene.Marker:
+    k = int(np.flatnonzero(found.places.ids == grid)[0])
+    return _marker({"point_m": found.places.points[k], "direction": found.places.normals[k]}, "")
+
+
+def _test(t: dict[str, Any]) -> str:
+    low, high = t["band_hz"]
+    return (
+        f"Stepped sine from {number(low)} to {number(high)} Hz needs {t['lines']} lines "
+        f"({number(t['lines_per_octave'], 3)} per octave, {PER_BANDWIDTH} in every half-bandwidth) "
+        f"and {number(t['stepped_sine_s'] / 60, 3)} minutes a sweep, waiting up to "
+        f"{t['longest_wait_cycles']:.0f} cycles until 1 % of a transient is left. Burst random "
+        f"with {AVERAGES} averages of {number(t['burst_random_resolution_hz'], 3)} Hz needs "
+        f"{number(t['burst_random_s'] / 60, 3)} minutes."
+    )
+
+
+def _vector(direction: np.ndarray) -> str:
+    return "(" + ", ".join(f"{x:.3f}" for x in direction) + ")"

@@ -1,0 +1,1 @@
+"""Sparse symmetric factorisation and block Lanczos."""

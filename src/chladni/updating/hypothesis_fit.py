@@ -1,0 +1,206 @@
+"""What a diagnosis works with, and the fit of one hypothesis."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effects import catalogue
+from ..effects.effect import Effect
+from ..effects.movable_attachment import Somewhere
+from .discrepancy import MEDIAN, learned
+from .likelihood import Data, Poles, Responses
+from .map_fit import Fit, Weighing, beside, fit, unknowns
+from .reduced_model import Reduced, State, evaluate
+from .reduced_problem import Workbench
+
+NEVER_WRITTEN = ("scatter", "jitter")  # nuisances no deck can hold; gain and mesh error stay
+ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One hypothesis after its fit: the effect, the fit, the model it was fitted in."""
+
+    effect: Effect
+    fit: Fit
+    model: Reduced
+
+    @property
+    def data(self) -> Data:
+        """What was fitted."""
+        return self.fit.data
+
+    @property
+    def S(self) -> float:
+        """-2 ln evidence."""
+        return self.fit.S
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """All that a diagnosis works with.
+
+    Attributes
+    ----------
+    base : ordinary parameters and nuisances, free in every fit
+    nuisance : the nuisances alone
+    """
+
+    bench: Workbench
+    data: Responses | Poles
+    weighing: Weighing | None
+    base: tuple[Effect, ...]
+    nuisance: tuple[Effect, ...]
+    setup: catalogue.Setup
+    labels: tuple[str, ...] = ()
+
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> "Search":
+        """Responses with errors of the model's form as they spread from this state."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.allowing_errors(state, delta))
+
+    def exactly(self) -> "Search":
+        """The same search with a model that is taken to be right but for its parameters."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.exactly())
+
+    def mean(self) -> np.ndarray:
+        """Prior mean of the base parameters."""
+        return np.array([p.mean for e in self.base for p in e.parameters])
+
+    def trial(
+        self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
+    ) -> Trial:
+        """Fit one effect together with the base, from these starts."""
+        model = self.bench.model
+        if isinstance(effect, Somewhere):
+            model = self.bench.with_attachments(effect.carried())
+        else:
+            for term in effect.terms(start):
+                model = self.bench.with_attachments(term.rows)
+        if any(change.field.startswith("Q") for change in effect.fields(start)):
+            model = model.with_components()
+        data = self.data.over(model)
+        kept = self.without(effect)
+        inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
+        x0 = np.concatenate([base[inside.astype(bool)], start])
+        return Trial(
+            effect, fitted(model, [*kept, effect], data, self.weighing, x0, max_steps), model
+        )
+
+    def without(self, effect: Effect) -> list[Effect]:
+        """The base less what the effect makes superfluous."""
+        return [e for e in self.base if e.text not in effect.replaces]
+
+
+def fitted(
+    model: Reduced, effects: Sequence[Effect], data: Data, weighing: Weighing | None, x: np.ndarray,
+    max_steps: int = 30,
+) -> Fit:  # fmt: skip
+    """A fit; for poles, the spread that no model reaches is found with it."""
+    if isinstance(data, Poles):
+        return _fit_poles(model, effects, data, weighing, x)
+    if isinstance(data, Responses) and data.error is not None:
+        return _fit_responses(model, effects, data, weighing, x, max_steps)
+    return fit(model, effects, data, weighing, x, max_steps=max_steps)
+
+
+ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
+
+
+def _fit_responses(
+    model: Reduced, effects: Sequence[Effect], data: Responses, weighing: Weighing | None,
+    x: np.ndarray, max_steps: int,
+) -> Fit:  # fmt: skip
+    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
+    assert data.error is not None
+    constant = sum(2 * np.log(effect.places) for effect in effects)
+    constant += sum(2 * np.log(p.sd) for p in unknowns(effects))
+    for _ in range(ROUNDS):
+        found = fit(model, effects, data, weighing, x, max_steps=max_steps)
+        r0, J0 = beside(effects, weighing, found.x, found.state)
+        likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
+        change = abs(np.log(likely.delta / data.error.delta))
+        data = replace(data, error=data.error.with_delta(likely.delta))
+        found = replace(found, S=likely.S + float(constant), data=data)
+        if max_steps <= ROUGH or change < CLOSE:
+            break
+        x = found.x
+    return found
+
+
+SCALES = np.geomspace(0.003, 0.2, 25)
+SCALE_SD = 0.5  # of ln(scale) about its prior median
+
+
+def _fit_poles(
+    model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
+) -> Fit:
+    """Alternate the fit with the most probable scale of what no model reaches."""
+    options = []
+    for road in ROADS:
+        there = x
+        for scale in road:
+            there = fit(model, effects, replace(data, scale=scale), weighing, there, max_steps=8).x
+        options.append(_settled(model, effects, data, weighing, there))
+    return min(options, key=lambda f: f.S)
+
+
+ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
+
+
+def _settled(
+    model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
+) -> Fit:
+    """Scale and parameters in turn until the evidence stays."""
+    best = None
+    for _ in range(4):
+        scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
+        now = fit(model, effects, replace(data, scale=scale), weighing, x)
+        var = data.sd[data.use] ** 2 + scale**2
+        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale, data.scale))
+        if best is not None and now.S > best.S - 0.05:
+            break
+        best, x = now, now.x
+    return best if best is not None else now
+
+
+def _likely_scale(data: Poles, state: State) -> float:
+    """The scale at which the pairing as a whole is most probable."""
+
+    def cost(scale: float) -> float:
+        wider = replace(data, scale=scale)
+        r, _ = wider.residual(state, False)
+        return float(r @ r + 2 * np.log(wider.spread()[data.use]).sum()) + _scale_prior(scale)
+
+    return float(min(SCALES, key=cost))
+
+
+def _scale_prior(scale: float, median: float = 0.006) -> float:
+    return float((np.log(scale / median) / SCALE_SD) ** 2)
+
+
+HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
+
+
+def as_written(trial: Trial, weighing: Weighing | None) -> Trial:
+    """The trial as a deck can hold it: without scatter and jitter, the effect held.
+
+    The ordinary parameters are fitted anew, for they were found beside a scatter that is not
+    there any more; calibration without the effect does the same.
+    """
+    x = trial.fit.of(trial.effect)
+    unknown = tuple(
+        replace(p, mean=float(v), sd=HELD) for p, v in zip(trial.effect.parameters, x, strict=True)
+    )
+    held = replace(trial.effect, parameters=unknown)
+    kept = [e for e in trial.fit.effects if e.name not in NEVER_WRITTEN]
+    start = np.concatenate([trial.fit.of(e) for e in kept])
+    effects = [held if e is trial.effect else e for e in kept]
+    data = trial.data
+    if isinstance(data, Responses):
+        data = data.exactly()
+    return Trial(held, fit(trial.model, effects, data, weighing, start), trial.model)

@@ -1,0 +1,157 @@
+"""Maximum a posteriori fits of effects: Levenberg-Marquardt on whitened residuals and priors.
+
+-2 ln posterior = |r(x)|² + ((m(x) - m_weighed)/σ_m)² + Σ ((x - μ)/σ)²; the evidence is Laplace's
+(MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 27-28).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from ..effects.effect import Effect, Parameter
+from ..errors import ModelError
+from .likelihood import Data
+from .reduced_model import Reduced, State, evaluate
+
+
+class Status(Enum):
+    """How a fit ended."""
+
+    CONVERGED = "converged"
+    OUT_OF_STEPS = "ran out of steps; raise max_steps or start nearer"
+    STALLED = "no step improves; the start may be in a wrong valley"
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """The weighed mass and its standard deviation [kg]; a datum like any other."""
+
+    mass: float
+    sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Effects at their most probable x.
+
+    Attributes
+    ----------
+    effects : tuple of Effect      in the order of x
+    x : (n_p,)                     most probable parameters
+    covariance : (n_p, n_p)        of x, Laplace's
+    misfit : float                 |r|² of the data alone
+    S : float                      -2 ln evidence up to a constant common to all fits of the data
+    state : State                  the reduced model there
+    data : Data                    what was fitted
+    """
+
+    effects: tuple[Effect, ...]
+    x: np.ndarray
+    covariance: np.ndarray
+    misfit: float
+    S: float
+    state: State
+    data: Data
+    status: Status
+
+    def of(self, effect: Effect) -> np.ndarray:
+        """The part of x that belongs to one effect."""
+        return self.x[self.slice(effect)]
+
+    def slice(self, effect: Effect) -> slice:
+        """Where an effect's parameters stand in x."""
+        at = 0
+        for other in self.effects:
+            if other is effect:
+                return slice(at, at + len(other.parameters))
+            at += len(other.parameters)
+        raise ModelError(f"{effect.name} is not part of this fit")
+
+    def sd(self, effect: Effect) -> np.ndarray:
+        """Standard deviations of an effect's parameters."""
+        return np.sqrt(np.diag(self.covariance)[self.slice(effect)])
+
+
+def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
+    """All parameters, in the order of x."""
+    return tuple(p for effect in effects for p in effect.parameters)
+
+
+def beside(
+    effects: Sequence[Effect], weighing: Weighing | None, x: np.ndarray, state: State
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened residuals and slopes of what is known beside the data: priors and the scales."""
+    priors = unknowns(effects)
+    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+    r, J = (x - mean) / sd, np.diag(1 / sd)
+    if weighing is None:
+        return r, J
+    row = state.dweight[None] / weighing.sd
+    return np.append(r, (state.weight - weighing.mass) / weighing.sd), np.concatenate([J, row])
+
+
+def fit(
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Data,
+    weighing: Weighing | None,
+    start: np.ndarray,
+    *,
+    max_steps: int = 30,
+    gain: float = 0.05,
+) -> Fit:
+    """Most probable x from one start, and the evidence there.
+
+    Parameters
+    ----------
+    start : (n_p,)      where to begin
+    gain : float        stop when a step improves -2 ln posterior by less
+    """
+    priors = unknowns(effects)
+    sd = np.array([p.sd for p in priors])
+    limit = np.array([p.step for p in priors])
+
+    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
+        state = evaluate(model, effects, x, gradient)
+        r, J = data.residual(state, gradient)
+        r0, J0 = beside(effects, weighing, x, state)
+        return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
+
+    x, damping, status = start.copy(), 1e-2, Status.OUT_OF_STEPS
+    r, J, state = objective(x, True)
+    cost = float(r @ r)
+    for _ in range(max_steps):
+        found = _step(objective, x, r, J, cost, damping, limit)
+        if found is None:
+            status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED
+            break
+        improved, x, damping = found
+        r, J, state = objective(x, True)
+        cost = float(r @ r)
+        if improved < gain:
+            status = Status.CONVERGED
+            break
+    A = J.T @ J
+    S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
+    S += sum(2 * np.log(effect.places) for effect in effects)
+    own = r[: len(r) - len(x) - (weighing is not None)]
+    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
+
+
+def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]
+    """One accepted Levenberg-Marquardt step: (gain, new x, new damping), or None."""
+    A, g = J.T @ J, J.T @ r
+    for _ in range(8):
+        dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)
+        dx = dx / max(1.0, np.abs(dx / limit).max())
+        try:
+            trial = objective(x + dx, False)[0]
+        except ModelError:
+            trial = np.array([np.inf])
+        new = float(trial @ trial)
+        if new < cost:
+            return cost - new, x + dx, damping / 6
+        damping = max(damping, 1e-4) * 6
+    return None

@@ -1,0 +1,280 @@
+"""The reduced model in which every hypothesis is tried.
+
+K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells, M likewise;
+E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small dense
+eigenproblem; derivatives are exact, because K and M are known functions of the fields.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ..dynamics.reduction import orthonormal
+from ..effects.effect import Effect, count
+from ..effects.shell_components import COMPONENTS, component_matrices
+from ..effects.shell_groups import Sheet
+from ..errors import ModelError
+from ..fem.energy import mass_properties
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Projected operators over one basis.
+
+    Attributes
+    ----------
+    sheet : what the groups are
+    basis : (n, r)            M-orthonormal
+    linear, cubic : {component: (g, r, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
+    mass : (g, r, r)
+    K0, M0 : (r, r)           all that is no shell
+    weight0 : float           mass beside the shells [kg]
+    """
+
+    sheet: Sheet
+    basis: np.ndarray
+    linear: dict[str, np.ndarray]
+    cubic: dict[str, np.ndarray]
+    mass: np.ndarray
+    K0: np.ndarray
+    M0: np.ndarray
+    weight0: float
+    _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
+
+    def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
+        """Rows of the structure in the basis (k, r); projected once where they are to be kept."""
+        return self._once(rows, lambda: rows @ self.basis) if keep else rows @ self.basis
+
+    def operator(self, A: sp.csr_array) -> np.ndarray:
+        """Φᵀ A Φ of an operator of the structure (r, r); projected once."""
+        return self._once(A, lambda: _symmetric(self.basis.T @ (A @ self.basis)))
+
+    def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
+        known = self._seen.get(id(key))
+        if known is None or known[0] is not key:
+            known = self._seen[id(key)] = key, np.asarray(made())
+        return known[1]
+
+    def extended(self, vectors: np.ndarray) -> Self:
+        """The same model over a basis that also holds these vectors (n, k)."""
+        system = self.sheet.structure.system
+        basis = orthonormal(system.M, [self.basis, vectors], kept=self.basis.shape[1])
+        new = basis[:, self.basis.shape[1] :]
+        if not new.shape[1]:
+            return self
+
+        def grown(old: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+            side = self.sheet.project(matrices, self.basis, new)
+            return _bordered(old, side, self.sheet.project(matrices, new))
+
+        def rest(old: np.ndarray, A: sp.csr_array, shells: np.ndarray) -> np.ndarray:
+            r = len(old)
+            full = basis.T @ (A @ new)
+            out = _bordered(old, full[:r], full[r:])
+            out[:, r:] -= shells.sum(axis=0)[:, r:]
+            out[r:, :r] = out[:r, r:].T
+            return out
+
+        pieces = self.pieces()
+        linear = {k: grown(self.linear[k], A) for k, (A, _) in pieces.items()}
+        cubic = {k: grown(self.cubic[k], B) for k, (_, B) in pieces.items()}
+        mass = grown(self.mass, self.sheet.mass)
+        stiff = sum(linear.values()) + sum(cubic.values())
+        return replace(
+            self, basis=basis, linear=linear, cubic=cubic, mass=mass,
+            K0=rest(self.K0, system.K.real, np.asarray(stiff)), M0=rest(self.M0, system.M, mass),
+            _seen={},
+        )  # fmt: skip
+
+    def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Element matrices that grow with t and with t³, by the names of ``linear``."""
+        if "" in self.linear:
+            return {"": (self.sheet.linear, self.sheet.cubic)}
+        return component_matrices(self.sheet.structure.assembly)
+
+    def with_components(self) -> Self:
+        """The same model with the plane stiffness split into its four components."""
+        pieces = component_matrices(self.sheet.structure.assembly)
+        linear = {k: self.sheet.project(A, self.basis) for k, (A, _) in pieces.items()}
+        cubic = {k: self.sheet.project(B, self.basis) for k, (_, B) in pieces.items()}
+        return replace(self, linear=linear, cubic=cubic)
+
+
+def _bordered(old: np.ndarray, side: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """[[old, side], [sideᵀ, corner]] over the last two axes."""
+    top = np.concatenate([old, side], axis=-1)
+    low = np.concatenate([side.swapaxes(-1, -2), corner], axis=-1)
+    return np.asarray(np.concatenate([top, low], axis=-2))
+
+
+def reduce(sheet: Sheet, basis: np.ndarray) -> Reduced:
+    """Project a structure on a basis."""
+    system = sheet.structure.system
+    linear, cubic = sheet.project(sheet.linear, basis), sheet.project(sheet.cubic, basis)
+    mass = sheet.project(sheet.mass, basis)
+    K = basis.T @ (system.K.real @ basis)
+    M = basis.T @ (system.M @ basis)
+    rest = mass_properties(sheet.structure.assembly)[0] - float(sheet.weight.sum())
+    return Reduced(
+        sheet, basis, {"": linear}, {"": cubic}, mass,
+        _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),
+        _symmetric(M - mass.sum(axis=0)), max(rest, 0.0),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The reduced model at one x.
+
+    Attributes
+    ----------
+    lam : (r,)             ω² [rad²/s²]
+    phi : (r, r)           eigenvectors in the basis
+    dK, dM : (n_p, r, r)   derivatives in *modal* coordinates φᵀ(∂K)φ, where asked for
+    weight, dweight        mass on the scales [kg] and its gradient (n_p,)
+    offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
+    """
+
+    lam: np.ndarray
+    phi: np.ndarray
+    dK: np.ndarray
+    dM: np.ndarray
+    weight: float
+    dweight: np.ndarray
+    offset: np.ndarray | None
+    doffset: np.ndarray | None
+
+
+def evaluate(
+    model: Reduced, effects: Sequence[Effect], x: np.ndarray, gradient: bool = True
+) -> State:
+    """Eigenvalues, modes and exact derivatives of the model with these effects at x.
+
+    Raises
+    ------
+    ModelError
+        If the stiffness lost its positive (semi-)definiteness: an effect is wrong.
+    """
+    n_p = count(effects)
+    logs, slopes = log_fields(model, effects, x)
+    K, M, dK, dM = _shells(model, logs, slopes, gradient)
+    weight, dweight = _weight(model, logs, slopes)
+    offset: np.ndarray | None = None
+    doffset: np.ndarray | None = None
+    for effect, at in slices(effects):
+        for term in effect.terms(x[at]):
+            b = model.rows(term.rows, keep=not term.moving)
+            target, slope = (K, dK) if term.matrix == "K" else (M, dM)
+            target += (b.T * term.coefficient) @ b
+            if gradient:
+                slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, b, optimize=True)
+                for p, rows in term.moving.items():
+                    half = (b.T * term.coefficient) @ model.rows(rows, keep=False)
+                    slope[at.start + p] += half + half.T
+        for part in effect.matrices(x[at]):
+            A = model.operator(part.operator)
+            target, slope = (K, dK) if part.matrix == "K" else (M, dM)
+            target += part.coefficient * A
+            if gradient:
+                slope[at] += part.gradient[:, None, None] * A
+        extra, d_extra = effect.weight(x[at])
+        weight, dweight[at] = weight + extra, dweight[at] + d_extra
+        if (change := effect.outputs(x[at])) is not None:
+            if offset is None or doffset is None:
+                offset = np.zeros(len(change.value), complex)
+                doffset = np.zeros((len(change.value), n_p), complex)
+            offset, doffset[:, at] = offset + change.value, change.gradient
+    lam, phi = _eigen(K, M)
+    if gradient:
+        dK, dM = phi.T @ dK @ phi, phi.T @ dM @ phi
+    return State(lam, phi, dK, dM, weight, dweight, offset, doffset)
+
+
+def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
+    except (sl.LinAlgError, ValueError) as error:
+        raise ModelError(f"an effect left no positive mass: {error}") from error
+    if lam[0] < -1e-6 * lam[len(lam) // 2]:
+        raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
+    return lam, phi
+
+
+def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
+    """Every effect and where its parameters stand in x."""
+    ends = np.cumsum([len(e.parameters) for e in effects])
+    return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
+
+
+def log_fields(
+    model: Reduced, effects: Sequence[Effect], x: np.ndarray
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Sum of the log fields (g,) and their gradients (g, n_p), by name.
+
+    Raises
+    ------
+    ModelError
+        If a component of the plane stiffness is to change in a model that is not split by them.
+    """
+    n, n_p = len(model.sheet), count(effects)
+    logs = {name: np.zeros(n) for name in ("t", "E", "rho", *COMPONENTS)}
+    slopes = {name: np.zeros((n, n_p)) for name in logs}
+    for effect, at in slices(effects):
+        for change in effect.fields(x[at]):
+            if change.field in COMPONENTS and "" in model.linear:
+                raise ModelError(
+                    f"{effect.name} changes {change.field}; the model needs with_components()"
+                )
+            logs[change.field] = logs[change.field] + change.value
+            slopes[change.field][:, at] += change.gradient
+    return logs, slopes
+
+
+def _shells(
+    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """K, M and their derivatives (n_p, r, r) from the fields."""
+    r = model.K0.shape[0]
+    n_p = slopes["t"].shape[1]
+    K, M = model.K0.ravel().copy(), model.M0.ravel().copy()
+    dK, dM = np.zeros((n_p, r * r)), np.zeros((n_p, r * r))
+    for stacks, power in ((model.linear, 1), (model.cubic, 3)):
+        for name, stack in stacks.items():
+            component = logs[name] if name else 0.0
+            w = np.exp(logs["E"] + power * logs["t"] + component)
+            flat = stack.reshape(len(w), -1)
+            K += w @ flat
+            if gradient:
+                slope = slopes["E"] + power * slopes["t"] + (slopes[name] if name else 0.0)
+                dK += _weighted(w[:, None] * slope, flat)
+    w = np.exp(logs["rho"] + logs["t"])
+    flat = model.mass.reshape(len(w), -1)
+    M += w @ flat
+    if gradient:
+        dM += _weighted(w[:, None] * (slopes["rho"] + slopes["t"]), flat)
+    shape = (n_p, r, r)
+    return K.reshape(r, r), M.reshape(r, r), dK.reshape(shape), dM.reshape(shape)
+
+
+def _weighted(weights: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """weightsᵀ flat, only for the parameters that have any weight (n_p, r²)."""
+    out = np.zeros((weights.shape[1], flat.shape[1]))
+    active = np.flatnonzero(np.abs(weights).max(axis=0) > 0) if len(weights) else np.zeros(0, int)
+    if len(active):
+        out[active] = weights[:, active].T @ flat
+    return out
+
+
+def _weight(
+    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
+) -> tuple[float, np.ndarray]:
+    w = model.sheet.weight * np.exp(logs["rho"] + logs["t"])
+    return float(model.weight0 + w.sum()), np.asarray(w @ (slopes["rho"] + slopes["t"]))
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    return np.asarray(A + A.T) / 2

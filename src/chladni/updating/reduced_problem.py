@@ -1,0 +1,84 @@
+"""A structure made ready for trying hypotheses: sheet, basis, factor, places."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.eigen import normal_modes
+from ..dynamics.reduction import attachments, orthonormal, shifted
+from ..effects.catalogue import Places, places, spread
+from ..effects.shell_groups import Sheet, sheet
+from ..fem.assemble import Structure, structure
+from ..model.assembly import Assembly
+from ..sparse.factor import Factor
+from .reduced_model import Reduced, reduce
+
+REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
+
+
+@dataclass(frozen=True, eq=False)
+class Workbench:
+    """One structure, its reduced model, and where unknown things may sit.
+
+    Attributes
+    ----------
+    frequency : (r,) Hz      of the nominal model's modes, rigid ones included
+    candidates : Places      a spread of all of ``grids``
+    flexibility : (k,)       static response at each candidate beyond the basis [m/N]
+    hertz : shift of the static responses
+    """
+
+    structure: Structure
+    sheet: Sheet
+    model: Reduced
+    frequency: np.ndarray
+    factor: Factor
+    hertz: float
+    grids: Places
+    candidates: Places
+
+    def flexibility(self, where: Places) -> np.ndarray:
+        """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
+        exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
+        b = self.model.rows(where.rows)
+        K = self.model.basis.T @ (self.structure.system.K.real @ self.model.basis)
+        shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
+        inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
+        return np.asarray(np.maximum(exact - inside, 0.0))
+
+    def with_attachments(self, rows: sp.csr_array) -> Reduced:
+        """The reduced model over a basis that can carry these rows."""
+        return self.model.extended(attachments(self.factor, rows))
+
+
+def workbench(
+    assembly: Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
+    groups: int = 64, extra: np.ndarray | None = None, built: Structure | None = None,
+) -> Workbench:  # fmt: skip
+    """Make a structure ready.
+
+    Parameters
+    ----------
+    top : highest frequency of interest [Hz]
+    rows : (k, n) places whose static response the basis must hold (sensors, shakers)
+    extra : (n, m) further vectors for the basis
+    most : candidate places
+    """
+    built = structure(assembly) if built is None else built
+    modes = normal_modes(built.system, band=REACH * top)
+    flexible = modes.frequency[modes.frequency > 0.02 * top]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
+    factor = shifted(built.system, hertz)
+    blocks = [modes.shapes]
+    if rows is not None and rows.shape[0]:
+        blocks.append(attachments(factor, rows))
+    if extra is not None:
+        blocks.append(extra)
+    basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
+    cloth = sheet(built, groups)
+    grids = places(cloth)
+    chosen = grids.only(spread(grids.point, most))
+    return Workbench(
+        built, cloth, reduce(cloth, basis), modes.frequency, factor, hertz, grids, chosen
+    )

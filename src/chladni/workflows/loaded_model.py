@@ -1,0 +1,163 @@
+"""What commands share about a model: from a path to its assembly, its modes, its pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dofs import parse
+from ..dynamics.modes import ModalModel
+from ..errors import FileError, LabelError
+from ..fem.assemble import Structure, structure
+from ..model.analysis import Analysis
+from ..model.assembly import Assembly
+from ..units import Units
+from ..units import units as unit_system
+from ..view.surface import Surface, surface
+
+if TYPE_CHECKING:
+    from ..io.nastran import Deck
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """An assembly with its matrices, made when first asked for."""
+
+    source: Path
+    assembly: Assembly
+    unit: str = "m"  # of length; "" where a bare deck came without its unit system
+    notes: tuple[str, ...] = ()  # what of the deck was left out
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Matrices of the free degrees of freedom."""
+        return structure(self.assembly)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Place of the node of each row of the system (n, 3) [m]."""
+        dofs = self.structure.system.dofs
+        return np.asarray(self.assembly.points[self.assembly.rows(dofs[:, 0])])
+
+    @cached_property
+    def seen(self) -> Surface:
+        """What a picture of it shows."""
+        return surface(self.assembly, self.unit)
+
+    def modes(self, count: int) -> ModalModel:
+        """The lowest normal modes."""
+        from ..dynamics.eigen import normal_modes
+
+        count = min(count, len(self.structure.system.dofs))
+        return normal_modes(self.structure.system, count, points=self.places)
+
+    def directions(self, labels: Sequence[str]) -> sp.csr_array:
+        """Motion at labels as 12:+Z or 12:n (the surface normal): (k, n_free)."""
+        return sp.csr_array(sp.vstack([self._direction(text) for text in labels]))
+
+    def _direction(self, text: str) -> sp.csr_array:
+        point, _, axis = text.partition(":")
+        if axis.strip() == "n" and point.strip().isdecimal():
+            ids = np.array([int(point)])
+            return self.structure.along(ids, normals_at(self.assembly, ids))
+        point_id, component, sign = parse(text)
+        return sp.csr_array(sign * self.structure.rows(np.array([[point_id, component]])))
+
+    def motion(self, shapes: np.ndarray) -> np.ndarray:
+        """Translation of every point in the basic frame, u = T q: (n, r) -> (n_points, 3, r)."""
+        u = self.structure.T @ shapes
+        return np.asarray(u.reshape(len(self.assembly.points), 6, -1)[:, :3])
+
+
+def load_model(
+    source: Path, units: str | None = None, allow: Sequence[str] = (), subcase: int | None = None
+) -> Model:
+    """The model of a bare deck, or of a case (folder or case.toml).
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it is no deck and no case.
+    """
+    if not source.exists():
+        raise FileError(f"no file or folder {source}{beside(source)}")
+    if is_case(source):
+        from ..case import load_case
+
+        return Model(source, load_case(source).assembly)
+    return load_deck(source, units, allow).model(subcase)
+
+
+@dataclass(frozen=True, eq=False)
+class DeckModels:
+    """A bare deck, what it asks for, and its model under each subcase."""
+
+    source: Path
+    deck: "Deck"
+    units: Units | None
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """Loads, frequencies, damping; read when first asked for."""
+        from ..io.nastran.read.analysis_requests import analysis
+
+        return analysis(self.deck, self.units)
+
+    def model(self, subcase: int | None = None) -> Model:
+        """The model under the supports and equations of a subcase, or of the one for modes."""
+        from ..io.nastran import assembly
+        from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
+
+        made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
+        return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
+
+
+def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:
+    """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
+    from ..io.nastran import read_deck
+
+    if not source.is_file():
+        raise FileError(f"no file {source}{beside(source)}")
+    system = None if units is None else unit_system(units)
+    return DeckModels(source, read_deck(source, allow), system)
+
+
+def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
+    """Unit normal of the shells around each grid, weighted by area: (k, 3)."""
+    seen, at = surface(assembly), assembly.rows(ids)
+    normal = np.zeros_like(seen.points)
+    for corner in range(4):
+        np.add.at(normal, seen.faces[:, corner], seen.areas())
+    length = np.linalg.norm(normal[at], axis=1, keepdims=True)
+    if np.any(bare := length[:, 0] == 0):
+        raise LabelError(
+            f"grid {ids[bare][0]} is on no shell, so it has no normal; give +X, +Y, +Z"
+        )
+    return np.asarray(normal[at] / length)
+
+
+def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:
+    """Values of the shells as values of all faces; skins of solids have none (nan)."""
+    values = np.full(len(seen.faces), np.nan)
+    values[: len(of_shells)] = of_shells
+    return values
+
+
+def is_case(source: Path) -> bool:
+    """A folder (with a case.toml, or to be told that there is none) or a .toml file."""
+    return source.is_dir() or source.suffix == ".toml"
+
+
+def beside(source: Path) -> str:
+    """The names nearest to the one that is missing, else those of its kind."""
+    if not source.parent.is_dir():
+        return f"; there is no folder {source.parent} either"
+    names = sorted(p.name for p in source.parent.iterdir() if not p.name.startswith("."))
+    alike = [n for n in names if Path(n).suffix == source.suffix]
+    near = get_close_matches(source.name, names, 4) or alike[:4]
+    return f"; beside it there is {', '.join(near)}" if near else ""

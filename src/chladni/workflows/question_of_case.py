@@ -1,0 +1,57 @@
+"""From a case to the question a diagnosis is asked."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..case import Case, Places
+from ..errors import FileError
+from ..updating.map_fit import Weighing
+from ..updating.question import Places as Sites
+from ..updating.question import Question
+
+
+def question(case: Case) -> Question:
+    """The question of a case.
+
+    Raises
+    ------
+    FileError
+        If the recordings hold neither FRFs nor poles, or the base was moved.
+    """
+    frfs = case.frfs
+    poles = [r.poles for r in case.recordings if r.poles is not None]
+    if not frfs and not poles:
+        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+    if case.inputs.base.any():
+        raise FileError(
+            f"{case.path}: diagnosis of a structure moved at its supports is not built yet; "
+            "give responses to a force"
+        )
+    weighing = None
+    if case.setup.mass is not None:
+        weighing = Weighing(case.setup.mass, case.setup.mass_sd)
+    asked = Question(
+        case.assembly,
+        _sites(case.outputs),
+        _sites(case.inputs),
+        weighing=weighing,
+        hangers=case.setup.hangers,
+        band=case.band or (0.0, np.inf),
+        exclude=case.exclude,
+        held_sensors=case.held_sensors,
+        held_band=case.held_band,
+        gain_known=case.gain_known,
+        parameters=tuple(
+            (p.field, p.parts or tuple(part.name for part in case.assembly.parts))
+            for p in case.parameters
+        ),
+    )
+    if frfs:
+        return replace(asked, frf=frfs[0])
+    state = poles[0].of(poles[0].states[0])
+    return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+
+
+def _sites(places: Places) -> Sites:
+    return Sites(places.labels, places.grids, places.points, places.directions, places.sd)

@@ -1,0 +1,1 @@
+"""Generated structures: plates, panels, the open tailgate; their mesher and their joints."""

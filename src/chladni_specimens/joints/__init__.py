@@ -1,0 +1,1 @@
+"""Joint builders on any assembly."""

@@ -1,0 +1,300 @@
+"""Screws, holes, hems, grips against sliding, and masses."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from chladni.errors import ModelError
+from chladni.geometry.cells import edges_of
+from chladni.geometry.nearest import Sheet, Surface, tangents
+from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
+from chladni.model.properties import BeamSection, Isotropic
+
+from .builders import (
+    REACH,
+    SOFT_ADHESIVE,
+    STEEL,
+    Joined,
+    Joint,
+    adhesive_bead,
+    cell_carriers,
+    followed,
+    next_id,
+    tied,
+    with_part,
+    with_points,
+)
+
+_ALL = (1, 2, 3, 4, 5, 6)
+Family = TypeVar("Family", Beams, Masses, Bushes)
+
+
+def free_edges(nodes: np.ndarray) -> np.ndarray:
+    """Sides (k, 2) that belong to one cell only."""
+    sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
+    return sides[count == 1]
+
+
+def rim(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
+    """Rows of the points round a hole: its rim, else free edges within `radius`, else a shell's.
+
+    A hole is a closed free edge no wider than four radii whose middle is within two radii. Where a
+    mesh does not resolve a bolt hole, the nearest shell stands for it.
+    """
+    sides = free_edges(surface.nodes)
+    if len(loop := _loop(surface.points, sides, place, radius)):
+        return loop
+    edge = np.unique(sides)
+    near = edge[np.linalg.norm(surface.points[edge] - place, axis=1) <= radius]
+    if len(near) >= 3:
+        return near
+    return np.unique(surface.nodes[surface.feet(place[None]).shell[0]])
+
+
+def _loop(points: np.ndarray, sides: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
+    """Rows of the small closed edge nearest to a place; none if there is none."""
+    near = sides[np.linalg.norm(points[sides[:, 0]] - place, axis=1) <= 6 * radius]
+    if not len(near):
+        return np.zeros(0, int)
+    rows, ends = np.unique(near, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(len(rows), len(rows)))
+    piece = connected_components(graph, directed=False)[1]
+    best, out = 2 * radius, np.zeros(0, int)
+    for k in range(piece.max() + 1):
+        ring, x = rows[piece == k], points[rows[piece == k]]
+        closed = len(ring) >= 3 and (piece[ends[:, 0]] == k).sum() == len(ring)
+        away = float(np.linalg.norm(x.mean(axis=0) - place))
+        if closed and np.linalg.norm(np.ptp(x, axis=0)) <= 4 * radius and away <= best:
+            best, out = away, ring
+    return out
+
+
+def _spider(id_: int, centre: int, rows: np.ndarray) -> RigidBody:
+    return RigidBody(id_, int(centre), tuple(rows.tolist()), (_ALL,) * len(rows))
+
+
+def screw(
+    assembly: Assembly,
+    place: np.ndarray,
+    sheets: tuple[Sheet, Sheet],
+    *,
+    diameter: float = 0.006,
+    mass: float = 0.012,
+    material: Isotropic = STEEL,
+    reach: float = REACH,
+    name: str = "screws",
+) -> Joined:
+    """A bar between the rims of two holes (RBE2), its mass half at either end.
+
+    The bar weighs little over the millimetre between two sheets; head and nut make up the rest.
+    """
+    place = np.asarray(place, dtype=float)
+    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    feet = [s.feet(place[None]) for s in surfaces]
+    for surface, foot in zip(surfaces, feet, strict=True):
+        surface.within(foot, place[None], reach)
+    rims = [rim(s, f.place[0], diameter) for s, f in zip(surfaces, feet, strict=True)]
+    if common := set(rims[0].tolist()) & set(rims[1].tolist()):
+        raise ModelError(f"the holes of a screw share grids {sorted(common)[:3]}; name two sheets")
+    ends = _ends(feet[0].place[0], feet[1].place[0], feet[0].normal[0])
+    grown, centres = with_points(assembly, ends)
+    first = next_id(grown)
+    spiders = tuple(_spider(first + k, centres[k], rims[k]) for k in range(2))
+    grown = replace(grown, rigid=(*grown.rigid, *spiders))
+    grown = _with_bar(grown, first + 2, centres, _round_bar(material, diameter), name)
+    bar = material.rho * np.pi * diameter**2 / 4 * float(np.linalg.norm(ends[1] - ends[0]))
+    grown = with_masses(grown, centres, max(mass - bar, 0.0) / 2)
+    far = max(float(f.distance[0]) for f in feet)
+    x, y, z = ends.mean(axis=0).tolist()
+    return grown, (
+        Joint("screw", (x, y, z), (surfaces[0].name, surfaces[1].name), (first + 2,), far),
+    )
+
+
+def _ends(a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Ends of the bar: the feet, at least a millimetre apart."""
+    gap = float(np.linalg.norm(b - a))
+    if gap > 1e-3:
+        return np.stack([a, b])
+    axis = normal if gap < 1e-5 else (b - a) / max(gap, 1e-9)
+    return (a + b) / 2 + np.outer([-0.5e-3, 0.5e-3], axis)
+
+
+def _round_bar(material: Isotropic, d: float) -> BeamSection:
+    """A = π d²/4, I = π d⁴/64, J = 2 I."""
+    I = np.pi * d**4 / 64
+    return BeamSection(material, np.pi * d**2 / 4, I, I, 0.0, 2 * I)
+
+
+def _with_bar(
+    assembly: Assembly, id_: int, nodes: np.ndarray, section: BeamSection, name: str
+) -> Assembly:
+    grown, part = with_part(assembly, name, section)
+    axis = np.diff(grown.points[nodes], axis=0)
+    up = tangents(axis / np.linalg.norm(axis))[0]
+    new = Beams(
+        np.array([id_]),
+        nodes[None],
+        np.array([part]),
+        up,
+        np.zeros((1, 2, 3)),
+        np.zeros((1, 2, 6), bool),
+    )
+    return replace(grown, beams=_joined(grown.beams, new))
+
+
+def _joined(old: Family, new: Family) -> Family:
+    """Two families of one kind as one."""
+    return type(old)(**{k: np.concatenate([getattr(old, k), getattr(new, k)]) for k in vars(old)})
+
+
+def with_masses(assembly: Assembly, rows: np.ndarray, mass: float | np.ndarray) -> Assembly:
+    """Point masses [kg] at these rows of points."""
+    rows = np.atleast_1d(np.asarray(rows, dtype=np.int64))
+    matrix = np.zeros((len(rows), 6, 6))
+    matrix[:, :3, :3] = np.broadcast_to(mass, len(rows))[:, None, None] * np.eye(3)
+    ids = next_id(assembly) + np.arange(len(rows))
+    return replace(assembly, masses=_joined(assembly.masses, Masses(ids, rows, matrix)))
+
+
+def accelerometers(assembly: Assembly, ids: Sequence[int], mass: float = 0.005) -> Assembly:
+    """The sensors' mass at these grids."""
+    return with_masses(assembly, assembly.rows(list(ids)), mass)
+
+
+def tied_hole(
+    assembly: Assembly,
+    place: np.ndarray,
+    sheets: Sequence[Sheet],
+    *,
+    radius: float = 0.006,
+    reach: float = REACH,
+) -> Joined:
+    """The rims of an empty hole in all its sheets on one RBE2, which reality does not have."""
+    place = np.asarray(place, dtype=float)
+    surfaces = [Surface.of(assembly, s) for s in sheets]
+    feet = [s.feet(place[None]) for s in surfaces]
+    for surface, foot in zip(surfaces, feet, strict=True):
+        surface.within(foot, place[None], reach)
+    rows = np.unique(
+        np.concatenate([rim(s, f.place[0], radius) for s, f in zip(surfaces, feet, strict=True)])
+    )
+    grown, centre = with_points(assembly, np.mean([f.place for f in feet], axis=0))
+    id_ = next_id(grown)
+    grown = replace(grown, rigid=(*grown.rigid, _spider(id_, centre[0], rows)))
+    x, y, z = grown.points[centre[0]].tolist()
+    far = max(float(f.distance[0]) for f in feet)
+    names = (surfaces[0].name, surfaces[-1].name)
+    return grown, (Joint("tied hole", (x, y, z), names, (id_,), far),)
+
+
+def grip(
+    assembly: Assembly,
+    places: np.ndarray,
+    directions: np.ndarray,
+    stiffness: np.ndarray,
+    sheets: tuple[Sheet, Sheet],
+    *,
+    reach: float = REACH,
+) -> Joined:
+    """Springs k (u_a - u_b)·e between two sheets at one point each, so that rigid motion is free.
+
+    Both ends are RBE3 grids at the same place: a spring over a gap would hold rotations.
+
+    Parameters
+    ----------
+    places, directions : (k, 3)   [m], unit vectors
+    stiffness : (k,)              [N/m]
+    """
+    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    ends, far = [], np.zeros(len(places))
+    for surface in surfaces:
+        feet = surface.feet(places)
+        surface.within(feet, places, reach)
+        far = np.maximum(far, feet.distance)
+        assembly, rows = tied(assembly, places, cell_carriers(surface, feet))
+        ends.append(rows)
+    k = np.zeros((len(places), 6))
+    k[:, 0] = stiffness
+    none = np.zeros_like(k)
+    ids = next_id(assembly) + np.arange(len(places))
+    new = Bushes(ids, np.column_stack(ends), _frames(directions), places, k, none, none)
+    names = (surfaces[0].name, surfaces[1].name)
+    joints = tuple(
+        Joint("grip", tuple(p), names, (int(i),), float(d))
+        for p, i, d in zip(places.tolist(), ids, far, strict=True)
+    )
+    return replace(assembly, bushes=_joined(assembly.bushes, new)), joints
+
+
+def _frames(directions: np.ndarray) -> np.ndarray:
+    """Frames (k, 3, 3) whose first axis is the direction."""
+    e = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    u, v = tangents(e)
+    return np.stack([e, u, v], axis=1)
+
+
+def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Unit tangents (k, 3) of a polyline and what of `per_length` each of its points stands for."""
+    t = np.gradient(line, axis=0)
+    length = np.linalg.norm(t, axis=1)
+    return t / length[:, None], per_length * length
+
+
+def hem(
+    assembly: Assembly,
+    edge: np.ndarray,
+    sheets: tuple[Sheet, Sheet],
+    *,
+    inset: float = 0.0075,
+    width: float = 0.010,
+    height: float | None = 0.15e-3,
+    pitch: float | None = None,
+    grip_stiffness: float = 0.0,
+    material: Isotropic = SOFT_ADHESIVE,
+    reach: float = REACH,
+    name: str = "hem adhesive",
+) -> Joined:
+    """A string of adhesive beside the inner sheet's edge, and a grip against sliding along it.
+
+    Parameters
+    ----------
+    edge : (k, 3)          the inner sheet's edge; the string runs `inset` inboard of it [m]
+    sheets : the inner and the outer sheet
+    grip_stiffness : stiffness against sliding along the edge per length [N/m²]; 0: the soft
+        string alone, as the thesis models it
+    """
+    inner = Surface.of(assembly, sheets[0])
+    edge = followed(np.asarray(edge, dtype=float), pitch)
+    line = _inboard(inner, edge, inset)
+    assembly, joints = adhesive_bead(
+        assembly,
+        line,
+        sheets,
+        width=width,
+        height=height,
+        material=material,
+        reach=reach,
+        name=name,
+    )
+    joints = tuple(replace(j, kind="hem") for j in joints)
+    if not grip_stiffness:
+        return assembly, joints
+    direction, k = along_line(edge, grip_stiffness)
+    assembly, grips = grip(assembly, edge, direction, k, sheets, reach=reach)
+    return assembly, joints + grips
+
+
+def _inboard(surface: Surface, edge: np.ndarray, inset: float) -> np.ndarray:
+    """The edge moved into the sheet along its surface, on the side where the sheet is."""
+    tangent, _ = along_line(edge, 1.0)
+    side = np.cross(surface.feet(edge).normal, tangent)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    left, right = (surface.feet(edge + s * inset * side) for s in (1, -1))
+    sign = np.where(left.distance.sum() <= right.distance.sum(), 1.0, -1.0)
+    return surface.feet(edge + sign * inset * side).place

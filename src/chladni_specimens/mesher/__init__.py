@@ -1,0 +1,1 @@
+"""Quad-dominant meshes of pressed sheets."""

@@ -1,0 +1,461 @@
+"""The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from chladni.case import load_case
+from chladni.cli.app import COMMANDS, application, guarded
+from chladni.cli.diagnose import written
+from chladni.errors import AccuracyError, FileError
+
+NEEDED = {  # extra arguments a command cannot do without
+    "frf": ["--input", "1:+Z", "--output", "9:+Z"],
+}
+OSCILLATOR = """SOL 108
+CEND
+DLOAD = 5
+FREQ = 6
+BEGIN BULK
+GRID,1,,0.,0.,0.,,23456
+GRID,2,,1.,0.,0.,,123456
+CELAS2,1,4000.,1,1,2,1
+CDAMP2,2,2.0,1,1,2,1
+CONM2,3,1,,0.1
+RLOAD1,5,7,,,8
+DAREA,7,1,1,3.0
+TABLED1,8
+,0.,1.,100.,1.,ENDT
+FREQ1,6,5.,5.,9
+ENDDATA
+"""
+
+
+def deck_text(n=2, side=0.3, t=1e-3, width=None):
+    """A free steel plate of n by n CQUAD4, square unless told, SI."""
+    lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", f"PSHELL,1,1,{t},1,,1"]
+    x, y = np.linspace(0, side, n + 1), np.linspace(0, width or side, n + 1)
+    lines += [
+        f"GRID,{1 + j + (n + 1) * i},,{x[i]:.5f},{y[j]:.5f},0.0"
+        for i in range(n + 1)
+        for j in range(n + 1)
+    ]
+    for i in range(n):
+        for j in range(n):
+            a = 1 + j + (n + 1) * i
+            lines.append(f"CQUAD4,{1 + j + n * i},1,{a},{a + n + 1},{a + n + 2},{a + 1}")
+    return "\n".join([*lines, "ENDDATA", ""])
+
+
+@pytest.fixture
+def deck(tmp_path):
+    path = tmp_path / "plate.bdf"
+    path.write_text(deck_text(6))
+    return path
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+def test_modes(tmp_path):
+    """Six rigid modes, then f = λ²/(2π a²) √(D/ρt) with λ² = 13.47 (Leissa 1973, free square)."""
+    deck = tmp_path / "plate.bdf"
+    deck.write_text(deck_text(14))
+    done = call("modes", deck, "--count", 8, "--units", "SI", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "modes.json").read_text())
+    assert result["mass_kg"] == pytest.approx(7850 * 1e-3 * 0.09)
+    np.testing.assert_allclose(result["centre_of_gravity_m"], [0.15, 0.15, 0], atol=1e-9)
+    D = 2.1e11 * 1e-9 / 12 / (1 - 0.09)
+    f = 13.47 / (2 * np.pi * 0.09) * np.sqrt(D / 7.85)
+    assert max(result["frequency_hz"][:6]) < 0.01
+    assert result["frequency_hz"][6] == pytest.approx(f, rel=0.02)
+    np.testing.assert_allclose(result["generalized_mass"], 1, rtol=1e-8)
+    (share,) = (part["strain_energy"] for part in result["parts"].values())
+    np.testing.assert_allclose(share[6:], 1, rtol=1e-6)
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names == {"modes.json", "modes.vtu", "modes.png", "report.html"}
+
+
+def test_frf_peaks_at_its_modes(deck, tmp_path):
+    out = tmp_path / "out"
+    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
+    done = call("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    call("modes", deck, "--count", 7, "--units", "SI", "--out", out)
+    first = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        assert held["outputs"].tolist() == ["1:+Z", "49:n"]
+        assert str(held["quantity"]) == "accelerance"
+        peak = held["frequency_hz"][np.abs(held["values"][:, 0, 0]).argmax()]
+    assert peak == pytest.approx(first, abs=0.1)
+
+
+def test_frf_holds_what_higher_modes_contribute(deck, tmp_path):
+    """Modes to 3 f and a two-term rest: direct inversion to (1/3)⁴ of the rest, so 1.2 %."""
+    from chladni.dynamics.frf import direct_frf
+    from chladni.workflows.loaded_model import load_model
+
+    out = tmp_path / "out"
+    ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "30:+Z"]
+    band = ["--band", "5:30", "--lines", 6, "--damping", 0.0]
+    options = [*ends, *band, "--units", "SI", "--quantity", "receptance", "--out", out]
+    assert call("frf", deck, *options).exit_code == 0
+    system = load_model(deck, "SI").structure.system
+    rows = [system.dofs.tolist().index([grid, 3]) for grid in (1, 30)]
+    exact = direct_frf(system, np.array(rows), np.array(rows[:1]), np.linspace(5, 30, 6)).values
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        np.testing.assert_allclose(held["values"], exact, rtol=3**-4)
+
+
+def test_frf_runs_what_the_deck_asks_for(tmp_path):
+    """One mass: u = F / (k - ω² m + i ω c), as SOL 108 has it."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR)
+    done = call("frf", deck, "--quantity", "receptance", "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        w = 2 * np.pi * held["frequency_hz"]
+        assert held["outputs"].tolist() == ["1:+X"]
+        exact = 3.0 / (4000 - 0.1 * w**2 + 2j * w)
+        np.testing.assert_allclose(w, 2 * np.pi * 5 * np.arange(1, 11))
+        np.testing.assert_allclose(held["values"][:, 0, 0], exact, rtol=1e-9)
+
+
+def test_transmissibility_of_a_base(tmp_path):
+    """One mass on a moving base without dashpot: T = 1 / (1 - f²/f₀²)."""
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(OSCILLATOR.replace("CDAMP2,2,2.0,1,1,2,1\n", ""))
+    ends = ["--input", "base:+X", "--output", "1:+X", "--band", "5:20", "--lines", 4]
+    done = call("frf", deck, *ends, "--damping", 0.0, "--out", out)
+    assert done.exit_code == 0, done.output
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        assert str(held["quantity"]) == "transmissibility"
+        f, f0 = held["frequency_hz"], np.sqrt(4000 / 0.1) / (2 * np.pi)
+        np.testing.assert_allclose(held["values"][:, 0, 0], 1 / (1 - (f / f0) ** 2), rtol=1e-9)
+
+
+def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
+    """On a plate in z = 0 the normal is Z up to sign, and H is reciprocal."""
+    labels = ["--input", "1:+Z", "--input", "9:n", "--output", "1:+Z", "--output", "9:n"]
+    assert call("frf", deck, *labels, "--out", tmp_path / "out").exit_code == 0
+    with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
+        H = held["values"]
+    np.testing.assert_allclose(H, H.swapaxes(1, 2), rtol=1e-6, atol=1e-9 * np.abs(H).max())
+
+
+def test_render(deck, tmp_path):
+    """Modes are counted from the first elastic one, so the plate's first is no rigid motion."""
+    out = tmp_path / "out"
+    options = ["--modes", "7-9", "--gif", 7, "--thickness", "--energy", 8]
+    done = call("render", deck, *options, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
+    assert {p.name for p in out.iterdir()} == due | {"report.html"}
+    assert "6 rigid motions are not counted" in (out / "report.html").read_text()
+
+
+def plates(heights):
+    """Free plates of 80 x 80 x 1 mm over each other, tied rigidly at one corner."""
+    lines = ["CEND", "BEGIN BULK", "MAT1,1,2.1+11,,.3,7850."]
+    for p, z in enumerate(heights, start=1):
+        lines.append(f"PSHELL,{p},1,.001,1,,1")
+        for i, j in np.ndindex(5, 5):
+            lines.append(f"GRID,{100 * p + 10 * i + j},,{0.02 * i},{0.02 * j},{z}")
+        for n, (i, j) in enumerate(np.ndindex(4, 4)):
+            a = 100 * p + 10 * i + j
+            lines.append(f"CQUAD4,{100 * p + n},{p},{a},{a + 10},{a + 11},{a + 1}")
+        if p > 1:
+            lines.append(f"RBE2,{900 + p},100,123456,{100 * p}")
+    return "\n".join([*lines, "ENDDATA", ""])
+
+
+def test_clearance_of_two_plates(tmp_path):
+    """Two plates of 1 mm at a distance of 3 mm leave 2 mm, and a force that closes them."""
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(plates([0.0, 0.003]))
+    options = ["--clearance", "--modes", 1, "--units", "SI", "--out", out]
+    done = call("render", deck, *options)
+    assert done.exit_code == 0, done.output
+    (pair,) = json.loads((out / "clearance.json").read_text())
+    assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
+    assert not pair["touching"]
+    assert "first contact" in (out / "report.html").read_text()
+
+
+def test_one_plate_has_no_clearance(tmp_path):
+    deck, out = tmp_path / "one.bdf", tmp_path / "out"
+    deck.write_text(plates([0.0]))
+    done = call("render", deck, "--clearance", "--out", out)
+    assert (done.exit_code, out.exists()) == (2, False)
+    assert "no two parts" in done.output
+
+
+CASE = """
+[model]
+deck = "plate.bdf"
+units = "SI"
+damping = 0.01
+[test]
+recordings = ["frf.npz"]
+[band]
+fit = [25.0, 180.0]
+"""
+
+
+@pytest.fixture
+def case(deck, tmp_path):
+    """A test of the model itself: six sensors, one shaker, 1 % damping."""
+    deck.write_text(deck_text(6, width=0.22))  # no two modes alike, none with a node at the shaker
+    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
+    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", tmp_path]
+    assert call("frf", deck, *options).exit_code == 0
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path
+
+
+def test_a_model_correlates_with_itself(case, tmp_path):
+    """Every mode finds itself, Q is nothing; MAC is 1 but for faintly driven modes."""
+    done = call("correlate", case, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out" / "correlation.json").read_text())
+    assert len(found["modes"]) >= 4
+    assert found["alone_test_hz"] == []
+    assert max(abs(m["deviation"]) for m in found["modes"]) < 1e-3
+    assert min(m["mac"] for m in found["modes"]) > 0.95
+    assert np.median([m["mac"] for m in found["modes"]]) > 0.999
+    assert found["Q"]["mean"] < 1e-6
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"correlation.json", "mac.png", "frequencies.png", "frf_fitted.png"} < names
+
+
+def test_frf_of_a_case_is_what_its_recording_holds(case, tmp_path):
+    """The recording was made of the same model: its lines, its labels, its values."""
+    done = call("frf", case, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    here, there = np.load(tmp_path / "out" / "frf.npz"), np.load(case / "frf.npz")
+    assert here["outputs"].tolist() == there["outputs"].tolist()
+    H, due = here["values"], there["values"]
+    np.testing.assert_allclose(H, due, atol=1e-4 * np.abs(due).max())
+
+
+def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
+    out = tmp_path / "out"
+    done = call("identify", case, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert call("modes", case, "--count", 12, "--out", out).exit_code == 0
+    (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
+    f = np.array(json.loads((out / "modes.json").read_text())["frequency_hz"])
+    f = f[(f > 25) & (f < 180)]
+    found = np.array(entry["frequency_hz"])[entry["firm"]]
+    near = np.abs(found[:, None] / f - 1).min(axis=1)
+    assert near.max() < 1e-3
+    assert len(found) == len(f)
+    np.testing.assert_allclose(np.array(entry["damping"])[entry["firm"]], 0.01, rtol=0.02)
+    assert (out / "poles.csv").read_text().startswith("mode,frequency_hz")
+
+
+def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
+    """The model's own responses are explained by the model; the answer is whole and readable."""
+    (case / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))
+    done = call("diagnose", case, "--out", tmp_path / "answer")
+    assert done.exit_code == 0, done.output
+    d = json.loads((tmp_path / "answer" / "diagnosis.json").read_text())
+    assert d["verdict"] in ("nothing missing", "calibration only")
+    assert d["effects"] == []
+    assert all("why_not" in a for a in d["alternatives"])
+    names = {p.name for p in (tmp_path / "answer").iterdir()}
+    assert {"report.html", "updated.bdf", "diagnosis.json", "evidence.png", "setup.png"} < names
+    modes = call("modes", tmp_path / "answer" / "updated.bdf", "--units", "SI", "--count", 14)
+    assert modes.exit_code == 0, modes.output
+
+
+LAMINATE = "PCOMP,1,,,,,,,SYM\n,1,2.5e-4,0.,,1,2.5e-4,45."
+
+
+def calibrated(case, out, factor=1.21):
+    """A laminated plate calibrated to the recording of one so much stiffer."""
+    out.mkdir()
+    text = deck_text(6, width=0.22)
+    (case / "plate.bdf").write_text(text.replace("2.1+11", f"{2.1e11 * factor:.4e}"))
+    ends = [x for grid in (2, 4, 7, 18, 30, 43) for x in ("--output", f"{grid}:+Z")]
+    options = ["--input", "2:+Z", *ends, "--band", "20:200", "--units", "SI", "--out", case]
+    assert call("frf", case / "plate.bdf", *options).exit_code == 0
+    (case / "plate.bdf").write_text(text.replace("PSHELL,1,1,0.001,1,,1", LAMINATE))
+    done = call("calibrate", case, "--out", out)
+    assert done.exit_code == 0, done.output
+    return json.loads((out / "diagnosis.json").read_text())
+
+
+def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
+    """Stiffness over mass of the plies moves by what was concealed; the deck is read again."""
+    out = tmp_path / "answer"
+    d = calibrated(case, out)
+    assert d["files"]["deck"] == "updated.bdf"
+    assert any("of 5 starts, 4 of them random, ended within 1" in note for note in d["notes"])
+    assert "missing physics was not looked for" in (out / "report.html").read_text()
+    assert call("modes", out / "updated.bdf", "--units", "SI", "--count", 8, "--out", out).output
+    f = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    assert call("modes", case / "plate.bdf", "--units", "SI", "--count", 8, "--out", out).output
+    before = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    assert f / before == pytest.approx(1.1, rel=0.01)
+
+
+def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
+    """One element of a laminate cannot be thinner than the rest: no deck, and a note says why."""
+    text = deck_text(6, width=0.22).replace("PSHELL,1,1,0.001,1,,1", LAMINATE)
+    (case / "plate.bdf").write_text(text)
+    opened = load_case(case)
+    shells = opened.assembly.shells
+    thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
+    final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
+    out = tmp_path / "answer"
+    out.mkdir()
+    path, notes = written(SimpleNamespace(folder=out), opened, final)
+    assert path is None
+    assert len(notes) == 1
+    assert notes[0].startswith("no updated deck was written: ")
+    assert "changed in a way its layers cannot" in notes[0]
+    assert not list(out.iterdir())
+
+
+def test_specimen_comes_back_as_a_deck(tmp_path):
+    """What is written weighs what the generator says: ρ t (a b) of a plate."""
+    out = tmp_path / "out"
+    sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
+    assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
+    done = call("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
+    assert done.exit_code == 0, done.output
+    mass = json.loads((out / "modes.json").read_text())["mass_kg"]
+    assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)
+
+
+def test_plan_sees_every_mode(deck, tmp_path):
+    """As many sensors as modes or more, no label twice, no mode unseen."""
+    out = tmp_path / "out"
+    done = call("plan", deck, "--modes", 5, "--sensors", 8, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    result = json.loads((out / "plan.json").read_text())
+    labels = [s["label"] for s in result["sensors"]]
+    assert len(set(labels)) == 8
+    assert (out / "sensors.csv").read_text().count("output") == 8
+
+
+WITH_FILE = [c for c in COMMANDS if c not in ("demo", "study")]  # these two take no file
+BAD = {
+    "missing": None,
+    "empty": b"",
+    "binary": bytes(range(256)) * 20,
+    "text": "one fine day\n" * 30,
+    "no grids": "BEGIN BULK\nMAT1,1,2.1+11,,0.3,7850.\nENDDATA\n",
+    "no elements": "BEGIN BULK\nGRID,1,,0.,0.,0.\nENDDATA\n",
+    "unknown property": deck_text().replace("PSHELL,1,", "PSHELL,7,"),
+    "unknown grid": deck_text().replace("CQUAD4,1,1,1,", "CQUAD4,1,1,999,"),
+    "no thickness": deck_text().replace("PSHELL,1,1,0.001,", "PSHELL,1,1,,"),
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "fault"),
+    [("modes", fault) for fault in BAD]
+    + [(c, f) for c in WITH_FILE if c != "modes" for f in ("missing", "binary", "no grids")],
+)
+def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
+    path, content = tmp_path / "bad.bdf", BAD[fault]
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    done = call(command, path, *NEEDED.get(command, []), "--out", tmp_path / "runs" / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    said = done.stderr.strip()
+    assert said.startswith("chladni: ")
+    assert "\n" not in said
+    assert "Traceback" not in said
+    assert not list(tmp_path.glob("runs/*")), "half a run was left"
+
+
+@pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in ("report", "specimen")])
+def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
+    done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "case.toml" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["frf", "--input", "999:+Z", "--output", "1:+Z"], "999"),
+        (["frf"], "--input"),
+        (["frf", "--input", "1:+Z"], "--output"),
+        (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "alone"),
+        (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
+        (["modes", "--units", "cubits"], "mm-t-s"),
+        (["render", "--modes", "a-b"], "--modes"),
+        (["render", "--modes", "0-3"], "from 1"),
+        (["render", "--gif", "100000"], "100000"),
+        (["plan", "--sensors", "3", "--modes", "9"], "3 sensors"),
+    ],
+)
+def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
+    command, *options = arguments
+    done = call(command, deck, *options, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["teapot"], "tailgate"),
+        (["plate", "--set", "lenght=1"], "length"),
+        (["plate", "--set", "length=a"], "number"),
+        (["tailgate", "--size", "1"], "6 to 32"),
+        (["panel", "--set", "t"], "KEY=VALUE"),
+    ],
+)
+def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
+    done = call("specimen", *arguments, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
+
+
+def test_out_must_be_a_folder(deck):
+    assert call("modes", deck, "--out", deck).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("raised", "code"),
+    [
+        (FileError("a"), 2),
+        (AccuracyError("a"), 3),
+        (OSError(13, "no", "f"), 2),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_exit_codes(raised, code):
+    import typer
+
+    def command():
+        raise raised
+
+    with pytest.raises(typer.Exit) as caught:
+        guarded(command)()
+    assert caught.value.exit_code == code
+
+
+def test_help_lists_every_command():
+    said = call("--help").output
+    assert all(name in said for name in COMMANDS)
+
+
+def test_version_is_printed():
+    done = call("--version")
+    assert done.exit_code == 0
+    assert done.output.startswith("chladni ")

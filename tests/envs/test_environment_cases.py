@@ -1,0 +1,149 @@
+"""Every environment on a case folder: the panel, recorded with one modulus off."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.frf import FRF
+from chladni.errors import ShapeError
+from chladni.fem.assemble import structure
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
+from chladni_envs import IDS, agents
+from chladni_envs import environment_cases as cases
+from chladni_specimens.plates import folded_panel
+
+SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
+SENSORS = ("34:+Z", "100:+Z", "187:+Z", "239:+Z", "313:+Z", "402:+Z", "470:+Z", "555:+Z")
+CASE = """
+[model]
+deck = "panel.bdf"
+units = "SI"
+damping = 0.01
+
+[test]
+recordings = ["article.npz"]
+quantity = "accelerance"
+
+[[parameter]]
+name = "E"
+field = "E"
+
+[[parameter]]
+name = "rho"
+field = "rho"
+"""
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("case")
+    panel = folded_panel()
+    write_assembly(panel, folder / "panel.bdf")
+    (folder / "case.toml").write_text(CASE)
+    write_npz(folder / "article.npz", _recorded(panel))
+    return str(folder)
+
+
+def _recorded(panel):
+    """Accelerance of an article that is softer than the deck, with a little noise."""
+    steel = panel.parts[0].section.membrane
+    soft = replace(steel, E=SOFT * steel.E)
+    parts = tuple(p.with_section(membrane=soft, bending=soft, shear=soft) for p in panel.parts)
+    built = structure(panel.with_parts(parts))
+    modal = normal_modes(built.system, 60).with_damping(0.01)
+    phi = modal.at(SENSORS)
+    f = np.arange(10.0, 130.0, 0.2)
+    omega, omega_r = 2 * np.pi * f[:, None], 2 * np.pi * modal.frequency
+    h = -(omega**2) / (omega_r**2 - omega**2 + 0.02j * omega_r * omega)
+    H = np.einsum("ir,kr,jr->kij", phi, h, phi[2:3])
+    rng = np.random.default_rng(0)
+    H *= 1 + 1e-3 * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape))
+    return FRF(H, f, SENSORS, (SENSORS[2],), "accelerance")
+
+
+@pytest.fixture(scope="module")
+def recorded(case):
+    """The case made ready for updating, once for both environments."""
+    return cases.Recorded(case)
+
+
+@pytest.fixture
+def ready(recorded, monkeypatch):
+    monkeypatch.setattr(cases, "Recorded", lambda path: recorded)
+    return recorded
+
+
+@pytest.mark.parametrize("id", IDS)
+@pytest.mark.filterwarnings("ignore:.*render:UserWarning")
+def test_contracts_with_a_case(ready, case, id):
+    """Gymnasium's checker and, where it is installed, that of Stable-Baselines3."""
+    env = gym.make(f"chladni_envs:{id}", case=case, render_mode="rgb_array")
+    check_env(env.unwrapped)
+    env.reset(seed=0)
+    assert env.render().shape[2] == 3
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
+    sb3.check_env(env.unwrapped, warn=False)
+
+
+@pytest.mark.parametrize("id", [i for i in IDS if "Placement" in i])
+def test_vectors_with_a_case_are_identical(case, id):
+    stories = []
+    for mode in ("sync", "async"):
+        envs = gym.make_vec(id, num_envs=2, vectorization_mode=mode, case=case, modes=8)
+        obs, _ = envs.reset(seed=5)
+        envs.action_space.seed(5)
+        story = [obs.copy()]
+        for _ in range(5):
+            obs, reward, *_ = envs.step(envs.action_space.sample())
+            story += [obs.copy(), reward.copy()]
+        envs.close()
+        stories.append(story)
+    for a, b in zip(*stories, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_shakers_of_a_case_are_vetoed_by_its_mesh(case):
+    """Gaps and access come from the mesh; a force beyond the first contact is a veto."""
+    specimen = cases.specimen(case, 8)
+    assert specimen.access.shape == (len(specimen.points),)
+    assert specimen.gap_shapes.shape == (len(specimen.clearance), 8)
+    closed = np.full(len(specimen.points), False)
+    with pytest.raises(ShapeError, match="access and rattle leave 0"):
+        gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8, access=closed)
+
+
+def test_sensors_of_a_case(case):
+    env = gym.make("chladni_envs:chladni/SensorPlacement-v0", case=case, modes=8, n_sensors=10)
+    efi, best = (agents.play(env, a) for a in (agents.efi, agents.exchange(env)))
+    assert efi["log_det"] <= best["log_det"]
+
+
+def test_actuators_of_a_case(case):
+    env = gym.make("chladni_envs:chladni/ActuatorPlacement-v0", case=case, modes=8)
+    assert agents.play(env, agents.best_actuators(env))["condition"] < 1e3
+
+
+def test_selection_of_a_case(ready, case):
+    """Freeing the modulus that is off improves the held-out data and is learned."""
+    env = gym.make("chladni_envs:chladni/ParameterSelection-v0", case=case)
+    problem = env.unwrapped.given
+    assert ready.names[0].startswith("E")
+    assert len(problem) == 2
+    assert problem.improvement([0]) > 0.5
+    assert problem.unlearned([0]) < 0.05
+    assert agents.play(env, agents.held_back())["score"] > 0.3
+
+
+def test_calibration_of_a_case(ready, case):
+    """The textbook agent finds the modulus of the article, to a quarter of what it is off."""
+    env = gym.make("chladni_envs:chladni/Calibration-v0", case=case)
+    end = agents.play(env, agents.gauss_newton(env))
+    assert env.unwrapped.question.names == ready.names
+    found = ready.mean[0] + cases.REACH * ready.sd[0] * end["x"][0]
+    assert found == pytest.approx(np.log(SOFT), rel=0.25)
+    assert end["score"] > 0.1

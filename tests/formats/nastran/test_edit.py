@@ -1,0 +1,224 @@
+"""Changed decks: only what changed is changed, and it says what was asked."""
+
+import time
+
+import numpy as np
+import pytest
+
+from chladni.errors import FileError, LabelError
+from chladni.io.nastran import (
+    Add,
+    Delete,
+    Replace,
+    SetColumns,
+    SetField,
+    assembly,
+    read_deck,
+    write_deck,
+)
+from chladni.model.properties import Orthotropic
+
+from .conftest import ANCHORS, PLATE, real_decks
+
+CASE = "SOL 103\nCEND\nMETHOD = 1\n"
+
+
+def changed_lines(before, after):
+    """(lines gone, lines new) as multisets, kept in order."""
+    old, new = before.read_text().splitlines(), after.read_text().splitlines()
+    gone, fresh = list(old), []
+    for line in new:
+        if line in gone:
+            gone.remove(line)
+        else:
+            fresh.append(line)
+    return gone, fresh
+
+
+def rewritten(deck, *changes, name="new.bdf"):
+    """The deck written with changes and read again, and the lines that differ."""
+    path = write_deck(deck, deck.path.parent / "out" / name, changes)
+    return read_deck(path), changed_lines(deck.path, path)
+
+
+def test_nothing_changed_is_the_same_bytes(bulk):
+    deck = bulk(PLATE.replace("\n", "   \r\n") + "$ end\n", before=CASE)
+    path = write_deck(deck, deck.path.parent / "copy.bdf", [])
+    assert path.read_bytes() == deck.path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "PSHELL       101       5      2.       5               5     $ steel",
+        "PSHELL,101,5,2.,5,,5 $ steel",
+        "PSHELL* 101             5               2.0             5",
+        "pshell\t101\t5\t2.\t5",
+    ],
+)
+@pytest.mark.parametrize("value", [0.8, 1.23456, 0.0012345678901, 1e-12])
+def test_one_field_of_one_card(bulk, line, value):
+    """Any format; a value that loses more than 1e-6 in 8 columns makes the card wide."""
+    text = PLATE.replace("PSHELL,101,5,2.,5,,5", line)
+    deck = bulk(text, before=CASE, fold=False)
+    again, (gone, fresh) = rewritten(deck, SetField("PSHELL", 101, "T", value))
+    assert gone == [line]
+    assert 1 <= len(fresh) <= 2
+    assert again["PSHELL"].real(0, 3) == pytest.approx(value, rel=1e-6, abs=0)
+    others = [k for k in range(1, 9) if k != 3]
+    assert [again["PSHELL"].word(0, k) for k in others] == [
+        deck["PSHELL"].word(0, k) for k in others
+    ]
+
+
+def test_corner_thickness_of_many_quadrilaterals(bulk):
+    """T1 to T4 open a continuation; the line of the element itself stays."""
+    deck = bulk(PLATE.replace("CQUAD4,7", "CQUAD4,7") + "CQUAD4,8,101,1,2,3,4,,\n", before=CASE)
+    t = np.array([[1.0, 1.1, 1.2, 1.25], [0.9, np.nan, 0.7, 0.6]])
+    fields = ("T1", "T2", "T3", "T4")
+    again, (gone, fresh) = rewritten(deck, SetColumns("CQUAD4", np.array([7, 8]), fields, t))
+    assert gone in ([], ["CQUAD4,8,101,1,2,3,4,,"])
+    thickness = assembly(again, loose=True).shells.thickness
+    np.testing.assert_allclose(thickness, np.where(np.isnan(t), 2.0, t))
+    assert len(fresh) <= 3
+
+
+def test_fixed_columns_continue(bulk):
+    lines = (
+        f"CQUAD4  {7:8}{101:8}{1:8}{2:8}{3:8}{4:8}                \n"
+        f"CQUAD4  {8:8}{101:8}{1:8}{2:8}{3:8}{4:8}                +Q8\n+Q8     {'':16}     1.5\n"
+    )
+    deck = bulk(PLATE.replace("CQUAD4,7,101,1,2,3,4\n", lines), before=CASE, fold=False)
+    t = np.array([[1.0, 1.1, 1.2, 1.3], [1.4, 1.5, 1.6, 1.7]])
+    fields = ("T1", "T2", "T3", "T4")
+    again, (gone, fresh) = rewritten(deck, SetColumns("CQUAD4", np.array([7, 8]), fields, t))
+    np.testing.assert_allclose(again["CQUAD4"].block(11, 4), t)
+    assert gone == [f"+Q8     {'':16}     1.5"]  # the only old line that held a thickness
+    assert len(fresh) == 2
+
+
+def test_diagnosis_writes_its_effects(bulk):
+    """MAT1 becomes MAT8 under its own id; masses and springs are added; a card goes."""
+    deck = bulk(PLATE + "CONM2,60,1,,5.\n", before=CASE)
+    added = [("CONM2", 901, 3, None, 1.5e-5), ("CELAS2", 902, 123.456789, 2, 3)]
+    again, (gone, fresh) = rewritten(
+        deck,
+        Replace("MAT1", 5, ("MAT8", 5, 2.1e5, 1.9e5, 0.3, 8e4, None, None, 7.85e-9)),
+        Add(added, "found by the diagnosis"),
+        Delete("CONM2", 60),
+    )
+    assert gone == ["MAT1,5,2.1+5,,.3,7.85-9", "CONM2,60,1,,5."]
+    assert "$ found by the diagnosis" in fresh
+    made = assembly(again, loose=True)
+    assert isinstance(made.parts[0].section.membrane, Orthotropic)
+    assert made.masses.ids.tolist() == [901]
+    assert made.springs.value[0] == pytest.approx(123.456789, rel=1e-6)
+
+
+def test_several_changes_of_one_card(bulk):
+    deck = bulk(PLATE, before=CASE)
+    again, (gone, _) = rewritten(
+        deck, SetField("MAT1", 5, "E", 2.05e5), SetField("MAT1", 5, "RHO", 7.8e-9),
+        SetField("MAT1", 5, "GE", 0.01),
+    )  # fmt: skip
+    assert gone == ["MAT1,5,2.1+5,,.3,7.85-9"]
+    assert again["MAT1"].block(2, 4, 0.0).tolist() == [[2.05e5, 0, 0.3, 7.8e-9]]
+    assert again["MAT1"].real(0, 8) == 0.01
+
+
+@pytest.fixture
+def nested(tmp_path):
+    """main -> parts/a.bdf -> deep/b.bdf, and c.bdf."""
+    home = tmp_path / "home"
+    (home / "parts" / "deep").mkdir(parents=True)
+    grids, rest = PLATE.split("CQUAD4")
+    (home / "parts" / "deep" / "b.bdf").write_text("CQUAD4" + rest)
+    (home / "parts" / "a.bdf").write_text("$ a\nINCLUDE 'deep/b.bdf'\n")
+    (home / "c.bdf").write_text(grids)
+    main = home / "main.bdf"
+    main.write_text(CASE + "BEGIN BULK\nEIGRL,1\nINCLUDE 'parts/a.bdf'\nINCLUDE 'c.bdf'\nENDDATA\n")
+    return main
+
+
+def test_includes_are_written_only_where_they_change(nested, tmp_path):
+    deck = read_deck(nested)
+    out = tmp_path / "out" / "main.bdf"
+    before = {p: p.read_bytes() for p in nested.parent.rglob("*.bdf")}
+    write_deck(deck, out, [SetField("PSHELL", 101, "T", 3.0)])
+    written = {p.relative_to(out.parent).as_posix() for p in out.parent.rglob("*.bdf")}
+    assert written == {"main.bdf", "parts/a.bdf", "parts/deep/b.bdf"}
+    again = read_deck(out)
+    assert again["PSHELL"].real(0, 3) == 3.0
+    assert len(again["GRID"]) == 4  # c.bdf is found where it was
+    assert (out.parent / "parts/a.bdf").read_bytes() == before[nested.parent / "parts/a.bdf"]
+    assert before == {p: p.read_bytes() for p in before}
+
+
+def test_main_alone_changes(nested, tmp_path):
+    out = tmp_path / "out" / "main.bdf"
+    write_deck(read_deck(nested), out, [SetField("EIGRL", 1, "ND", 20)])
+    assert [p.name for p in out.parent.rglob("*.bdf")] == ["main.bdf"]
+    assert len(read_deck(out)["GRID"]) == 4
+
+
+def test_beside_the_original(nested):
+    """In the same folder a changed include takes another name, and its statement follows."""
+    before = {p: p.read_bytes() for p in nested.parent.rglob("*.bdf")}
+    out = write_deck(
+        read_deck(nested), nested.with_name("new.bdf"), [SetField("GRID", 2, "X1", 9.0)]
+    )
+    assert before == {p: p.read_bytes() for p in before}
+    again = read_deck(out)
+    assert again["GRID"].reals(3).tolist() == [0, 9, 10, 0]
+    assert len(again["PSHELL"]) == 1
+    with pytest.raises(FileError, match="choose another name"):
+        write_deck(again, out, [])
+
+
+def test_what_does_not_exist(bulk):
+    deck = bulk(PLATE + "FORCE,1,1,,1.,1.\nFORCE,1,2,,1.,1.\n")
+    out = deck.path.parent / "x.bdf"
+    with pytest.raises(LabelError, match="has no PSHELL 7; there are 101"):
+        write_deck(deck, out, [SetField("PSHELL", 7, "T", 1.0)])
+    with pytest.raises(LabelError, match="PSHELL has no field 'THICK'; there are PID, MID1, T"):
+        write_deck(deck, out, [SetField("PSHELL", 101, "THICK", 1.0)])
+    with pytest.raises(LabelError, match="has no CTRIA3 7; there are none at all"):
+        write_deck(deck, out, [Delete("CTRIA3", 7)])
+    with pytest.raises(LabelError, match="several FORCE 1"):
+        write_deck(deck, out, [SetField("FORCE", 1, "F", 2.0)])
+    assert not out.exists()
+
+
+@pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks are not at hand")
+@pytest.mark.parametrize(("folder", "main"), real_decks())
+def test_real_decks_come_back(folder, main, tmp_path):
+    """Unchanged: the same bytes. All grids moved by 1e-3: every grid, and nothing else, differs."""
+    path = ANCHORS / folder / main
+    deck = read_deck(path, allow=("GENEL", "CTRPLT1"))
+    if len(deck.sources) == 1:
+        assert write_deck(deck, tmp_path / "same", []).read_bytes() == path.read_bytes()
+    grid = deck["GRID"]
+    ids, x = grid.integers(1), grid.block(3, 3, 0.0)
+    wanted = np.round(x + 1e-3, 6)
+    change = SetColumns("GRID", ids, ("X1", "X2", "X3"), wanted)
+    again = read_deck(write_deck(deck, tmp_path / "new" / main, [change]), allow=deck.allowed)
+    np.testing.assert_allclose(again["GRID"].block(3, 3, 0.0), wanted, rtol=1e-6)
+    for name, cards in deck.cards.items():
+        other = [k for k in range(1, cards.width() + 1) if name != "GRID" or k not in (3, 4, 5)]
+        for k in other[:40]:
+            assert np.array_equal(cards.words(k), again[name].words(k))
+
+
+def test_forty_thousand_thicknesses_in_seconds(tmp_path):
+    """10 000 quadrilaterals with four new corner thicknesses; 1 s idle, 3 s granted."""
+    n = 10_000
+    quads = "".join(f"CQUAD4  {k + 1:8}{1:8}{1:8}{2:8}{3:8}{4:8}\n" for k in range(n))
+    path = tmp_path / "large.bdf"
+    path.write_text(quads)
+    deck = read_deck(path)
+    t = np.random.default_rng(0).uniform(0.5, 1.5, (n, 4))
+    start = time.process_time()
+    change = SetColumns("CQUAD4", np.arange(n) + 1, ("T1", "T2", "T3", "T4"), t)
+    again = read_deck(write_deck(deck, tmp_path / "new.bdf", [change]))
+    assert time.process_time() - start < 3
+    np.testing.assert_allclose(again["CQUAD4"].block(11, 4), t, rtol=1e-6)

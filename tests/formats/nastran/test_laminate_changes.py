@@ -1,0 +1,118 @@
+"""A laminate's calibration is put into its layers, and the deck read again is what was found."""
+
+import re
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.ordinary import ordinary
+from chladni.effects.shell_groups import sheet
+from chladni.errors import ModelError
+from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran.edit.laminate_changes import laminate_changes
+from chladni.io.nastran.edit.model_changes import changes
+from chladni.units import UNITS
+from chladni_specimens.plates import folded_panel
+
+MM = UNITS["mm-t-s"]
+PLY = "MAT8,7,1.3+5,9.+3,.31,5.+3,4.5+3,3.5+3,1.6-9\n"
+STACKS = {
+    "angles": "PCOMP,{0},,2.-9\n,7,.3,30.,,,,-40.\n,1,.2,0.,,7,.25,90.\n",
+    "off its plane": "PCOMP,{0},.1\n,7,.4,0.,,7,.4,60.\n",
+    "symmetric": "PCOMP,{0},,,,,,,SYM\n,7,.2,0.,,7,.3,45.\n",
+    "numbered": "PCOMPG,{0}\n,1,7,.4,0.\n,2,7,.3,90.\n",
+}
+
+
+@pytest.fixture(params=STACKS.values(), ids=STACKS)
+def deck(request, tmp_path):
+    """A panel whose two parts are laminates of the same ply."""
+    return opened(tmp_path, request.param, request.param)
+
+
+def opened(folder, *stacks):
+    """Deck and assembly; an empty stack leaves a part its PSHELL."""
+    path = write_assembly(folded_panel(0.3, 0.2, 0.04, 0.01, 0.04), folder / "plain.bdf", MM)
+    text = path.read_text().replace("ENDDATA", PLY + "ENDDATA")
+    for id, stack in enumerate(stacks, start=1):
+        if stack:
+            text = re.sub(rf"PSHELL  .{{7}}{id}.*\n", stack.format(id), text)
+    path = path.with_name("deck.bdf")
+    path.write_text(text)
+    found = read_deck(path)
+    return found, assembly(found, MM)
+
+
+def repaired(deck, before, after):
+    path = deck.path.with_name("updated.bdf")
+    write_deck(deck, path, changes(deck, before, after, MM))
+    return assembly(read_deck(path), MM)
+
+
+def calibrated(before, quantities, positions):
+    cloth = sheet(structure(before), 8)
+    for quantity, x in quantities.items():
+        before = ordinary(cloth, quantity, positions).apply(before, np.array([x]))
+    return before
+
+
+def same(found, wanted, before):
+    f = [normal_modes(structure(a).system, 14).frequency[6:] for a in (found, wanted, before)]
+    np.testing.assert_allclose(f[0], f[1], rtol=1e-6)
+    assert np.abs(f[2] / f[1] - 1).max() > 1e-3
+    np.testing.assert_allclose(found.shells.offset, wanted.shells.offset, rtol=1e-6, atol=1e-12)
+
+
+ALL = {"E": -0.03, "rho": 0.04, "t": -0.08}
+
+
+@pytest.mark.parametrize(("quantities", "positions"), [
+    ({"E": 0.07}, (1,)), ({"rho": -0.06}, (1,)), ({"t": 0.05}, (1,)), (ALL, (0, 1)),
+])  # fmt: skip
+def test_common_factors_are_written_exactly(deck, quantities, positions):
+    made, before = deck
+    after = calibrated(before, quantities, positions)
+    found = repaired(made, before, after)
+    same(found, after, before)
+    for k in {0, 1} - set(positions):
+        np.testing.assert_array_equal(
+            found.parts[k].section.bending.Q, before.parts[k].section.bending.Q
+        )
+
+
+def test_ply_that_a_plain_sheet_uses_too_is_copied(tmp_path):
+    """MAT1 1 is a layer of one part and the whole of the other."""
+    made, before = opened(tmp_path, "PCOMP,{0}\n,1,.4,0.,,7,.4,0.\n", "")
+    after = calibrated(before, {"E": 0.1}, (0,))
+    found = repaired(made, before, after)
+    same(found, after, before)
+    assert found.parts[1] == before.parts[1]
+
+
+def test_laminate_and_property_of_the_same_number_as_a_material(tmp_path):
+    """The smeared material goes by the property's id, which is a MAT1's too."""
+    made, before = opened(tmp_path, STACKS["symmetric"], "")
+    after = calibrated(before, {"E": 0.1}, (1,))
+    same(repaired(made, before, after), after, before)
+
+
+def test_nothing_to_repair(deck):
+    made, before = deck
+    assert changes(made, before, before, MM) == []
+
+
+def test_what_layers_cannot_take_on_together_is_refused(deck):
+    made, before = deck
+    t = before.shells.thickness.copy()
+    t[np.flatnonzero(before.shells.part == 0)[3]] *= 0.9
+    thin = replace(before, shells=replace(before.shells, thickness=t))
+    section = before.parts[0].section
+    stiff = replace(section.bending, Q=1.1 * section.bending.Q)
+    bent = before.with_parts((before.parts[0].with_section(bending=stiff), before.parts[1]))
+    for after in (thin, bent):
+        with pytest.raises(ModelError, match=r"laminate .* changed in a way its layers cannot"):
+            laminate_changes(made, before, after, MM, count(900))

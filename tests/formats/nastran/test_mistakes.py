@@ -1,0 +1,82 @@
+"""Every user mistake is one sentence: file, line, card, what is wrong, what there is instead."""
+
+import pytest
+
+from chladni.errors import ChladniError
+from chladni.io.nastran import assembly
+
+from .conftest import PLATE
+
+Z = "0.,0.,0.,0.,0.,1.,1."  # a CORD2R's points A, B and the first of C
+
+BEAM, SIX = "CBEAM,8,1,1,2,0.,0.,1.\n", ",,,,,,,,\n"
+MISTAKES = {
+    "grid": (("1,2,3,4", "1,2,3,44"), r":5: CQUAD4 7: grid 44 does not exist.* 4 points, 1 to 4"),
+    "property": (("CQUAD4,7,101", "CQUAD4,7,102"), r"no PSHELL or PCOMP 102; there are PSHELL 101"),
+    "material": (("101,5,2.", "101,6,2."), r":6: PSHELL 101: material 6 does not .* are 5"),
+    "foreign material": (("MAT1,5,2.1+5,,.3", "MAT9,5,1."), "material 5 is a MAT9"),
+    "no thickness": (("101,5,2.", "101,5,"), "neither it nor its property gives a thickness"),
+    "zero thickness": (("101,5,2.", "101,5,0."), r":6: PSHELL 101: the thickness is 0"),
+    "negative thickness": (("101,5,2.", "101,5,-2."), "thickness is -2"),
+    "duplicate grid": (("GRID,2,,", "GRID,1,,"), r":2: GRID 1: .*already taken at .*:1"),
+    "duplicate element": (("MAT1", "CQUAD4,7,101,1,2,4,3\nMAT1"), "CQUAD4 7: .*already taken"),
+    "duplicate across kinds": (("MAT1", "CELAS2,7,1.,1,1\nMAT1"), "id is already taken by CQUAD4"),
+    "duplicate property": (("MAT1", "PCOMP,101\n,5,1.\nMAT1"), "PCOMP 101: .*already taken"),
+    "duplicate material": (("MAT1", "MAT8,5,1.,1.,.3,1.\nMAT1"), r"id is already taken by MAT1"),
+    "same corner": (("1,2,3,4", "1,2,3,3"), "CQUAD4 7: a corner is named twice"),
+    "coincident nodes": (("2,,10.,0.", "2,,0.,0."), "CQUAD4 7: its area is zero"),
+    "number": (("2,,10.,0.", "2,,1o.,0."), r":2: GRID 2: X1 is '1O.', not a number"),
+    "integer": (("GRID,2", "GRID,2.5"), "ID is '2.5', not an integer"),
+    "blank": (("1,2,3,4", "1,2,3"), r"CQUAD4 7: G4 is blank, the card is not complete"),
+    "no stiffness": (("2.1+5", ""), "neither E nor G is given"),
+    "negative E": (("2.1+5", "-2.1+5"), "cannot be negative"),
+    "Poisson": ((".3,", ".7,"), "Poisson's ratio 0.7"),
+    "negative density": (("7.85-9", "-7.85-9"), "density -7.85e-09 is negative"),
+    "system": (("3,4\n", "3,4,77\n"), "coordinate system 77 does not exist"),
+    "cyclic system": (("3,4\n", f"3,4,8\nCORD2R,8,9,{Z}\nCORD2R,9,8,{Z}\n"), "defined by itself"),
+    "flat system": (("3,4\n", "3,4,8\nCORD2R,8,,0.,0.,0.,0.,0.,1.,0.,0.,2.\n"), "lie on one line"),
+    "wtmass text": (("MAT1", "PARAM,WTMASS,HALF\nMAT1"), "WTMASS is 'HALF', not a number"),
+    "wtmass": (("MAT1", "PARAM,WTMASS,0.\nMAT1"), "WTMASS is 0"),
+    "k6rot": (("MAT1", "PARAM,K6ROT,-1.\nMAT1"), "K6ROT is -1"),
+    "component": (("MAT1", "CELAS2,8,1.,1,7\nMAT1"), "not one of 1 to 6"),
+    "spring to nothing": (("MAT1", "CELAS2,8,1.\nMAT1"), "joins nothing"),
+    "PELAS": (("MAT1", "CELAS1,8,3,1,1\nMAT1"), "there is no PELAS 3; there are none"),
+    "RBE2 itself": (("MAT1", "RBE2,8,1,123,1\nMAT1"), "grid 1 follows itself"),
+    "RBE2 nothing": (("MAT1", "RBE2,8,1,123\nMAT1"), "ties no grids"),
+    "digits": (("MAT1", "RBE2,8,1,1283,2\nMAT1"), "component '1283'"),
+    "mid-side nodes": (("MAT1", "CTETRA,8,1,1,2,3,4,5,6\n,7\nMAT1"), "mid-side nodes"),
+    "flat solid": (("MAT1", "CTETRA,8,1,1,2,3,4\nPSOLID,1,5\nMAT1"), "its volume is zero"),
+    "parallel": (("MAT1", "CBAR,8,1,1,2,1.,0.,0.\nPBAR,1,5,1.\nMAT1"), "along its axis"),
+    "no orientation": (("MAT1", "CBAR,8,1,1,2\nPBAR,1,5,1.\nMAT1"), "orientation vector .*missing"),
+    "bush lateral": (("MAT1", "CBUSH,8,1,1,2\nPBUSH,1,K,1.,2.\nMAT1"), "neither orient"),
+    "taper": (("MAT1", "CBEAM,8,1,1,2,0.,0.,1.\nPBEAM,1,5,1.,1.,1.\n,,,,,,,,\n,YESA,1.,2.\nMAT1"),
+              "tapered"),
+    "taper, small numbers": (("MAT1", f"{BEAM}PBEAM,1,5,1.-4,1.-9,1.-9\n{SIX},YESA,1.,1.-4,2.-9"
+                              "\nMAT1"), "tapered"),
+    "taper of mass": (("MAT1", f"{BEAM}PBEAM,1,5,1.,1.,1.,,,.1\n{SIX},NO,1.,,,,,,.2\nMAT1"),
+                      "tapered"),
+    "taper of axis": (("MAT1", f"{BEAM}PBEAM,1,5,1.,1.,1.\n{SIX}\n\n,,,,,.1,.0,.2\nMAT1"),
+                      "tapered"),
+    "taper of a profile": (("MAT1", f"{BEAM}PBEAML,1,5,,BAR\n,2.,1.,,YES,1.,3.,1.\nMAT1"),
+                           "PBEAML 1: a tapered"),
+    "profile": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,OVAL\n,1.\nMAT1"), "TYPE 'OVAL'"),
+    "profile sizes": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,TUBE\n,1,2\nMAT1"), "no TUBE"),
+    "spc set": (("MAT1", "SPC1,2,a,1\nMAT1"), "'A'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "match"), MISTAKES.values(), ids=MISTAKES)
+def test_every_mistake_is_one_sentence(bulk, change, match):
+    with pytest.raises(ChladniError, match=match) as caught:
+        assembly(bulk(PLATE.replace(*change, 1)))
+    assert "\n" not in str(caught.value)
+    assert "deck.bdf" in str(caught.value)
+
+
+def test_missing_selected_set(bulk):
+    with pytest.raises(ChladniError, match="SPC set 9 is selected but there is no such set"):
+        assembly(bulk(PLATE, before="CEND\nSPC = 9\n"))
+    with pytest.raises(ChladniError, match="there is no subcase 5; there are 1"):
+        assembly(bulk(PLATE, before="CEND\nSUBCASE 1\n"), subcase=5)
+    with pytest.raises(ChladniError, match="there is no GRID"):
+        assembly(bulk("MAT1,1,1.,,.3\n"))

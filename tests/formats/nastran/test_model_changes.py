@@ -1,0 +1,239 @@
+"""A repaired deck, read again, is the structure that was found, and no other line moved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.ordinary import ordinary
+from chladni.effects.orthotropic_material import orthotropic
+from chladni.effects.points import with_masses, with_springs
+from chladni.effects.shell_groups import sheet
+from chladni.errors import ModelError
+from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.properties import Anisotropic, BeamSection, Part, ShellSection
+from chladni.units import UNITS
+from chladni_specimens.plates import folded_panel, plate
+
+SYSTEMS = ("mm-t-s", "SI", "mm-kg-ms")
+
+
+@pytest.fixture(params=SYSTEMS)
+def deck(request, tmp_path):
+    """(deck, its assembly, units) of a folded panel; both parts share one MAT1."""
+    return opened(folded_panel(0.3, 0.2, 0.04, 0.01, 0.04), tmp_path, request.param)
+
+
+def opened(made, folder, name="mm-t-s"):
+    units = UNITS[name]
+    found = read_deck(write_assembly(made, folder / "deck.bdf", units))
+    return found, assembly(found, units), units
+
+
+def repaired(deck, before, after, units):
+    """The written deck as an assembly, and the lines that are new in it."""
+    path = deck.path.with_name("updated.bdf")
+    write_deck(deck, path, changes(deck, before, after, units))
+    old, fresh = deck.path.read_text().splitlines(), []
+    new = path.read_text().splitlines()
+    for line in new:
+        if line in old:
+            old.remove(line)
+        else:
+            fresh.append(line)
+    return assembly(read_deck(path), units), fresh, old
+
+
+def frequencies(made, count=16):
+    return normal_modes(structure(made).system, count).frequency[6:]
+
+
+def same(found, wanted, before):
+    """Equal frequencies to 1e-6, where the change itself moved them by more than 1e-4."""
+    due = frequencies(wanted)
+    np.testing.assert_allclose(frequencies(found), due, rtol=1e-6)
+    assert np.abs(frequencies(before) / due - 1).max() > 1e-4
+
+
+def test_nothing_to_repair(deck):
+    made, before, units = deck
+    assert changes(made, before, before, units) == []
+
+
+@pytest.mark.parametrize(("quantity", "card"), [("E", "MAT1"), ("rho", "MAT1"), ("t", "PSHELL")])
+def test_ordinary_value_of_all_parts(deck, quantity, card):
+    """One line a card: a shared material is one line, thickness is one a part."""
+    made, before, units = deck
+    effect = ordinary(sheet(structure(before), 8), quantity, (0, 1))
+    after = effect.apply(before, np.array([0.0712345678]))
+    found, _, gone = repaired(made, before, after, units)
+    same(found, after, before)
+    assert [line[:6].strip().rstrip("*") for line in gone] == [card] * (2 if quantity == "t" else 1)
+    np.testing.assert_allclose(found.shells.thickness, after.shells.thickness, rtol=1e-6)
+
+
+@pytest.mark.parametrize("quantity", ["E", "rho", "t"])
+def test_ordinary_value_of_one_part(deck, quantity):
+    """A material two parts share is changed for the one that changed, not for the other."""
+    made, before, units = deck
+    effect = ordinary(sheet(structure(before), 8), quantity, (1,))
+    after = effect.apply(before, np.array([-0.2]))
+    found, _, gone = repaired(made, before, after, units)
+    same(found, after, before)
+    assert found.parts[0] == before.parts[0]
+    assert len(gone) == 1
+
+
+def test_thickness_at_corners(deck):
+    made, before, units = deck
+    chosen = np.flatnonzero(before.shells.part == 0)[[2, 3, 7]]
+    t = before.shells.thickness.copy()
+    t[chosen] *= 1 - np.linspace(0.03, 0.2, 12).reshape(3, 4)
+    after = replace(before, shells=replace(before.shells, thickness=t))
+    found, _, gone = repaired(made, before, after, units)
+    same(found, after, before)
+    np.testing.assert_allclose(found.shells.thickness, t, rtol=1e-6)
+    assert len(gone) <= 3  # in place, or on a continuation of a line that stays
+
+
+def test_thickness_of_triangles(tmp_path):
+    made = plate(0.3, 0.2, 4, 3, 1e-3)
+    nodes = made.shells.nodes.copy()
+    nodes[5, 3] = nodes[5, 2]
+    made = replace(made, shells=replace(made.shells, nodes=nodes))
+    deck, before, units = opened(made, tmp_path)
+    t = before.shells.thickness * (1 - 0.1 * before.points[before.shells.nodes][..., 0])
+    after = replace(before, shells=replace(before.shells, thickness=t))
+    found, _, _ = repaired(deck, before, after, units)
+    same(found, after, before)
+
+
+@pytest.mark.parametrize("positions", [(0, 1), (0,)])
+@pytest.mark.parametrize("axis", [[1.0, 0, 0], [0.6, 0.8, 0]])
+def test_grain(deck, positions, axis):
+    """MAT1 becomes MAT8 along a direction; a part that keeps the MAT1 keeps it."""
+    made, before, units = deck
+    effect = orthotropic(sheet(structure(before), 8), positions, np.array(axis))
+    after = effect.apply(before, np.array([0.15, -0.1, 0.05, 0.1]))
+    found, _, _ = repaired(made, before, after, units)
+    same(found, after, before)
+    for k in {0, 1} - set(positions):
+        assert found.parts[k] == before.parts[k]
+
+
+def test_grain_keeps_its_loss_factor(tmp_path):
+    deck, before, units = opened(plate(0.3, 0.2, 4, 3, 1e-3), tmp_path)
+    section = before.parts[0].section
+    lossy = replace(section.membrane, damping=0.02)
+    first = before.with_parts((before.parts[0].with_section(membrane=lossy, bending=lossy),))
+    deck, before, units = opened(first, tmp_path)
+    effect = orthotropic(sheet(structure(before), 4), (0,), np.eye(3)[0])
+    found, _, _ = repaired(deck, before, effect.apply(before, np.full(4, 0.1)), units)
+    assert found.parts[0].section.membrane.damping == pytest.approx(0.02)
+
+
+def test_grain_that_is_there_already(tmp_path):
+    """A MAT8's moduli, nu12 and density."""
+    deck, before, units = opened(plate(0.3, 0.2, 4, 3, 1e-3), tmp_path)
+    effect = orthotropic(sheet(structure(before), 4), (0,), np.eye(3)[1])
+    first, second = (effect.apply(before, np.array(x)) for x in ([0.1] * 4, [0.3, 0.1, 0, 0.4]))
+    deck, before, units = opened(first, tmp_path)
+    id = before.parts[0].section.membrane.id
+    grain = replace(second.parts[0].section.membrane, rho=8000.0, id=id)
+    after = before.with_parts((before.parts[0].with_section(membrane=grain, bending=grain),))
+    found, _, _ = repaired(deck, before, after, units)
+    same(found, after, before)
+    assert found.parts[0].section.membrane.nu12 == pytest.approx(grain.nu12, rel=1e-6)
+
+
+def test_poisson_ratio(deck):
+    made, before, units = deck
+    new = replace(before.parts[0].section.membrane, nu=0.36)
+    every = {"membrane": new, "bending": new, "shear": new}
+    after = before.with_parts(tuple(p.with_section(**every) for p in before.parts))
+    found, _, gone = repaired(made, before, after, units)
+    same(found, after, before)
+    assert len(gone) == 1
+
+
+def test_material_a_bar_shares(tmp_path):
+    """The sheet's modulus changes; the bar with the same MAT1 keeps its own."""
+    made = plate(0.3, 0.2, 4, 3, 1e-3)
+    steel = made.parts[0].section.membrane
+    bar = Part(9, "bar", BeamSection(steel, 1e-5, 1e-11, 1e-11, 0.0, 2e-11))
+    nodes = np.array([[0, 4], [4, 8]])
+    beams = replace(
+        made.beams, ids=np.array([901, 902]), nodes=nodes, part=np.array([1, 1]),
+        up=np.tile([0.0, 0, 1], (2, 1)), offset=np.zeros((2, 2, 3)), pins=np.zeros((2, 2, 6), bool),
+    )  # fmt: skip
+    made = replace(made, parts=(*made.parts, bar), beams=beams)
+    deck, before, units = opened(made, tmp_path)
+    k = next(k for k, p in enumerate(before.parts) if isinstance(p.section, ShellSection))
+    effect = ordinary(sheet(structure(before), 4), "E", (k,))
+    after = effect.apply(before, np.array([0.2]))
+    found, _, _ = repaired(deck, before, after, units)
+    same(found, after, before)
+    assert found.parts[1 - k].section.material.E == pytest.approx(steel.E)
+
+
+@pytest.mark.parametrize("offset", [None, [0.004, -0.011, 0.02]])
+def test_masses(deck, offset):
+    made, before, units = deck
+    grids = tuple(int(i) for i in before.ids[[3, 11]])
+    after = with_masses(before, grids, 0.0321, None if offset is None else np.array(offset))
+    found, fresh, gone = repaired(made, before, after, units)
+    same(found, after, before)
+    np.testing.assert_allclose(found.masses.matrix, after.masses.matrix, rtol=1e-6, atol=1e-12)
+    np.testing.assert_array_equal(found.masses.node, after.masses.node)
+    assert gone == []
+    assert sum(line.startswith("CONM2") for line in fresh) == 2
+
+
+def test_springs_to_ground(deck):
+    """An oblique spring is one along each axis; element ids stay unique beside new masses."""
+    made, before, units = deck
+    grids = tuple(int(i) for i in before.ids[[0, 17]])
+    after = with_springs(before, grids, np.array([[0, 0, 1.0], [0.6, 0, 0.8]]), 4321.0)
+    after = with_masses(after, grids, 0.01)
+    found, _, gone = repaired(made, before, after, units)
+    due, got = normal_modes(structure(after).system, 12), normal_modes(structure(found).system, 12)
+    np.testing.assert_allclose(got.frequency[2:], due.frequency[2:], rtol=1e-6, atol=0.05)
+    np.testing.assert_allclose(found.springs.value, after.springs.value, rtol=1e-6)
+    np.testing.assert_array_equal(found.springs.component[:, 0], after.springs.component[:, 0])
+    assert len({*found.springs.ids, *found.masses.ids, *found.shells.ids}) == 3 + 2 + len(
+        found.shells
+    )
+    assert gone == []
+
+
+@pytest.mark.parametrize("quantity", ["E", "rho"])
+def test_plane_stiffness(tmp_path, quantity):
+    """A MAT2's six moduli or its density."""
+    Q = plate(0.3, 0.2, 4, 3, 1e-3).parts[0].section.membrane.plane_stress()
+    Q[0, 2] = Q[2, 0] = 0.03 * Q[0, 0]
+    made = plate(0.3, 0.2, 4, 3, 1e-3, Anisotropic(Q, rho=7850.0))
+    made = made.with_parts((made.parts[0].with_section(rigid_shear=True),))
+    deck, before, units = opened(made, tmp_path)
+    effect = ordinary(sheet(structure(before), 4), quantity, (0,))
+    after = effect.apply(before, np.array([0.1]))
+    found, _, _ = repaired(deck, before, after, units)
+    same(found, after, before)
+
+
+def test_what_no_card_says_is_refused(deck):
+    made, before, units = deck
+    heavy = with_masses(before, (int(before.ids[0]),), 0.1)
+    turned = heavy.masses.matrix.copy()
+    turned[0, 3:, 3:] += np.eye(3)
+    heavy = replace(heavy, masses=replace(heavy.masses, matrix=turned))
+    with pytest.raises(ModelError, match="inertia"):
+        changes(made, before, heavy, units)
+    odd = Anisotropic(1e9 * np.eye(3), id=before.parts[0].section.membrane.id)
+    after = before.with_parts(
+        tuple(p.with_section(membrane=odd, bending=odd) for p in before.parts)
+    )
+    with pytest.raises(ModelError, match="Anisotropic"):
+        changes(made, before, after, units)

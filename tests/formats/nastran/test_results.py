@@ -1,0 +1,148 @@
+"""Results of other solvers: punch files written here column by column, OP2 and OP4 of pyYeti."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.errors import FileError
+from chladni.io.nastran import read_op2_modes, read_op4, read_punch_modes, read_punch_responses
+from chladni.io.package_files import mesh_path
+
+rng = np.random.default_rng(5)
+
+
+def numbered(lines):
+    return "".join(f"{line:<72}{k + 1:8d}\n" for k, line in enumerate(lines))
+
+
+def record(head, values):
+    """One punched record: 18 columns, then three values a line."""
+    rows = [values[k : k + 3] for k in range(0, len(values), 3)]
+    marks = [f"{head}       G"] + ["-CONT-"] * (len(rows) - 1)
+    return [
+        f"{m:<18}" + "".join(f"{v:18.6E}" for v in row) for m, row in zip(marks, rows, strict=True)
+    ]
+
+
+HEAD = ["$TITLE   = PLATE", "$SUBTITLE=", "$LABEL   ="]
+
+
+def modes_file(folder, eigenvalues, shapes, ids):
+    lines = []
+    for k, value in enumerate(eigenvalues):
+        lines += [*HEAD, "$EIGENVECTOR", "$REAL OUTPUT", "$SUBCASE ID =           1",
+                  f"$EIGENVALUE = {value:14.7E}  MODE = {k + 1:5d}"]  # fmt: skip
+        for j, id in enumerate(ids):
+            lines += record(f"{id:10d}", shapes[j, :, k])
+    path = folder / "modes.pch"
+    path.write_text(numbered(lines))
+    return path
+
+
+def test_eigenvectors(tmp_path):
+    shapes, hertz = rng.normal(size=(4, 6, 4)), np.array([0.0, 12.5, 12.5, 80.0])  # a pair
+    path = modes_file(tmp_path, [-1e-7, *(2 * np.pi * hertz[1:]) ** 2], shapes, [7, 11, 20, 90001])
+    found = read_punch_modes(path)
+    np.testing.assert_allclose(found.frequency, hertz, rtol=1e-6)
+    assert found.ids.tolist() == [7, 11, 20, 90001]
+    np.testing.assert_allclose(found.shapes, shapes, rtol=1e-5)
+
+
+@pytest.mark.parametrize("polar", [False, True])
+@pytest.mark.parametrize("by_point", [False, True])
+def test_frequency_responses(tmp_path, polar, by_point):
+    """Sorted by frequency (SORT1) or by point (SORT2), rectangular or polar: the same numbers."""
+    H = rng.normal(size=(3, 2, 6)) + 1j * rng.normal(size=(3, 2, 6))
+    f, ids = np.array([10.0, 20.0, 35.5]), [5, 8]
+    style = "$MAGNITUDE-PHASE OUTPUT" if polar else "$REAL-IMAGINARY OUTPUT"
+    lines = []
+
+    def pair(z):
+        return np.concatenate(
+            [np.abs(z), np.degrees(np.angle(z)) % 360] if polar else [z.real, z.imag]
+        )
+
+    for subcase in (1, 2):
+        for a in range(2 if by_point else 3):
+            key = (
+                f"$POINT ID = {ids[a]:11d}  IDENTIFIED BY FREQUENCY"
+                if by_point
+                else (f"$FREQUENCY = {f[a]:15.7E}")
+            )
+            lines += [*HEAD, "$ACCELERATION", style, f"$SUBCASE ID = {subcase:11d}", key]
+            for b in range(3 if by_point else 2):
+                head = f"{f[b]:17.6E}"[:10] if by_point else f"{ids[b]:10d}"
+                head = f"{f[b]:10.4E}" if by_point else head
+                lines += record(head, subcase * 0 + pair(H[b, a] if by_point else H[a, b]))
+    path = tmp_path / "frf.pch"
+    path.write_text(numbered(lines))
+    responses = read_punch_responses(path)
+    assert [(r.kind, r.subcase) for r in responses] == [("acceleration", 1), ("acceleration", 2)]
+    for r in responses:
+        np.testing.assert_allclose(r.frequency, f, rtol=1e-4)
+        assert r.ids.tolist() == ids
+        np.testing.assert_allclose(r.values, H, rtol=1e-4, atol=1e-5)
+
+
+def test_what_is_not_there(tmp_path):
+    path = modes_file(tmp_path, [4.0], rng.normal(size=(1, 6, 1)), [7])
+    with pytest.raises(FileError, match="holds no frequency responses"):
+        read_punch_responses(path)
+    path.write_text(path.read_text().replace("G  ", "G O", 1))
+    with pytest.raises(FileError, match=r"modes.pch:\d+: .* no record"):
+        read_punch_modes(path)
+    (tmp_path / "bulk.pch").write_text("GRID    1\n")
+    with pytest.raises(FileError, match="holds no eigenvectors"):
+        read_punch_modes(tmp_path / "bulk.pch")
+    with pytest.raises(FileError, match="cannot be read"):
+        read_punch_modes(tmp_path / "none.pch")
+
+
+def yeti_file(name):
+    spec = importlib.util.find_spec("pyyeti")
+    if spec is None:
+        pytest.skip("pyYeti is not installed")
+    path = Path(spec.origin).parent / "tests" / name
+    if not path.exists():
+        pytest.skip("pyYeti came without its test data")
+    return path
+
+
+def test_op2_eigenvectors_are_normalised_to_the_mass():
+    """A free structure has six frequencies of zero, and all its shapes are punched for all dofs."""
+    found = read_op2_modes(yeti_file("nastran_op2_data/rdop2gpwg_1.op2"))
+    assert found.shapes.shape == (len(found.ids), 6, len(found.frequency))
+    assert np.all(found.frequency[:6] < 1e-3)
+    assert found.frequency[6] > 1
+    assert np.all(np.isfinite(found.shapes))
+
+
+def test_op4_matrices():
+    matrices = read_op4(yeti_file("nas2cam/with_se_nas2cam.op4"))
+    assert matrices
+    assert all(m.ndim == 2 for m in matrices.values())
+
+
+def test_files_pyyeti_cannot_read(tmp_path):
+    pytest.importorskip("pyyeti")
+    path = tmp_path / "x.op2"
+    path.write_bytes(b"not an op2 file at all, whatever its name says" * 4)
+    with pytest.raises(FileError, match="no OP2 file pyYeti can read"):
+        read_op2_modes(path)
+    with pytest.raises(FileError, match="does not exist"):
+        read_op4(tmp_path / "none.op4")
+
+
+def test_without_pyyeti(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyyeti.nastran", None)
+    with pytest.raises(FileError, match="pip install 'chladni"):
+        read_op2_modes("x.op2")
+
+
+def test_reference_meshes():
+    assert mesh_path("README.md").name == "README.md"
+    with pytest.raises(FileError, match=r"no reference mesh 'none.bdf'; there are README.md"):
+        mesh_path("none.bdf")

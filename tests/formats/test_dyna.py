@@ -1,0 +1,187 @@
+"""Formed thickness in and out: what is written is read, every dialect, one sentence a fault."""
+
+import numpy as np
+import pytest
+
+from chladni.errors import FileError, ModelError, ShapeError
+from chladni.io.dyna import read_formed, read_keyword, write_keyword
+from chladni.model.formed_mesh import FormedMesh
+from chladni_specimens.mesher.flat_regions import grid
+
+
+def sheet(n=4, t=None):
+    plan, quads = grid(np.linspace(0, 0.1, n + 1), np.linspace(0, 0.08, n + 1))
+    points = np.column_stack([plan, 0.02 * plan[:, 0]])
+    t = np.linspace(0.5e-3, 0.9e-3, len(points))[quads] if t is None else t
+    part = np.where(np.arange(len(quads)) % 2, 7, 3)
+    ids = 10 + 3 * np.arange(len(points))
+    return FormedMesh(ids, points, quads, part, t, {3: "inner", 7: "outer upper"})
+
+
+@pytest.mark.parametrize("unit", ["mm-t-s", "SI", "in-lb-s"])
+def test_round_trip(tmp_path, unit):
+    """To 0.1 µm in any unit system."""
+    mesh = sheet()
+    back = read_keyword(write_keyword(tmp_path / "a.k", mesh, unit), unit)
+    np.testing.assert_allclose(back.points, mesh.points, atol=1e-7)
+    np.testing.assert_allclose(back.thickness, mesh.thickness, atol=1e-7)
+    np.testing.assert_array_equal(back.ids, mesh.ids)
+    np.testing.assert_array_equal(back.cells, mesh.cells)
+    np.testing.assert_array_equal(back.part, mesh.part)
+    assert back.names == mesh.names
+
+
+FIXED = """*KEYWORD
+$ a comment
+*NODE
+       1             0.0             0.0             0.0       0       0
+       2            10.0             0.0             0.0
+       3            10.0            10.0             0.0
+       4             0.0            10.0             0.0
+*ELEMENT_SHELL_THICKNESS
+       1       5       1       2       3       4
+            0.61            0.62            0.63            0.64             0.0
+       2       5       1       2       3       3
+            0.70            0.71            0.72            0.72
+*END
+"""
+FREE = FIXED.replace(
+    "       1             0.0             0.0             0.0       0       0", "1,0.,0,0.0e+0,0"
+)
+I10 = """*KEYWORD I10=Y
+*NODE
+         1             0.0             0.0             0.0
+         2            10.0             0.0             0.0
+         3            10.0            10.0             0.0
+         4             0.0            10.0             0.0
+*ELEMENT_SHELL_THICKNESS
+         1         5         1         2         3         4
+            0.61            0.62            0.63            0.64
+         2         5         1         2         3         0
+            0.70            0.71            0.72            0.72
+"""
+LONG = (
+    "*KEYWORD LONG=Y\n*NODE\n"
+    + "".join(
+        f"{k:20d}{x:20.6f}{y:20.6f}{0:20.6f}\n"
+        for k, x, y in ((1, 0, 0), (2, 10, 0), (3, 10, 10), (4, 0, 10))
+    )
+    + "*ELEMENT_SHELL_THICKNESS\n"
+    + "".join(f"{v:20d}" for v in (1, 5, 1, 2, 3, 4))
+    + "\n"
+    + "".join(f"{v:20.4f}" for v in (0.61, 0.62, 0.63, 0.64))
+    + "\n"
+    + "".join(f"{v:20d}" for v in (2, 5, 1, 2, 3, 3))
+    + "\n"
+    + "".join(f"{v:20.4f}" for v in (0.70, 0.71, 0.72, 0.72))
+    + "\n*END\nnot read any more\n"
+)
+SECTION = FIXED.replace(
+    "            0.70            0.71            0.72            0.72",
+    "             0.0             0.0             0.0             0.0",
+).replace(
+    "*END",
+    "*PART\ninner\n         5         9         1\n*SECTION_SHELL_TITLE\nsheet\n"
+    "         9        16\n      0.70      0.70      0.70      0.70\n*END",
+)
+
+
+@pytest.mark.parametrize("text", [FIXED, FREE, I10, LONG], ids=["fixed", "free", "i10", "long"])
+def test_dialects(tmp_path, text):
+    path = tmp_path / "a.key"
+    path.write_text(text)
+    mesh = read_keyword(path)
+    np.testing.assert_allclose(mesh.points[2], [0.01, 0.01, 0])
+    np.testing.assert_allclose(mesh.thickness[0], [0.61e-3, 0.62e-3, 0.63e-3, 0.64e-3])
+    np.testing.assert_array_equal(mesh.cells[1], [0, 1, 2, 2])
+    assert mesh.part.tolist() == [5, 5]
+
+
+def test_section_holds_where_the_element_has_none(tmp_path):
+    path = tmp_path / "a.k"
+    path.write_text(SECTION)
+    mesh = read_keyword(path)
+    np.testing.assert_allclose(mesh.thickness[1], 0.70e-3)
+    np.testing.assert_allclose(mesh.thickness[0, 0], 0.61e-3)
+    assert mesh.names == {5: "inner"}
+
+
+def test_include(tmp_path):
+    nodes, _, shells = FIXED.partition("*ELEMENT")
+    (tmp_path / "nodes.k").write_text(nodes)
+    (tmp_path / "all.k").write_text("*INCLUDE\nnodes.k\n*ELEMENT" + shells)
+    assert len(read_keyword(tmp_path / "all.k").cells) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("            0.62", "            0.6b", "line 10: '0.6b' is no number"),
+        ("       3       4\n", "       3       8\n", "shell 1 names a node"),
+        ("*ELEMENT_SHELL_THICKNESS", "*ELEMENT_SHELL", "is no number in .ELEMENT_SHELL$"),
+        ("            0.70            0.71            0.72            0.72\n", "", "2 per element"),
+        ("*NODE", "*INCLUDE\nnowhere.k\n*NODE", "no file 'nowhere.k'"),
+        (FIXED, "*KEYWORD\n*END\n", "both are needed"),
+    ],
+)
+def test_one_sentence_a_fault(tmp_path, old, new, named):
+    path = tmp_path / "bad.k"
+    path.write_text(FIXED.replace(old, new))
+    with pytest.raises(FileError, match=named) as caught:
+        read_keyword(path)
+    assert "bad.k" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_wrong_unit_is_noticed(tmp_path):
+    """Thickness of 0.6 m: the file is in millimetres."""
+    path = tmp_path / "a.k"
+    path.write_text(FIXED)
+    with pytest.raises(ModelError, match="unit system"):
+        read_keyword(path, "SI")
+    with pytest.raises(FileError, match="cannot be read"):
+        read_keyword(tmp_path / "none.k")
+
+
+def test_vtu(tmp_path):
+    """Nodal and elemental thickness of a mesh file."""
+    import meshio
+
+    mesh = sheet()
+    cells = [("quad", np.asarray(mesh.cells))]
+    for name, data in (("point_data", mesh.nodal), ("cell_data", [mesh.thickness.mean(axis=1)])):
+        path = tmp_path / f"{name}.vtu"
+        meshio.Mesh(1e3 * mesh.points, cells, **{name: {"Thickness": scaled(data)}}).write(path)
+        back = read_formed(path)
+        np.testing.assert_allclose(back.points, mesh.points, atol=1e-12)
+        np.testing.assert_allclose(
+            back.thickness.mean(axis=1), mesh.thickness.mean(axis=1), rtol=0.02
+        )
+    meshio.Mesh(1e3 * mesh.points, cells).write(tmp_path / "bare.vtu")
+    with pytest.raises(FileError, match="no field called thickness"):
+        read_formed(tmp_path / "bare.vtu")
+
+
+def scaled(data):
+    return [1e3 * d for d in data] if isinstance(data, list) else 1e3 * data
+
+
+def test_csv(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("node,x,y,z,thickness\n4,0,0,0,0.6\n5,10,0,0,0.7\n")
+    mesh = read_formed(path)
+    np.testing.assert_allclose(mesh.nodal, [0.6e-3, 0.7e-3])
+    np.testing.assert_allclose(mesh.points[1], [0.01, 0, 0])
+    assert mesh.ids.tolist() == [4, 5]
+    path.write_text("node,x,y,z\n4,0,0,0\n")
+    with pytest.raises(FileError, match="thickness"):
+        read_formed(path)
+
+
+def test_shapes_must_fit():
+    mesh = sheet()
+    with pytest.raises(ShapeError, match="one row per cell"):
+        FormedMesh(mesh.ids, mesh.points, mesh.cells, mesh.part, mesh.thickness[:-1])
+    with pytest.raises(ModelError, match="no part 9"):
+        mesh.of_part(9)
+    assert len(mesh.of_part(7).cells) == 8

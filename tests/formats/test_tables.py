@@ -1,0 +1,165 @@
+"""Tables: round trips to the last digit; one sentence for each kind of fault."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.frf import FRF
+from chladni.ema.setup import Poles
+from chladni.errors import FileError
+from chladni.io.tables.read_tables import read_poles, read_recordings
+from chladni.io.tables.sensor_table import read_sensors
+from chladni.io.tables.write_tables import write_csv, write_npz, write_poles
+
+
+@pytest.fixture
+def H() -> FRF:
+    rng = np.random.default_rng(1)
+    f = np.geomspace(7.0, 300.0, 20)
+    values = rng.normal(size=(20, 3, 2)) + 1j * rng.normal(size=(20, 3, 2))
+    spread, gamma = rng.uniform(size=(2, 20, 3, 2))
+    outputs, inputs = ("1:+Z", "4:-X", "7:n"), ("1:+Z", "base:+Z")
+    return FRF(values, f, outputs, inputs, "mobility", spread, gamma)
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz"])
+def test_every_digit_comes_back(tmp_path: Path, H: FRF, ending: str) -> None:
+    path = tmp_path / f"a.{ending}"
+    {"csv": write_csv, "npz": write_npz}[ending](path, H)
+    (back,) = read_recordings(path, quantity="mobility")
+    assert back.frf is not None
+    for name in ("values", "frequency", "variance", "coherence"):
+        np.testing.assert_array_equal(getattr(back.frf, name), getattr(H, name))
+    assert (back.frf.outputs, back.frf.inputs) == (H.outputs, H.inputs)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_order_of_rows_and_columns_is_free(tmp_path: Path, H: FRF) -> None:
+    write_csv(tmp_path / "a.csv", H)
+    head, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    turned = [",".join(reversed(line.split(","))) for line in [head, *rows[::-1]]]
+    (tmp_path / "b.csv").write_text("\ufeff" + "\n\n".join(turned), encoding="utf-8")
+    back = read_recordings(tmp_path / "b.csv", "mobility")[0].frf
+    assert back is not None
+    again = back.sel(H.outputs, H.inputs)
+    np.testing.assert_array_equal(again.values, H.values)
+
+
+def test_levels_and_articles_are_recordings_of_their_own(tmp_path: Path) -> None:
+    """Each level may have its own frequencies, as a stepped sine has."""
+    lines = ["frequency_hz,output,input,real,imag,level,article"]
+    lines += [f"{f},1:+Z,2:+Z,{f},1,{a},{n}" for n in "AB" for a in (1, 2) for f in (a, a + 1.5)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    read = read_recordings(tmp_path / "a.csv", "accelerance")
+    assert [(r.article, r.level) for r in read] == [("A", 1), ("A", 2), ("B", 1), ("B", 2)]
+    assert read[1].frf is not None
+    np.testing.assert_array_equal(read[1].frf.frequency, [2.0, 3.5])
+    assert read[3].name == "a.csv, article B, level 2"
+
+
+def test_poles_come_back(tmp_path: Path) -> None:
+    nan = np.nan
+    poles = Poles(
+        np.array([10.1, 20.2, 9.9]), np.array([0.1, nan, nan]), np.array([nan, 0.01, nan]),
+        np.array([1, 2, 1]), ("bare", "bare", "with mass"),
+    )  # fmt: skip
+    write_poles(tmp_path / "p.csv", poles)
+    back = read_poles(tmp_path / "p.csv")
+    for name in ("frequency", "frequency_sd", "damping", "mode"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(poles, name))
+    assert back.states == ("bare", "with mass")
+    np.testing.assert_array_equal(back.of("with mass").frequency, [9.9])
+    assert read_recordings(tmp_path / "p.csv")[0].poles is not None
+
+
+def test_sensors_of_every_kind(tmp_path: Path) -> None:
+    (tmp_path / "s.csv").write_text(
+        "label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd\n"
+        "1:+Z,,0.1,0.2,0,,,,,input,,0.025\n"
+        "2:-X,17,,,,,,,,,0.004,\n"
+        "3:n,,,,,,,,,output,,\n"
+        "4:+Z,,1,2,3,n,,,,,,\n"
+        "5:+Z,,1,2,3,,0,3,4,,,\n"
+        "base:+Z,,,,,,,,,input,,\n"
+    )
+    hit, left, normal, placed, tilted, base = read_sensors(tmp_path / "s.csv")
+    assert (hit.role, hit.position_sd, hit.grid) == ("input", 0.025, None)
+    np.testing.assert_array_equal(hit.place, [0.1, 0.2, 0.0])
+    assert (left.grid, left.mass) == (17, 0.004)
+    np.testing.assert_array_equal(left.direction, [-1, 0, 0])
+    assert (normal.grid, normal.direction, placed.direction) == (3, None, None)
+    np.testing.assert_allclose(tilted.direction, [0, 0.6, 0.8])
+    assert (base.grid, base.place) == (None, None)
+
+
+HEAD = "frequency_hz,output,input,real,imag\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "empty"),
+        (HEAD, "no rows"),
+        ("frequency_hz,output,real,imag\n1,1:+Z,1,1\n", "no column input"),
+        ("frequency_hz,output,input,real,imag,phase\n", "unknown column 'phase'; known are"),
+        (HEAD + "1,1:+Z,1:+Z,1\n", "line 2: 4 cells, the header has 5"),
+        (HEAD + "1,1:+Z,1:+Z,1,1\n2,1:+Z,1:+Z,nan,1\n", "line 3: real is 'nan'"),
+        (HEAD + "1,1:+Z,1:+Z,1,one\n", "line 2: imag is 'one'"),
+        (HEAD + "1,1:+Z,1:+Z,1,1\n1,1:+Z,1:+Z,1,1\n", "line 3: .* twice; several levels"),
+        (HEAD + "1,1:+Z,1:+Z,1,1\n2,2:+Z,1:+Z,1,1\n", "2:.Z / 1:.Z has no line at 1 Hz"),
+        (HEAD + "1,1:+Z,1:+Z,0,0\n", "the FRF is empty"),
+    ],
+)
+def test_faults_of_a_table(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(FileError, match=said) as error:
+        read_recordings(tmp_path / "a.csv", "mobility")
+    assert "a.csv" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("2:+Z,,,,,up,,", "line 2: direction 'up'; write"),
+        ("2:+Z,,1,,,,,", "line 2: a place needs x, y and z"),
+        ("2:+Z,3,1,1,1,,,", "both a grid and a place"),
+        ("2:+Z,3,,,,,sensor,", "role 'sensor'; there are output and input"),
+        ("tip:+Z,,,,,,,", "names no node"),
+        ("2:+Z,,,,,,,-1", "cannot be negative"),
+        ("2:+Z,,,,,,,\n2:+Z,,,,,,,", "line 3: output 2:.Z is already in line 2"),
+    ],
+)
+def test_faults_of_the_sensors(tmp_path: Path, row: str, said: str) -> None:
+    (tmp_path / "s.csv").write_text(f"label,grid,x,y,z,direction,role,mass\n{row}\n")
+    with pytest.raises(FileError, match=said):
+        read_sensors(tmp_path / "s.csv")
+
+
+def test_faults_of_an_archive(tmp_path: Path, H: FRF) -> None:
+    path = tmp_path / "a.npz"
+    write_npz(path, H)
+    arrays = dict(np.load(path, allow_pickle=False))
+    for change, said in (
+        ({"outputs": np.array(["1:+Z"])}, r"labels and frequencies say \(20, 1, 2\)"),
+        ({"values": np.where(np.arange(20)[:, None, None] == 3, np.nan, H.values)}, "not a number"),
+        ({"outputs": np.array([{}], dtype=object)}, "cannot be read"),
+        ({"gain": np.ones(2)}, "unknown array gain"),
+        ({"frequency_hz": np.ones(20)}, "frequencies must increase"),
+    ):
+        np.savez(path, **(arrays | change))
+        with pytest.raises(FileError, match=said):
+            read_recordings(path)
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(FileError, match="cannot be read"):
+        read_recordings(path)
+
+
+def test_the_quantity_must_be_known(tmp_path: Path, H: FRF) -> None:
+    write_csv(tmp_path / "a.csv", replace(H, variance=None))
+    with pytest.raises(FileError, match="does not say its quantity: one of receptance"):
+        read_recordings(tmp_path / "a.csv")
+    with pytest.raises(FileError, match=r"end in .uff, .unv, .npz or .csv, not '.txt'"):
+        read_recordings(tmp_path / "a.txt")

@@ -1,0 +1,81 @@
+"""The reduced model is the structure itself, seen through a basis."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.points import with_masses, with_springs
+from chladni.updating.reduced_model import evaluate, reduce
+from chladni.updating.reduced_problem import workbench
+from chladni_specimens.plates import folded_panel
+
+TOP = 120.0
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return workbench(folded_panel(h=0.06), TOP, groups=12)
+
+
+def alike(got, expected):
+    assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_nominal_frequencies_are_those_of_the_structure(bench):
+    lam = evaluate(bench.model, [], np.zeros(0)).lam
+    got = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+    assert_allclose(got[6 : len(bench.frequency)], bench.frequency[6:], rtol=1e-7)
+
+
+def test_shells_are_all_there_is_where_there_is_nothing_else(bench):
+    model = bench.model
+    total = model.linear[""].sum(axis=0) + model.cubic[""].sum(axis=0)
+    assert np.abs(model.K0).max() < 1e-9 * np.abs(total).max()
+    assert np.abs(model.M0).max() < 1e-9 * np.abs(model.mass.sum(axis=0)).max()
+    assert model.weight0 < 1e-9
+
+
+def test_groups_and_rest_sum_to_the_structure():
+    built = with_masses(folded_panel(h=0.06), (3, 9), 0.05)
+    bench = workbench(with_springs(built, (5,), np.eye(3)[2:], 2e3), TOP, groups=12)
+    model, system = bench.model, bench.structure.system
+    K = model.linear[""].sum(axis=0) + model.cubic[""].sum(axis=0) + model.K0
+    alike(K, model.basis.T @ (system.K.real @ model.basis))
+    alike(model.mass.sum(axis=0) + model.M0, model.basis.T @ (system.M @ model.basis))
+    assert_allclose(model.weight0, 0.1)
+
+
+def test_basis_is_orthonormal_before_and_after_it_grows(bench):
+    rows = bench.grids.rows[[2, 11]]
+    for model in (bench.model, bench.with_attachments(rows)):
+        one = model.basis.T @ (bench.structure.system.M @ model.basis)
+        assert_allclose(one, np.eye(len(one)), atol=1e-8)
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_grown_model_is_the_model_of_the_grown_basis(bench, split):
+    model = bench.model.with_components() if split else bench.model
+    vectors = np.random.default_rng(3).normal(size=(len(model.basis), 4))
+    grown = model.extended(vectors)
+    direct = reduce(bench.sheet, grown.basis)
+    direct = direct.with_components() if split else direct
+    assert grown.basis.shape[1] == model.basis.shape[1] + 4
+    assert grown.linear.keys() == direct.linear.keys()
+    for name in direct.linear:
+        alike(grown.linear[name], direct.linear[name])
+        alike(grown.cubic[name], direct.cubic[name])
+    alike(grown.mass, direct.mass)
+    scale = np.abs(sum(direct.linear.values()).sum(axis=0)).max()
+    assert_allclose(grown.K0, direct.K0, atol=1e-9 * scale)
+    assert_allclose(grown.M0, direct.M0, atol=1e-9 * np.abs(direct.mass.sum(axis=0)).max())
+
+
+def test_vectors_it_has_already_leave_it_alone(bench):
+    assert bench.model.extended(bench.model.basis[:, 6:9] * 3.0) is bench.model
+
+
+def test_components_sum_to_the_whole(bench):
+    split = bench.model.with_components()
+    assert set(split.linear) == {"Q11", "Q22", "Q12", "Q66"}
+    alike(sum(split.linear.values()), bench.model.linear[""])
+    alike(sum(split.cubic.values()), bench.model.cubic[""])
