@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chladni.meshing.nastran.analysis import analysis
-from chladni.meshing.nastran.convert import assembly
-from chladni.meshing.nastran.deck import read_deck
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.fem.solve import motion_at, subcase_statics
+from chladni.io.nastran import analysis, assembly, read_deck
 
 FOLDER = Path(__file__).resolve().parents[2] / "../shared/anchors/warped_quads"
 MSC = np.array([-5.1959488e-3, 3.2730366e-3, -2.1422641e-2])  # grid 12432 [in]
