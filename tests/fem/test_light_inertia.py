@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from chladni.meshing.nastran import assembly, read_deck
-from chladni.model.plates import plate
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.system import System
 from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, read_deck
 from chladni.model.assembly import Beams, Equation
 from chladni.model.properties import BeamSection, Isotropic, Part
+from chladni_specimens.plates import plate
 
 E, G, A, I1, I2, J, L, M = 210e9, 80e9, 1e-4, 1e-9, 3e-9, 2e-9, 1.5, 2.0  # SI
 
