@@ -12,15 +12,12 @@ Problems 30, 114007).
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import Protocol, Self
 
 import numpy as np
 import scipy.linalg as sl
 
 from .reduced_model import Reduced, State
-
-if TYPE_CHECKING:
-    from .likelihood import Responses
 
 MEDIAN, LOG_SD = 0.01, 0.7  # prior of δ: two formulations of one sheet differ by 0.3 to 4 %
 GRID = np.geomspace(0.0008, 0.16, 16)  # values of δ over which an evidence is integrated
@@ -30,6 +27,38 @@ MOST = 2000  # pairs of modes, or samples, that are decomposed
 CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
 WRAPS = 0.4  # relative deviation of H from which its phase may wrap
+
+
+class Lines(Protocol):
+    """Responses on lines s, as :class:`.likelihood.Responses`."""
+
+    @property
+    def values(self) -> np.ndarray:
+        """H (n_f, n_out, n_in)."""
+
+    @property
+    def s(self) -> np.ndarray:
+        """(n_f,) [rad/s]."""
+
+    @property
+    def use(self) -> np.ndarray:
+        """Lines and channels in use (n_f, n_out)."""
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o, φ_i and D."""
+
+    def model(self, state: State) -> np.ndarray:
+        """H of the model."""
+
+    def spread(self) -> np.ndarray:
+        """Standard deviation of log10 H."""
+
+    def only(self, use: np.ndarray) -> Self:
+        """Others in use."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +141,7 @@ def prior(delta: np.ndarray | float) -> np.ndarray:
     return np.asarray(z**2 + np.log(2 * np.pi * LOG_SD**2))
 
 
-def discrepancy(data: "Responses", state: State) -> Discrepancy:
+def discrepancy(data: Lines, state: State) -> Discrepancy:
     """How errors of modal stiffness and mass at a state spread over the whitened residual.
 
     The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs.
@@ -128,21 +157,21 @@ def discrepancy(data: "Responses", state: State) -> Discrepancy:
     return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
 
 
-def curvature(data: "Responses", state: State) -> np.ndarray:
+def curvature(data: Lines, state: State) -> np.ndarray:
     """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
 
     For H = H_0 (1 + z), z of variance σ², ln(1 + z) = z - z²/2: near a zero of H, where σ is no
     longer small, the logarithm is bent, and beyond σ = 0.4 its phase may wrap. What is left of the
     exact response to G is alike along lines and counts ``BENT`` times.
     """
-    every = replace(data, use=np.ones(data.use.shape, bool))
+    every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
     sd = every.spread() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
     return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
 
 
-def columns(data: "Responses", state: State, about: Form) -> np.ndarray:
+def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     """∂r/∂G and ∂r/∂G' of pairs of modes, times the standard deviation at δ = 1 (n, 2 pairs).
 
     dH = -s^k a_oᵀ (Λ^½ dG Λ^½ + s² dG') a_i with a = T D φ, T the reference modes' share in those

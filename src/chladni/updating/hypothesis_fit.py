@@ -14,7 +14,11 @@ from .map_fit import Fit, Weighing, beside, fit, unknowns
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import Workbench
 
-NEVER_WRITTEN = ("scatter", "jitter")  # nuisances no deck can hold; gain and mesh error stay
+NEVER_WRITTEN = (
+    "scatter",
+    "jitter",
+    "family",
+)  # nuisances no deck can hold; gain and mesh error stay
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 

@@ -15,6 +15,7 @@ from ..dynamics.frf import FRF
 from ..effects import catalogue
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
+from ..effects.families import families
 from ..effects.ordinary import PartScale, gain, ordinary, scatter
 from ..ema.identification import Identified, equalised, identify, spread
 from ..fem.assemble import Structure, structure
@@ -196,13 +197,14 @@ def nuisances(
     """Scatter within parts, mesh error, jitter: what calibration cannot remove.
 
     Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
+    What is structured in that error stands beside it, joints and shear of the shells by families.
     """
     out: list[Effect] = [
         scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(built, top, mesh)] if jittered else out
+    return [*out, jitter(built, top, mesh)] if jittered else [*out, *families(built)]
 
 
 def searched(
