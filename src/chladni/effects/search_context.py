@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from .effect import Effect
-from .surroundings import Surroundings
+from .surroundings import ShellGrids, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,13 @@ class ResponseScan(Protocol):
     def deviation(self) -> np.ndarray:
         """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines."""
 
-    def point_scores(self, about: int, matrix: str, strengths: np.ndarray) -> np.ndarray:
-        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
+    def point_scores(
+        self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
+    ) -> np.ndarray:
+        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths).
+
+        ``places`` are those of :class:`Surroundings` unless others are given.
+        """
 
     def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""

@@ -13,6 +13,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from ..ema.correlation import wrapped
+from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
 from .pole_assignment import paired, price_alone, price_missed
 from .reduced_model import Reduced, State
 
@@ -25,6 +26,9 @@ class Data(Protocol):
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """r (n,) and ∂r/∂x (n, n_p)."""
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The same over the spread of each sample alone, dependence not yet whitened out."""
 
     def over(self, model: Reduced) -> Self:
         """The same data seen through another basis."""
@@ -40,7 +44,7 @@ class Responses:
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
     use : (n_f, n_out) bool                lines and channels the fit may see
-    floor : float                          standard deviation of log10 H that no model reaches
+    floor : float                          sd of log10 H that neither noise nor δ explains
     """
 
     values: np.ndarray
@@ -49,10 +53,17 @@ class Responses:
     inputs: object
     use: np.ndarray
     quantity: str = "accelerance"
-    floor: float = 0.015
+    floor: float = 0.003
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
+    bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
+    error: Discrepancy | None = None  # covariance of the lines and channels in use
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+        return POWER[self.quantity]
 
     def over(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
@@ -60,11 +71,12 @@ class Responses:
 
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) (n_f, n_out, n_in)."""
-        phi_o, phi_i, d = self._modal(state)
+        phi_o, phi_i, d = self.modal(state)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
-        return np.asarray(self.s[:, None, None] ** POWER[self.quantity] * H)
+        return np.asarray(self.s[:, None, None] ** self.power * H)
 
-    def _modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r)."""
         d = 1 / (state.lam + self.s[:, None] ** 2)
         return self.a @ state.phi, self.b @ state.phi, d
 
@@ -79,9 +91,28 @@ class Responses:
         """Standard deviation of δ: the floor, inflated where the response itself is small."""
         rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
         out = self.floor**2 + (0.6 * self.floor * rms / np.abs(self.values)) ** 2
-        return np.sqrt(out + (0.0 if self.noise is None else self.noise**2))
+        for more in (self.noise, self.bent):
+            out = out + (0.0 if more is None else more**2)
+        return np.sqrt(out)
+
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
+        """The same responses of a model whose form is off by about δ, as seen from a state."""
+        plain = self.exactly()
+        data = replace(plain, bent=curvature(plain, state))
+        return replace(data, error=discrepancy(data, state).with_delta(delta))
+
+    def exactly(self) -> Self:
+        """The same responses of a model that is right but for its parameters."""
+        return replace(self, bent=None, error=None)
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """δ over its spread, with the errors of the model's form whitened out."""
+        r, J = self.scaled(state, gradient)
+        if self.error is None:
+            return r, J
+        return self.error.whitened(r), self.error.whitened(J) if gradient else J
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """Real and imaginary part of δ over its spread, on the lines and channels in use."""
         sd = self.spread()
         delta = (self.deviation(state) / sd)[self.use].ravel()
@@ -93,7 +124,7 @@ class Responses:
 
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D (dK + s² dM) D φ_i, over H ln 10."""
-        phi_o, phi_i, d = self._modal(state)
+        phi_o, phi_i, d = self.modal(state)
         n_p, r = len(state.dK), len(state.lam)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
         out = np.empty((n_p, *H.shape), complex)
@@ -111,7 +142,7 @@ class Responses:
 
     def only(self, use: np.ndarray) -> Self:
         """The same responses on other lines and channels."""
-        return replace(self, use=use)
+        return replace(self.exactly(), use=use)
 
     def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
         """Mean |δ|² over the lines and channels in use (``real`` is for poles)."""
@@ -210,6 +241,8 @@ class Poles:
             J[test] = (dlam / (2 * lam) / sd[test]).T
         use = np.append(self.use, True)
         return r[use], J[use]
+
+    scaled = residual  # poles are independent
 
     def only(self, use: np.ndarray) -> Self:
         """The same poles, others in use."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, verdict
+from .diagnosis import Diagnosis, tested, verdict
 from .hypothesis_fit import Search, Trial, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
@@ -93,7 +93,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         "named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
-    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note), written=None)
+    notes = (*diagnosis.notes, note)
+    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.search)
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:

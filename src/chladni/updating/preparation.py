@@ -11,11 +11,13 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.frf import FRF
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
+from ..effects.model_families import model_families
 from ..effects.ordinary import PartScale, defaults, gain, ordinary, scatter
 from ..effects.surroundings import Setup
-from ..ema.identification import equalised, identify
+from ..ema.identification import Identified, equalised, identify, spread
 from ..ema.recording_noise import equalised_noise
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -63,10 +65,10 @@ def _by_responses(question: Question) -> Prepared:
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_top, held_sensors)
-        data.append(
-            Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
-        )
-    nuisance = nuisances(bench, nominal, top)
+        H = equalised(found, s)
+        read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
+        data.append(read.over(bench.model))
+    nuisance = nuisances(bench, nominal, top, jittered=False)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, top)
@@ -97,6 +99,19 @@ def _by_responses(question: Question) -> Prepared:
     notes += _mass_note(question)
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found)
+
+
+def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
+    """Standard deviation of log10 H(s) from the noise of the recording (n_f, n_out, n_in).
+
+    The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
+    """
+    sd = np.sqrt(spread(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    f, own = s.imag / (2 * np.pi), frf.frequency
+    near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
+    lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))
+    per_line = np.minimum(sd[near], 1.0) * max(found.chi, 1.0)
+    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
@@ -180,14 +195,20 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     return Prepared(search, data, held, what, notes, nominal, None, found, ~held)
 
 
-def nuisances(bench: Workbench, model: Modelled, top: float) -> list[Effect]:
-    """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
+def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = True) -> list[Effect]:
+    """Scatter within parts, mesh error, jitter: what calibration cannot remove.
+
+    Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
+    What is structured in that error stands beside it, joints and shear of the shells by families.
+    """
     out: list[Effect] = [
         scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(model, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(model, top, mesh)]
+    if jittered:
+        return [*out, jitter(model, top, mesh)]
+    return [*out, *model_families(model.structure)]
 
 
 def searched(

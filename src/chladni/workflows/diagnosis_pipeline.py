@@ -30,7 +30,7 @@ from ..updating.outcome import fitted_scores, held_out, judged, models, real_pol
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from ..updating.result import MassComparison, Scores
+from ..updating.result import Adequacy, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
@@ -147,10 +147,20 @@ def _result(
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
+        adequate=_adequate(found),
         notes=(*prepared.notes, *found.notes, left.sentence),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
     )
+
+
+def _adequate(found: Diagnosis) -> Adequacy | None:
+    """The absolute test as the page has it; None where natural frequencies were compared."""
+    test = found.adequacy
+    if test is None:
+        return None
+    place: dict[str, object] = {"text": test.where, "parts": [], "modes_hz": []}
+    return Adequacy(test.passes, test.p, test.what, () if test.passes else (place,))
 
 
 def _scores(
