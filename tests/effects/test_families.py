@@ -20,7 +20,7 @@ from chladni.fem.energy import mass_properties
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.units import UNITS
-from chladni.updating.candidates import Context
+from chladni.updating.candidates import UpdatingContext
 from chladni.updating.hypothesis_fit import Search, Trial, fitted
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.reduced_model import evaluate
@@ -62,7 +62,7 @@ def searched(bench, data, setup):
     labels = tuple(f"{g}:+Z" for g in SENSORS)
     search = Search(bench, data, None, base, (), setup, labels)
     fit = fitted(bench.model, base, data, None, search.mean())
-    return Context(search, Trial(Effect(), fit, bench.model))
+    return UpdatingContext(search, Trial(Effect(), fit, bench.model))
 
 
 @pytest.fixture(scope="module")
