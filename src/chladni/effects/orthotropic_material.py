@@ -49,7 +49,7 @@ class OrthotropicMaterial(Effect):
         return [*rows[:3], last]
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
-        """Ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
+        """ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
         m = _mean_ratio(x[3])
         base = np.log(1 - self.nu**2) - np.log(1 - m**2)
         return np.array(
@@ -57,7 +57,7 @@ class OrthotropicMaterial(Effect):
         )
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Ln factors of the four components of the plane stiffness."""
+        """ln factors of the four components of the plane stiffness."""
         has = 0.0 if self.reference is None else self._logs(self.reference)
         logs, h = self._logs(x) - has, 1e-6
         slopes = np.stack(

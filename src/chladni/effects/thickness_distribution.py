@@ -35,7 +35,7 @@ class ThicknessDistribution(Effect):
     ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def _bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
-        """Q at points X (n,), averaged over a group of variance ``blur``."""
+        """q at points X (n,), averaged over a group of variance ``blur``."""
         d2 = ((X - self.at(x)) ** 2).sum(axis=1)
         R2 = (self.size * np.exp(x[1])) ** 2
         return np.asarray(R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur))))
