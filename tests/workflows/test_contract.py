@@ -73,8 +73,11 @@ def test_json_of_a_command_is_the_result_of_its_function(
 def test_json_of_a_diagnosis_is_the_result_of_its_function(diagnosed, folder, tmp_path):
     found = written("diagnose", "diagnosis.json", folder, tmp_path / "out")
     assert found.pop("files") == {
-        "deck": "updated.bdf", "report": "report.html", "diagnosis": "diagnosis.json"
-    }  # fmt: skip
+        "deck": "updated.bdf",
+        "calibrated": "calibrated.bdf",
+        "report": "report.html",
+        "diagnosis": "diagnosis.json",
+    }
     due = plain(to_json(diagnosed))
     assert due.pop("files") == {}
     assert found == due
