@@ -47,7 +47,7 @@ LIBRARIES = {
     "progress": {"rich"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pyyeti", "pyuff"},
+    "io": {"meshio", "pyyeti", "pyuff", "trimesh"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},
@@ -61,7 +61,6 @@ WAITING_FOR = {  # module no command, environment or public name reaches: what w
     "chladni/ema/screening": "screening of a recording before anything is fitted",
     "chladni/ema/shapes": "shapes of identified modes, their covariance and complexity",
     "chladni/ema/realisation": "an identified model as a state space",
-    "chladni/geometry/thickness_alignment": "thickness mapping",
     "chladni/geometry/thickness_prior": "thickness mapping",
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names

@@ -98,7 +98,7 @@ class Recorded:
         outputs = np.flatnonzero(self.score.use.any(axis=0))
 
         def fitted(values: np.ndarray) -> np.ndarray:
-            return np.asarray(values[np.ix_(lines, outputs)].reshape(len(lines), -1))
+            return values[np.ix_(lines, outputs)].reshape(len(lines), -1)
 
         def predict(x: np.ndarray) -> np.ndarray:
             return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))

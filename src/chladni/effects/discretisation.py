@@ -28,7 +28,7 @@ class MeshError(Effect):
     change: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """X ΔK over the modes."""
+        """x ΔK over the modes."""
         return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None]),)
 
 

@@ -49,7 +49,7 @@ class Workbench:
         K = self.model.basis.T @ (self.structure.system.K.real @ self.model.basis)
         shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
         inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
-        return np.asarray(np.maximum(exact - inside, 0.0))
+        return np.maximum(exact - inside, 0.0)
 
     def with_attachments(self, rows: sp.csr_array) -> Reduced:
         """The reduced model over a basis that can carry these rows."""

@@ -35,6 +35,7 @@ class Model:
     assembly: Assembly
     unit: str = "m"  # of length; "" where a bare deck came without its unit system
     notes: tuple[str, ...] = ()  # what of the deck was left out
+    length: float = 1.0  # the deck's own unit of length [m]
 
     @cached_property
     def structure(self) -> Structure:
@@ -95,7 +96,8 @@ def load_model(
     if is_case(source):
         from ..case import load_case
 
-        return Model(source, load_case(source).assembly)
+        case = load_case(source)
+        return Model(source, case.assembly, length=case.units.length)
     return load_deck(source, units, allow).model(subcase)
 
 
@@ -120,7 +122,8 @@ class DeckModels:
         from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
 
         made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
-        return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
+        unit, length = ("", 1.0) if self.units is None else ("m", self.units.length)
+        return Model(self.source, made, unit, tuple(notes), length)
 
 
 def as_model(source: "Case | Model | DeckModels") -> Model:
