@@ -46,6 +46,7 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
 _HALF = ("waterfall", "held_out")  # two of them stand side by side
 _FILES = {
     "deck": "the updated deck",
+    "calibrated": "the deck calibrated without the effect",
     "report": "this page",
     "diagnosis": "the result for other programs",
     "frf": "test and model as arrays",

@@ -16,8 +16,7 @@ from ..case import Case
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
-from ..fem.modelled import modelled
-from ..io.nastran.edit.changes import Change
+from ..fem.modelled import Modelled, modelled
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -34,7 +33,7 @@ from ..updating.result import Adequacy, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
-from .diagnosis_result import DiagnosisResult, UpdatedModels
+from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
 
 
@@ -75,31 +74,27 @@ def _judged(
 def _updated(
     case: Case, asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[UpdatedModels, list[str]]:
-    """The structures before and after, each solved once, the last as its deck has it."""
-    stages, band = models(asked, found), prepared.nominal.band
-    known = {id(case.assembly): prepared.nominal}
-    edits, final, lost = _as_written(case, stages.final)
-    if stages.final is not case.assembly or edits:
-        known[id(stages.final)] = modelled(final, band)
-    for assembly in (stages.calibrated, stages.final):
-        if id(assembly) not in known:
-            known[id(assembly)] = modelled(assembly, band)
-    nominal, calibrated, last = (
-        known[id(a)] for a in (case.assembly, stages.calibrated, stages.final)
-    )
-    made = UpdatedModels(nominal, calibrated, last, edits, held_out=_unseen(prepared))
+    """The structures before and after, each solved once, changed ones as their decks have them."""
+    stages, nominal = models(asked, found), prepared.nominal
+    calibrated, lost = _deck(case, nominal, stages.calibrated)
+    final = calibrated
+    if stages.final is not stages.calibrated:
+        final, lost = _deck(case, nominal, stages.final)
+    made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
 
 
-def _as_written(
-    case: Case, final: Assembly
-) -> tuple[tuple[Change, ...] | None, Assembly, list[str]]:
+def _deck(case: Case, nominal: Modelled, changed: Assembly) -> tuple[ChangedDeck, list[str]]:
     """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
+    if changed is case.assembly:
+        return ChangedDeck(nominal, ()), []
     try:
-        edits = tuple(changes(case.deck, case.assembly, final, case.units))
-        return edits, written_assembly(case.deck, edits, case.units), []
+        edits = tuple(changes(case.deck, case.assembly, changed, case.units))
+        written = written_assembly(case.deck, edits, case.units)
     except (FileError, LabelError, ModelError) as error:
-        return None, final, [f"no updated deck was written: {error}"]
+        known = modelled(changed, nominal.band)
+        return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
+    return ChangedDeck(modelled(written, nominal.band), edits), []
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
@@ -121,8 +116,8 @@ def _curves(case: Case, made: UpdatedModels) -> dict[str, FRF]:
     test = case.frfs[0].sel(band=(max(low, 1e-6), high))
     zeta = case.damping or DAMPING
     after = before = model_frf(case, made.nominal, zeta, test)
-    if made.final is not made.nominal:
-        after = model_frf(case, made.final, zeta, test)
+    if made.final.model is not made.nominal:
+        after = model_frf(case, made.final.model, zeta, test)
     return {"test": test, "before": before, "after": after}
 
 
@@ -132,7 +127,11 @@ def _result(
     """All numbers and words, from the decks as written."""
     last = found.found or found.null
     real = real_poles(prepared, last)
-    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
+    every = (
+        ("before", stages.nominal),
+        ("calibrated", stages.calibrated.model),
+        ("after", stages.final.model),
+    )
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
     left = remainder(prepared, found)
@@ -143,7 +142,7 @@ def _result(
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
-        mass=MassComparison(weighed, mass_properties(stages.final.assembly)[0]),
+        mass=MassComparison(weighed, mass_properties(stages.final.model.assembly)[0]),
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
@@ -173,10 +172,10 @@ def _scores(
     fault = found.found if found.verdict == "measurement fault" else None
     nominal = written_Q(asked, prepared, stages.nominal, sets, real)
     calibrated = final = nominal
-    if stages.calibrated is not stages.nominal:
-        calibrated = written_Q(asked, prepared, stages.calibrated, sets, real)
-    if stages.final is not stages.nominal:
-        final = written_Q(asked, prepared, stages.final, sets, real, fault)
+    if stages.calibrated.model is not stages.nominal:
+        final = calibrated = written_Q(asked, prepared, stages.calibrated.model, sets, real)
+    if fault is not None or stages.final is not stages.calibrated:
+        final = written_Q(asked, prepared, stages.final.model, sets, real, fault)
     fits = fitted_scores(prepared, found)
     first, second = (
         (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)
