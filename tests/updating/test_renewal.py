@@ -10,6 +10,24 @@ from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
 
 
+class Remade(Effect):
+    """So strong that the structure is another one."""
+
+    remakes_structure = True
+
+
+@pytest.mark.parametrize(("effect", "structure"), [(Effect(), "deck"), (Remade(), "remade")])
+def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effect, structure):
+    """Not by name or class: the effect says so itself."""
+    found = Accuracy(np.array([10.0]), np.array([0.0]), np.zeros((3, 1)))
+    remade = SimpleNamespace(structure="remade")
+    monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
+    monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
+    prepared = SimpleNamespace(search=SimpleNamespace())
+    trial, _ = renewal.renewed(None, prepared, SimpleNamespace(effect=effect, structure="deck"))
+    assert trial.structure == structure
+
+
 def a_trial():
     fit = SimpleNamespace(effects=(), x=np.zeros(0))
     data = SimpleNamespace(over=lambda model: model)
