@@ -21,7 +21,7 @@ def seen(bench, responses):
     """A plate seen with 8 % damping, and E and rho free."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [ordinary(bench.sheet, "E", [0]), ordinary(bench.sheet, "rho", [0])]
+    effects = [ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "rho", [0])]
     return empty, effects
 
 

@@ -19,7 +19,7 @@ def softer(bench, responses):
     """The recording, at 8 % damping, seen from a model that is nearly right."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [ordinary(bench.sheet, "E", [0]), ordinary(bench.sheet, "rho", [0])]
+    effects = [ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "rho", [0])]
     truth = evaluate(bench.model, effects, np.array([0.01, 0.005]))
     return replace(empty, values=empty.model(truth)), effects
 
