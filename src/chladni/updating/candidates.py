@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from ..effects import catalogue
 from ..effects.effect import Effect
@@ -12,6 +11,7 @@ from ..effects.thickness_distribution import thickness_distribution
 from ..errors import ModelError
 from .hypothesis_fit import Search, Trial
 from .likelihood import LN10, Poles, Responses
+from .pole_starts import global_starts
 from .reduced_model import evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 
@@ -67,13 +67,6 @@ def _scores(search: Search, base: Baseline, effect: Effect, starts: list[np.ndar
     return out
 
 
-def _draws(effect: Effect, n: int) -> list[np.ndarray]:
-    """Sobol points of an effect's prior."""
-    u = qmc.Sobol(len(effect.parameters), seed=1).random(n)
-    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
-    return list(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))
-
-
 def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
     """Effects without an unknown place: the best start of each."""
     bench, setup = search.bench, search.setup
@@ -84,12 +77,13 @@ def _listed(search: Search, bases: list[Baseline]) -> list[Candidate]:
     ]
     out: list[Candidate] = []
     for effect in effects:
-        base, starts = bases[-1], effect.starts()
-        several = 1
+        base = bases[-1]
         if isinstance(search.data, Poles) and len(effect.parameters) > 2:
-            starts, several = [*starts, *_draws(effect, 1024)], 6  # pairing makes many valleys
+            out += [(effect, x, search.mean()) for x in global_starts(search, effect)]
+            continue
+        starts = effect.starts()
         for scores in _scores(search, base, effect, starts):
-            out += [(effect, starts[k], base.x) for k in np.argsort(scores)[:several]]
+            out.append((effect, starts[int(np.argmin(scores))], base.x))
     return out
 
 

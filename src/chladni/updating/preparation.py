@@ -21,6 +21,7 @@ from ..fem.energy import mass_properties
 from .hypothesis_fit import Search
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
+from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
 from .test_frequencies import band_of, counted, frequencies, widened
@@ -29,6 +30,7 @@ ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough 
 ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
+FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
 def prepare(question: Question) -> Prepared:
@@ -157,7 +159,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
     built = structure(question.assembly)
-    bench = workbench(question.assembly, top, built=built, groups=48)
+    bench = workbench(question.assembly, top, built=built, groups=48, reach=FAR)
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -167,8 +169,9 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
-        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
-    ).over(bench.model)
+        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
+        spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
+    ).over(bench.model)  # fmt: skip
     nuisance = nuisances(bench, built, top)
     search = searched(question, bench, data, nuisance, top)
     what = f"the {int(held.sum())} highest of {len(held)} frequencies"

@@ -55,6 +55,7 @@ class Workbench:
 def workbench(
     assembly: Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
     groups: int = 64, extra: np.ndarray | None = None, built: Structure | None = None,
+    reach: float = REACH,
 ) -> Workbench:  # fmt: skip
     """Make a structure ready.
 
@@ -64,9 +65,10 @@ def workbench(
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
     extra : (n, m) further vectors for the basis
     most : candidate places
+    reach : the basis holds modes up to this many times ``top``
     """
     built = structure(assembly) if built is None else built
-    modes = normal_modes(built.system, band=REACH * top)
+    modes = normal_modes(built.system, band=reach * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
     factor = shifted(built.system, hertz)
