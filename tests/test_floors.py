@@ -55,8 +55,6 @@ LIBRARIES = {
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 WAITING_FOR = {  # module no command, environment or public name reaches: what will
-    "chladni/effects/linear_parameter": "calibration of joints",
-    "chladni/fem/derivative": "calibration of joints",
     "chladni/ema/signals": "estimates of FRFs from time data",
     "chladni/ema/screening": "screening of a recording before anything is fitted",
     "chladni/ema/shapes": "shapes of identified modes, their covariance and complexity",

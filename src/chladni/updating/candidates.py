@@ -13,6 +13,7 @@ from ..effects.surroundings import ShellGrids, Surroundings
 from ..errors import ModelError
 from .hypothesis_fit import Search, Trial
 from .likelihood import Poles, Responses
+from .pole_starts import global_starts
 from .reduced_model import evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 
@@ -90,6 +91,10 @@ class UpdatingContext:
                 r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
+
+    def valleys(self, effect: Effect) -> list[np.ndarray]:
+        """Lowest minima of an effect over its whole prior, where poles alone are known."""
+        return global_starts(self.search, effect)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
 from .discrepancy import MEDIAN, learned
-from .likelihood import Data, Poles, Responses
+from .likelihood import SCALE, Data, Poles, Responses
 from .map_fit import Fit, Weighing, beside, fit, unknowns
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import Workbench
@@ -130,7 +130,7 @@ def _fit_responses(
 
 
 SCALES = np.geomspace(0.003, 0.2, 25)
-SCALE_SD = 0.5  # of ln(scale) about its prior median
+SCALE_SD = 0.6  # of ln(scale) about its prior median
 
 
 def _fit_poles(
@@ -158,7 +158,7 @@ def _settled(
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), weighing, x)
         var = data.sd[data.use] ** 2 + scale**2
-        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale, data.scale))
+        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale))
         if best is not None and now.S > best.S - 0.05:
             break
         best, x = now, now.x
@@ -167,16 +167,17 @@ def _settled(
 
 def _likely_scale(data: Poles, state: State) -> float:
     """The scale at which the pairing as a whole is most probable."""
-
-    def cost(scale: float) -> float:
-        wider = replace(data, scale=scale)
-        r, _ = wider.residual(state, False)
-        return float(r @ r + 2 * np.log(wider.spread()[data.use]).sum()) + _scale_prior(scale)
-
-    return float(min(SCALES, key=cost))
+    return float(min(SCALES, key=lambda scale: neg2_log_mixture(replace(data, scale=scale), state)))
 
 
-def _scale_prior(scale: float, median: float = 0.006) -> float:
+def neg2_log_mixture(data: Poles, state: State) -> float:
+    """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
+    r, _ = data.residual(state, False)
+    widths = 2 * np.log(data.spread()[data.use]).sum()
+    return float(r @ r + widths) + _scale_prior(data.scale)
+
+
+def _scale_prior(scale: float, median: float = SCALE) -> float:
     return float((np.log(scale / median) / SCALE_SD) ** 2)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..ema.correlation import wrapped
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
-from .pole_assignment import paired, price_alone, price_missed
+from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
@@ -154,6 +154,9 @@ def _real_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.asarray(A @ z.real + 1j * (A @ z.imag))
 
 
+SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
+
+
 @dataclass(frozen=True, eq=False)
 class Poles:
     """Natural frequencies, each with the standard deviation of its logarithm.
@@ -165,7 +168,8 @@ class Poles:
     use : (n,) bool           poles the fit may see
     strength : (n,)           peak height relative to the highest
     band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             spread of ln f that no model reaches; a hypothesis may raise it
+    scale : float             spread of ln f that no model reaches; learned with every hypothesis
+    spurious : float          share of poles that may belong to no mode of the structure
     outputs, inputs           rows at the likely places of sensors and shakers, or None
     """
 
@@ -174,9 +178,10 @@ class Poles:
     use: np.ndarray
     strength: np.ndarray
     band: tuple[float, float]
-    scale: float = 0.006
+    scale: float = SCALE
     outputs: object = None
     inputs: object = None
+    spurious: float = SPURIOUS
     a: np.ndarray | None = None
     b: np.ndarray | None = None
 
@@ -208,7 +213,7 @@ class Poles:
 
     def _alone(self) -> np.ndarray:
         """Price of a lonely pole, on the scale on which a pair costs δ²/σ²."""
-        price = np.where(np.isinf(self.strength), 1e4, price_alone(self.strength))
+        price = np.where(np.isinf(self.strength), 1e4, price_spurious(self.spurious))
         return price - 2 * np.log(self.spread())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from ..fem.modelled import Modelled, modelled
 from .hypothesis_fit import Search
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
+from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
 from .test_frequencies import band_of, counted, frequencies, widened
@@ -33,6 +34,7 @@ ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
+FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
 def prepare(question: Question) -> Prepared:
@@ -174,9 +176,9 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
     highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
-    nominal = modelled(question.assembly, SOLVED * highest)
+    nominal = modelled(question.assembly, max(FAR * top, SOLVED * highest))
     built = nominal.structure
-    bench = workbench(nominal, top, groups=48)
+    bench = workbench(nominal, top, groups=48, reach=FAR)
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -186,8 +188,9 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
-        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
-    ).over(bench.model)
+        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
+        spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
+    ).over(bench.model)  # fmt: skip
     nuisance = nuisances(bench, nominal, top)
     search = searched(question, bench, data, nuisance, top)
     what = f"the {int(held.sum())} highest of {len(held)} frequencies"

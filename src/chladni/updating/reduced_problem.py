@@ -65,7 +65,7 @@ class Workbench:
 
 def workbench(
     model: Modelled | Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
-    groups: int = 64, extra: np.ndarray | None = None,
+    groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
 ) -> Workbench:  # fmt: skip
     """Make a structure ready.
 
@@ -76,10 +76,11 @@ def workbench(
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
     extra : (n, m) further vectors for the basis
     most : candidate places
+    reach : the basis holds modes up to this many times ``top``
     """
     if isinstance(model, Assembly):
-        model = modelled(model, REACH * top)
-    built, modes = model.structure, model.up_to(REACH * top)
+        model = modelled(model, reach * top)
+    built, modes = model.structure, model.up_to(reach * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
     factor = shifted(built.system, hertz)
