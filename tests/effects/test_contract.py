@@ -13,6 +13,8 @@ from chladni.effects import discretisation as mesh
 from chladni.effects import sensor_fault as sensors
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.freed import freed
+from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import gain, ordinary, scatter
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
@@ -25,6 +27,7 @@ from chladni.fem.assemble import structure
 from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
+from chladni.model.free_parameter import FreeParameter
 from chladni.updating.reduced_model import Reduced, evaluate
 from chladni.updating.reduced_problem import workbench
 from chladni_specimens.plates import plate
@@ -32,9 +35,10 @@ from chladni_specimens.plates import plate
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
 FLEXIBLE = slice(6, 12)
 CHANNELS = 4
-NAMES = (
+NAMES = ("family", 
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
+    "freed",
 )  # fmt: skip
 
 
@@ -57,7 +61,7 @@ def bench():
 def cases(bench):
     groups = bench.groups
     corners = (1, 7, 57, 63)
-    setup = Setup(corners, (7, 63), float(groups.weight.sum()), TOP)
+    setup = Setup(tuple(((g, 1.0),) for g in corners), (7, 63), float(groups.weight.sum()), TOP)
     where = Surroundings(groups, bench.grids, bench.candidates, setup)
     k = bench.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
@@ -85,6 +89,9 @@ def cases(bench):
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
+    found["family"] = (model_families(bench.structure)[0], [0.3], [0])
+    number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
+    found["freed"] = (freed(groups, number), [0.2], [0])
     return {
         name: Case(
             e, np.array(x, float), np.array(idle, float), bench.model_for(e, np.array(x, float))

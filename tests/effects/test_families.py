@@ -53,7 +53,7 @@ def bench(deck):
 
 @pytest.fixture(scope="module")
 def setup(deck):
-    return Setup(tuple(SENSORS), (7, 63), mass_properties(deck)[0], TOP)
+    return Setup(tuple(((int(g), 1.0),) for g in SENSORS), (7, 63), mass_properties(deck)[0], TOP)
 
 
 def searched(bench, data, setup):

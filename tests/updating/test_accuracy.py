@@ -31,7 +31,7 @@ def changes(bench):
     """Effect and x of each kind of change."""
     groups = bench.groups
     sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
-    setup = Setup(sensors, (), float(groups.weight.sum()), TOP)
+    setup = Setup(tuple(((int(g), 1.0),) for g in sensors), (), float(groups.weight.sum()), TOP)
     where = Surroundings(groups, bench.grids, bench.candidates, setup)
     k = bench.grids.position(int(bench.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0])

@@ -17,7 +17,7 @@ from chladni.updating.reduced_model import evaluate
 
 @pytest.fixture(scope="module")
 def effects(bench):
-    setup = Setup((1, 63), (7,), 1.41, 200.0)
+    setup = Setup((((1, 1.0),), ((63, 1.0),)), (7,), 1.41, 200.0)
     where = Surroundings(bench.groups, bench.grids, bench.candidates, setup)
     spot = bench.grids.position(26)
     return [

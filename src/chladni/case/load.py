@@ -13,7 +13,6 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
-from ..effects.registry import names
 from ..ema.setup import Recording, TestSetup
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
@@ -21,23 +20,16 @@ from ..io.nastran import Deck, assembly, read_deck
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..model.point_masses import with_masses
 from ..units import UNITS, Units
-from .sensor_places import grid_row, places
+from .free_parameters import free_parameter
+from .recordings import compared_first, notes_of, without_dead_channels
+from .schema import key, known, sections, unread
+from .sensor_places import ROLES, carried, grid_row, labels, places, unrecorded
 from .toml_sections import KeyFile, TomlSection, read_keys
 
-FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
-_TABLES = ("model", "test", "band", "held_out", "parameter")
-_TEST = ("recordings", "quantity", "gain", "sensors", "mass", "mass_sd", "hangers")
 _MASS_SD = 0.002  # of the mass, where the user gives none
-
-
-@dataclass(frozen=True)
-class FreeParameter:
-    """A parameter the user frees: a field of parts, or an effect by name."""
-
-    name: str
-    field: str
-    parts: tuple[str, ...]  # names; empty: all
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +51,8 @@ class Case:
     parameters : tuple        freed by the user; empty: a default set
     gain_known : bool         else one real factor common to all channels is free
     notes : tuple of str      what was read otherwise than it stands there
+    given : (section, key)    every word the file holds
+    carried : (grid, kg)      sensors of known mass: on the article while it was measured
     """
 
     path: Path
@@ -77,11 +71,34 @@ class Case:
     parameters: tuple[FreeParameter, ...] = ()
     gain_known: bool = True
     notes: tuple[str, ...] = field(default=())
+    given: tuple[tuple[str, str], ...] = ()
+    carried: tuple[tuple[int, float], ...] = ()
 
     @property
     def frfs(self) -> tuple[FRF, ...]:
-        """The FRFs of all recordings that hold one."""
+        """The FRFs of all recordings that hold one, the compared first; none where poles are."""
+        if self.recordings and self.recordings[0].frf is None:
+            return ()
         return tuple(r.frf for r in self.recordings if r.frf is not None)
+
+    def tested(self, assembly: Assembly) -> Assembly:
+        """An article with the sensors of known mass on it, as it was measured."""
+        if not self.carried:
+            return assembly
+        grids, m = zip(*self.carried, strict=True)
+        return with_masses(assembly, grids, np.array(m))
+
+    def said(self, command: str) -> list[str]:
+        """Notes of what was read and how, and of what this command makes no use of."""
+        out = [*self.notes, *unread(self.given, command)]
+        if self.carried and command in key("sensors.csv", "mass").used:
+            total, n = sum(m for _, m in self.carried), len({g for g, _ in self.carried})
+            out.append(
+                f"Sensors of {1e3 * total:.3g} g in all (sensors.csv) are in the model, at {n} "
+                "grids, before anything is asked; the weighed mass and the deck that is written "
+                "are without them."
+            )
+        return out
 
     def lines(self, frequency: np.ndarray) -> np.ndarray:
         """Which of these frequencies are to be fitted (n_f,) bool: in the band, not left out."""
@@ -102,18 +119,25 @@ def load_case(path: str | Path) -> Case:
     """
     path = Path(path)
     path = path / "case.toml" if path.is_dir() else path
-    keys = read_keys(path, _TABLES)
-    model = keys.section("model", ("deck", "units", "damping"), due=True)
-    test = keys.section("test", _TEST)
-    units = UNITS[model.text("units", due=True, among=tuple(UNITS)) or "SI"]
+    keys = read_keys(path, sections())
+    model, test = (
+        keys.section("model", known("model"), due=True),
+        keys.section("test", known("test")),
+    )
+    units = UNITS[model.text("units", due=True, among=key("model", "units").choices) or "SI"]
     deck = read_deck(_file(model, "deck", str(model.text("deck", due=True))))
     made = assembly(deck, units)
     recordings = _recordings(test)
     setup = _setup(test, made)
-    notes = [note for r in recordings for note in r.notes]
+    notes = notes_of(recordings)
     band, exclude = _bands(keys, recordings, notes)
     held_sensors, held_band = _held(keys, recordings, notes)
-    frf = next((r.frf for r in recordings if r.frf is not None), None)
+    outputs, inputs = (
+        places(test, setup, made, labels(recordings, setup, role), role, recordings[:1], notes)
+        for role in ROLES
+    )
+    _base_and_quantity(test, recordings, inputs)
+    notes += unrecorded(setup, outputs, inputs)
     return Case(
         path=path,
         deck=deck,
@@ -122,15 +146,19 @@ def load_case(path: str | Path) -> Case:
         damping=model.number("damping", low=0.0, high=0.5),
         recordings=recordings,
         setup=setup,
-        outputs=places(test, setup, made, frf.outputs if frf else (), "output"),
-        inputs=places(test, setup, made, frf.inputs if frf else (), "input"),
+        outputs=outputs,
+        inputs=inputs,
         band=band,
         exclude=exclude,
         held_sensors=held_sensors,
         held_band=held_band,
-        parameters=tuple(_parameter(s, made) for s in keys.sections("parameter", _PARAMETER)),
-        gain_known=test.text("gain", among=("known", "unknown")) != "unknown",
+        parameters=tuple(
+            free_parameter(s, made, deck) for s in keys.sections("parameter", known("parameter"))
+        ),
+        gain_known=test.text("gain", among=key("test", "gain").choices) != "unknown",
         notes=tuple(notes),
+        given=keys.given(),
+        carried=carried(made, outputs, inputs),
     )
 
 
@@ -150,9 +178,11 @@ def _recordings(test: TomlSection) -> tuple[Recording, ...]:
     quantity = test.text("quantity", among=get_args(Quantity))
     read: list[Recording] = []
     for name in test.list("recordings", str) or []:
-        read += read_recordings(_file(test, "recordings", name), quantity)
-    held = [r for r in read if r.frf is not None]
-    return tuple(_like(held[0], r, test) if r.frf is not None else r for r in read)
+        found = read_recordings(_file(test, "recordings", name), quantity)
+        read += [without_dead_channels(r) for r in found]
+    ranked = compared_first(test, read)
+    held = [r for r in ranked if r.frf is not None]
+    return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
 
 
 def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
@@ -179,7 +209,9 @@ def _setup(test: TomlSection, made: Assembly) -> TestSetup:
     name = test.text("sensors")
     sensors = read_sensors(_file(test, "sensors", name)) if name else ()
     mass = test.number("mass", low=1e-9)
-    mass_sd = test.number("mass_sd", low=0.0)
+    mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0))
+    if mass is None and mass_sd is not None:
+        raise FileError(f"{test.at('mass_sd')} says how far a mass is known, but there is no mass")
     hangers = test.list("hangers", int) or []
     for grid in hangers:
         grid_row(made, grid, test.at("hangers"))
@@ -192,10 +224,32 @@ def _setup(test: TomlSection, made: Assembly) -> TestSetup:
     )
 
 
+def _base_and_quantity(
+    test: TomlSection, recordings: Sequence[Recording], inputs: MeasuredDofs
+) -> None:
+    """Refuse a moving base that is no transmissibility, and the other way round."""
+    frf = recordings[0].frf if recordings else None
+    if frf is None:
+        return
+    base, quantity = inputs.base, frf.quantity
+    if base.any() and not base.all():
+        raise FileError(f"{test.at('recordings')}: forces and a moving base cannot both be inputs")
+    if base.any() != (quantity == "transmissibility"):
+        due = (
+            "its input must be base:+X, +Y or +Z"
+            if not base.any()
+            else ('what a moving base causes is quantity = "transmissibility"')
+        )
+        raise FileError(
+            f"{test.at('quantity')}: {recordings[0].name} is {quantity} from "
+            f"{', '.join(frf.inputs[:3])}; {due}"
+        )
+
+
 def _bands(
     keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
 ) -> tuple[tuple[float, float] | None, tuple[tuple[float, float], ...]]:
-    section = keys.section("band", ("fit", "exclude"))
+    section = keys.section("band", known("band"))
     band = section.band("fit")
     if band is not None:
         band = _inside(section, "fit", band, recordings, notes)
@@ -231,7 +285,7 @@ def _held(
     keys: KeyFile, recordings: Sequence[Recording], notes: list[str]
 ) -> tuple[int | tuple[str, ...] | None, tuple[float, float] | None]:
     """Sensors (how many, or which) and band that no fit may see."""
-    section = keys.section("held_out", ("sensors", "band"))
+    section = keys.section("held_out", known("held_out"))
     band = section.band("band")
     if band is not None:
         band = _inside(section, "band", band, recordings, notes)
@@ -239,6 +293,8 @@ def _held(
     outputs = next((r.frf.outputs for r in recordings if r.frf is not None), ())
     if value is None:
         return None, band
+    if not outputs:
+        raise FileError(f"{section.at('sensors')}: there are no FRFs of which to hold any out")
     if isinstance(value, list):
         labels = section.list("sensors", str) or []
         for label in labels:
@@ -246,24 +302,10 @@ def _held(
                 raise LabelError(
                     f"{section.at('sensors')}: no output {label!r}; there are {list(outputs)[:8]}"
                 )
+        if set(labels) >= set(outputs):
+            raise FileError(f"{section.at('sensors')} names every output; none is left to fit")
         return tuple(labels), band
-    count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0))
-    return int(count or 0), band
-
-
-_PARAMETER = ("name", "parts", "field")
-
-
-def _parameter(section: TomlSection, made: Assembly) -> FreeParameter:
-    """A parameter the user frees."""
-    what = section.text("field", due=True, among=(*FIELDS, *names())) or ""
-    parts: list[str] = []
-    given = section.values.get("parts", [])
-    for name in given if isinstance(given, list) else [given]:
-        try:
-            parts.append(made.parts[made.part(name)].name)
-        except LabelError as error:
-            near = difflib.get_close_matches(str(name), [p.name for p in made.parts], 1, 0.5)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise LabelError(f"{section.at('parts')}: {hint}{error}") from error
-    return FreeParameter(section.text("name") or what, what, tuple(parts))
+    count = section.number("sensors", low=0, high=max(len(outputs) - 1, 0)) or 0.0
+    if count != int(count):
+        raise FileError(f"{section.at('sensors')} = {count:g} is no whole number")
+    return int(count), band

@@ -1,11 +1,12 @@
 """Where the dofs of recordings are on the structure: grids, places on shells, the base."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..ema.setup import Role, Sensor, TestSetup
+from ..ema.setup import Recording, Role, Sensor, TestSetup
 from ..errors import LabelError
+from ..fem.locate import shares_of
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.grid_normals import grid_normals
 from ..geometry.nearest import ShellSurface
@@ -13,15 +14,38 @@ from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 from .toml_sections import TomlSection
 
+ROLES: tuple[Role, ...] = ("output", "input")
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
+_OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
+_ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
+
+
+def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tuple[str, ...]:
+    """Dofs of the compared FRFs; where only poles are known, those of the table of sensors."""
+    frf = recordings[0].frf if recordings else None
+    if frf is not None:
+        return frf.outputs if role == "output" else frf.inputs
+    return tuple(s.label for s in (setup.outputs if role == "output" else setup.inputs))
 
 
 def places(
-    test: TomlSection, setup: TestSetup, made: Assembly, labels: Sequence[str], role: Role
+    test: TomlSection,
+    setup: TestSetup,
+    made: Assembly,
+    labels: Sequence[str],
+    role: Role,
+    recorded: Sequence[Recording],
+    notes: list[str],
 ) -> MeasuredDofs:
-    """Every label of the recording on the structure."""
-    known = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
-    rows = [_place(test, known.get(label), label, made) for label in labels]
+    """Every label on the structure, by the table of sensors or by what the recording says of it."""
+    table = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
+    nodes = {n: x for r in recorded for n, x in r.nodes.items()}
+    axes = {n: A for r in recorded for n, A in r.axes.items()}
+    spoken = [label for label in labels if label not in table]
+    known = {**table, **{label: _spoken(label, test, made, nodes, axes) for label in spoken}}
+    rows = [_place(test, known[label], made) for label in labels]
+    notes += _nodes_said(made, spoken, nodes, axes)
+    notes += _off_said(made, role, [r[3].place for r in rows if r[3].place is not None])
     return MeasuredDofs(
         labels=tuple(labels),
         grids=np.array([r[0] for r in rows], dtype=np.int64),
@@ -32,34 +56,121 @@ def places(
     )
 
 
-def _spoken(label: str, test: TomlSection) -> Sensor:
-    """What a label says by itself: node and direction."""
+def _spoken(
+    label: str,
+    test: TomlSection,
+    made: Assembly,
+    nodes: Mapping[int, np.ndarray],
+    axes: Mapping[int, np.ndarray],
+) -> Sensor:
+    """What a label and the recording's geometry say of a dof, the direction in the basic frame.
+
+    Its +X, +Y, +Z are the axes the recording gives the node, else those the deck counts the grid's
+    displacements in. A node that is no grid sits where the recording says it does.
+    """
     where = test.at("recordings")
     node = label.partition(":")[0].strip()
-    if node != "base" and not node.isdigit():
+    if node != "base" and not (node.isdecimal() and node.isascii()):
         raise LabelError(f"{where}: {label!r} names no grid; give its place in sensors.csv")
-    grid = None if node == "base" else int(node)
-    return Sensor(label, grid, direction=direction(label, f"{where}: label {label!r}"))
+    way = direction(label, f"{where}: label {label!r}")
+    if node == "base":
+        return Sensor(label, None, direction=way)
+    id = int(node)
+    at = np.flatnonzero(made.ids == id)
+    if way is not None and id in axes:
+        way = way @ axes[id]
+    elif way is not None and len(at) and made.axes is not None:
+        way = way @ made.axes[at[0]]
+    if not len(at) and id in nodes:
+        return Sensor(label, None, nodes[id], way)
+    return Sensor(label, id, direction=way)
+
+
+def _off_said(made: Assembly, role: Role, given: list[np.ndarray]) -> list[str]:
+    """A sentence where places were moved to get onto the structure."""
+    if not given:
+        return []
+    if len(made.shells):
+        off = float(ShellSurface.whole(made).feet(np.array(given)).distance.max())
+    else:
+        off = max(float(np.linalg.norm(made.points - x, axis=1).min()) for x in given)
+    if off <= 1e-6 * float(np.linalg.norm(np.ptp(made.points, axis=0))):
+        return []
+    what = "nearest points of the shells" if len(made.shells) else "nearest grids"
+    return [f"places of {role}s are up to {1e3 * off:.3g} mm off the mesh: the {what} count"]
+
+
+def _nodes_said(
+    made: Assembly,
+    spoken: Sequence[str],
+    nodes: Mapping[int, np.ndarray],
+    axes: Mapping[int, np.ndarray],
+) -> list[str]:
+    """How the geometry of a recording was read."""
+    said = [label.partition(":")[0] for label in spoken]
+    ids = list(dict.fromkeys(int(n) for n in said if n.isdecimal()))
+    row = {int(id): k for k, id in enumerate(made.ids)}
+    out = []
+    if free := [n for n in ids if n not in row and n in nodes]:
+        out.append(
+            f"nodes {free[:6]} of the recording are no grids of the deck: they sit where the "
+            "recording has them, read in the deck's basic frame"
+        )
+    if turned := [n for n in ids if n in axes]:
+        out.append(f"directions at nodes {turned[:6]} are along the recording's own axes there")
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
+    both = [n for n in ids if n in row and n in nodes]
+    away = {n: float(np.linalg.norm(made.points[row[n]] - nodes[n])) for n in both}
+    if away and max(away.values()) > _OFF * size:
+        worst, off = max(away, key=lambda n: away[n]), sum(d > _OFF * size for d in away.values())
+        out.append(
+            f"node {worst} of the recording is {away[worst]:.3g} m away from grid {worst} of the "
+            f"deck ({off} of {len(away)} are off): the grids were taken; if the numbers are not "
+            "the deck's, give the places in sensors.csv"
+        )
+    return out
+
+
+def unrecorded(setup: TestSetup, outputs: MeasuredDofs, inputs: MeasuredDofs) -> list[str]:
+    """A sentence on rows of the table of sensors that no recording has."""
+    rows = [s.label for s in setup.outputs if s.label not in outputs.labels]
+    rows += [s.label for s in setup.inputs if s.label not in inputs.labels]
+    if not rows:
+        return []
+    return [f"{len(rows)} rows of the table of sensors are in no recording: {', '.join(rows[:6])}"]
+
+
+def carried(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], ...]:
+    """(grid, kg) of the devices of known mass; rows of one place and role are one device.
+
+    On a shell the mass hangs on the corners by their weights.
+    """
+    out: dict[int, float] = {}
+    for at in places:
+        heavy = np.flatnonzero((at.mass > 0) & ~at.base)
+        heavy = heavy[np.argsort(-at.mass[heavy], kind="stable")]
+        one = [k for n, k in enumerate(heavy) if not _same_place(at.points, heavy[:n], int(k))]
+        for k, shares in zip(one, shares_of(made, at.grids[one], at.points[one]), strict=True):
+            for grid, share in shares:
+                out[grid] = out.get(grid, 0.0) + share * float(at.mass[k])
+    return tuple(sorted(out.items()))
+
+
+def _same_place(points: np.ndarray, before: np.ndarray, k: int) -> bool:
+    return bool((np.linalg.norm(points[before] - points[k], axis=1) < _ONE_DEVICE).any())
 
 
 def _place(
-    test: TomlSection, given: Sensor | None, label: str, made: Assembly
+    test: TomlSection, sensor: Sensor, made: Assembly
 ) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
-    """(grid or 0, place, direction, sensor) of one dof; None given: what the label says.
-
-    A label's own +X, +Y, +Z are the axes the deck counts that grid's displacements in; those of
-    the table of sensors are the basic ones.
-    """
-    where = f"{test.at('recordings')}: label {label!r}"
-    sensor = given or _spoken(label, test)
+    """(grid or 0, place, direction, sensor) of one dof."""
+    where = f"{test.at('recordings')}: label {sensor.label!r}"
     if sensor.grid is None and sensor.place is None:
         return 0, np.full(3, np.nan), _base(made, sensor, where), sensor
     if sensor.grid is None:
         return _free(made, sensor, where)
     row = grid_row(made, sensor.grid, where)
     way = _normal(made, row, where) if sensor.direction is None else sensor.direction
-    if given is None and sensor.direction is not None and made.axes is not None:
-        way = way @ made.axes[row]
     return sensor.grid, made.points[row], way, sensor
 
 

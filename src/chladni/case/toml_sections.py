@@ -10,6 +10,16 @@ from typing import Any
 
 from ..errors import FileError
 
+_LONGEST = 60  # characters of a value that a sentence repeats
+
+
+def _short(value: object) -> str:
+    """A value for a sentence; of a long one its beginning."""
+    if isinstance(value, int) and abs(value) > 10**_LONGEST:
+        return "a number of more than 60 digits"
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
 
 @dataclass(frozen=True)
 class TomlSection:
@@ -56,11 +66,11 @@ class TomlSection:
         if value is None:
             return None
         if not isinstance(value, str):
-            raise FileError(f"{self.at(key)} = {value!r} is not text in quotes")
+            raise FileError(f"{self.at(key)} = {_short(value)} is not text in quotes")
         if among and value not in among:
             near = difflib.get_close_matches(value, among, 1, 0.5)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            raise FileError(f"{self.at(key)} = {value!r}; {hint}there are {', '.join(among)}")
+            raise FileError(f"{self.at(key)} = {_short(value)}; {hint}there are {', '.join(among)}")
         return value
 
     def number(
@@ -72,7 +82,9 @@ class TomlSection:
 
     def _number(self, key: str, value: Any, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise FileError(f"{self.at(key)} = {value!r} is not a number")
+            raise FileError(f"{self.at(key)} = {_short(value)} is not a number")
+        if abs(value) > 1e300:
+            raise FileError(f"{self.at(key)} = {_short(value)} is beyond any use")
         if not low <= value <= high:
             bound = f"at least {low:g}" if high > 1e299 else f"between {low:g} and {high:g}"
             raise FileError(f"{self.at(key)} = {value:g}; it must be {bound}")
@@ -87,7 +99,9 @@ class TomlSection:
         word = {str: "text in quotes", int: "whole numbers"}[kind]
         for item in items:
             if isinstance(item, bool) or not isinstance(item, kind):
-                raise FileError(f"{self.at(key)} holds {item!r}; write a list of {word}")
+                raise FileError(f"{self.at(key)} holds {_short(item)}; write a list of {word}")
+            if isinstance(item, int) and not 0 < item < 2**31:
+                raise FileError(f"{self.at(key)} holds {_short(item)}, which is no id of a grid")
         return items
 
     def band(self, key: str) -> tuple[float, float] | None:
@@ -100,12 +114,12 @@ class TomlSection:
         single = isinstance(value, list) and value and not isinstance(value[0], list)
         items = [value] if single else value
         if not isinstance(items, list):
-            raise FileError(f"{self.at(key)} = {value!r}; write [[low, high], ...] in Hz")
+            raise FileError(f"{self.at(key)} = {_short(value)}; write [[low, high], ...] in Hz")
         return tuple(self._pair(key, item) for item in items)
 
     def _pair(self, key: str, value: Any) -> tuple[float, float]:
         if not isinstance(value, list) or len(value) != 2:
-            raise FileError(f"{self.at(key)} = {value!r}; write [low, high] in Hz")
+            raise FileError(f"{self.at(key)} = {_short(value)}; write [low, high] in Hz")
         low, high = (self._number(key, v, 0.0, 1e9) for v in value)
         if low >= high:
             raise FileError(f"{self.at(key)} = {value!r}; the first must be below the second")
@@ -130,6 +144,10 @@ class KeyFile:
         section.only(known)
         return section
 
+    def given(self) -> tuple[tuple[str, str], ...]:
+        """(section, key) of every word of the file."""
+        return tuple((s.name, k) for many in self.tables.values() for s in many for k in s.values)
+
     def sections(self, name: str, known: Sequence[str]) -> list[TomlSection]:
         """Every [[name]]."""
         found = self.tables.get(name, [])
@@ -153,7 +171,7 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
         values = tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and numbers beyond any use
         raise FileError(f"{path.name} is no TOML: {error}") from error
     headers, lines = _places(text)
     tables = {}

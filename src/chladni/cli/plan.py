@@ -57,7 +57,8 @@ def run(
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units)
+        model = load_model(source, units, command="plan")
+        job.notes += model.notes
         found = plan(model, wishes, within(job.progress, 0.1, 0.8))
         result = to_json(found)
         job.json("plan.json", result)

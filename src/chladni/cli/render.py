@@ -51,7 +51,8 @@ def run(
     chosen = numbers(modes)
     with started("render", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units)
+        model = load_model(source, units, command="render")
+        job.notes += model.notes
         count = max([0, *chosen, *(gif or []), *(energy or [])])
         modal = _modal(job, model, count)
         job.progress("pictures", 0.6)

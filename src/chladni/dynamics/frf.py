@@ -222,6 +222,11 @@ def residual_flexibility(
     return Residual(static, slope, sigma)
 
 
+def residual_shift(modal: ModalModel, top: float) -> float:
+    """σ = -λ/100 [rad²/s²], λ the highest kept, or (2π top)² where only rigid modes are kept."""
+    return -1e-2 * (2 * np.pi * max(float(modal.frequency.max(initial=0.0)), top)) ** 2
+
+
 def unit_columns(n: int, rows: np.ndarray) -> np.ndarray:
     """Columns e_k of the identity (n, len(rows))."""
     E = np.zeros((n, len(rows)))

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..fem.derivative import Slope
 from ..model.assembly import Assembly
@@ -13,9 +12,10 @@ from .effect import Effect, MatrixTerm, Parameter
 
 @dataclass(frozen=True, eq=False)
 class LinearScale(Effect):
-    """K + v (e^x - 1) ∂K/∂v and M likewise, v the value the structure has.
+    """K + d ∂K/∂v + d²/2 ∂²K/∂v², d = v (e^x - 1), and M likewise; v is the structure's value.
 
-    ``write`` puts a value into an assembly.
+    ``bent`` is the second slope of what is not linear in v (Poisson's ratio); ``weight_slope`` is
+    ∂m/∂v [kg]; ``write`` puts a value into an assembly.
     """
 
     kind = "ordinary"
@@ -23,18 +23,21 @@ class LinearScale(Effect):
 
     slope: Slope | None = None
     write: Callable[[Assembly, float], Assembly] | None = None
+    bent: Slope | None = None
+    weight_slope: float = 0.0
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The operators' slopes times the change of the value."""
         assert self.slope is not None
         v = self.parameters[0].scale
-        change, gradient = v * np.expm1(x[0]), np.array([v * np.exp(x[0])])
-        pairs: tuple[tuple[str, sp.csr_array], ...] = (("K", self.slope.K), ("M", self.slope.M))
-        return tuple(
-            MatrixTerm("M" if name == "M" else "K", A, change, gradient)
-            for name, A in pairs
-            if A.nnz
-        )
+        d, slope = v * np.expm1(x[0]), v * np.exp(x[0])
+        out = _terms(self.slope, d, slope)
+        return out if self.bent is None else out + _terms(self.bent, d**2 / 2, d * slope)
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The change of the value times what each unit of it weighs."""
+        v = self.parameters[0].scale * self.weight_slope
+        return float(v * np.expm1(x[0])), np.array([v * np.exp(x[0])])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The structure with the value in it."""
@@ -43,11 +46,20 @@ class LinearScale(Effect):
         )
 
 
+def _terms(slope: Slope, change: float, gradient: float) -> tuple[MatrixTerm, ...]:
+    """The operators a slope has, times a change."""
+    g = np.array([gradient])
+    out = [MatrixTerm("K", slope.K, change, g)] if slope.K.nnz else []
+    return (*out, *([MatrixTerm("M", slope.M, change, g)] if slope.M.nnz else []))
+
+
 def linear_scale(
     text: str, name: str, unit: str, value: float, slope: Slope,
     write: Callable[[Assembly, float], Assembly] | None = None, sd: float = 0.3,
+    bent: Slope | None = None, weight_slope: float = 0.0,
 ) -> LinearScale:  # fmt: skip
     """The parameter v e^x of a linear operator, x of prior deviation ``sd``."""
     return LinearScale(
-        (Parameter(name, unit, 0.0, sd, value, step=0.3),), text, slope=slope, write=write
-    )
+        (Parameter(name, unit, 0.0, sd, value, step=0.3),), text, slope=slope, write=write,
+        bent=bent, weight_slope=weight_slope,
+    )  # fmt: skip

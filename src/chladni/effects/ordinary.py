@@ -149,7 +149,7 @@ def scatter(
     """
     columns = []
     parts = np.unique(groups.part)
-    each = max(3, round(most / np.sqrt(len(parts))))
+    each = max(3, round(most / np.sqrt(max(1, len(parts)))))
     for p in parts:
         inside = np.flatnonzero(groups.part == p)
         if len(inside) > 2:

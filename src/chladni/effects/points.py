@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly, Masses, Scalars
+from ..model.assembly import Assembly, Scalars
+from ..model.point_masses import with_masses as with_masses
 from .effect import Effect, Parameter, PointTerm
 
 NOTHING = -30.0  # ln of a strength over its median that is none
@@ -50,22 +51,6 @@ class MassEffect(AtPoints):
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts, nominal=NOTHING)
-
-
-def with_masses(
-    assembly: Assembly, grids: tuple[int, ...], m: float, offset: np.ndarray | None = None
-) -> Assembly:
-    """The assembly with a mass m [kg] at each of these grids, ``offset`` (3,) from it [m]."""
-    old = assembly.masses
-    first = int(old.ids.max(initial=0)) + 1
-    x, y, z = np.zeros(3) if offset is None else offset
-    arm = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])  # motion of the mass
-    new = Masses(
-        np.append(old.ids, first + np.arange(len(grids))),
-        np.append(old.node, assembly.rows(list(grids))),
-        np.concatenate([old.matrix, np.tile(m * arm.T @ arm, (len(grids), 1, 1))]),
-    )
-    return replace(assembly, masses=new)
 
 
 def with_springs(

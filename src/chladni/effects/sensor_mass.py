@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..fem.locate import Share
+from ..model.assembly import Assembly
 from .family import Article, Family
 from .points import MassEffect, strength, with_masses
 from .surroundings import Surroundings
@@ -11,10 +13,23 @@ from .surroundings import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class SensorMass(MassEffect):
-    """Accelerometers (and their cables) weigh something; taken off before weighing."""
+    """Accelerometers (and their cables) weigh something; taken off before weighing.
+
+    ``shares`` are the (grid id, weight) each sensor hangs on.
+    """
 
     name = "sensor-mass"
     claim = "the accelerometers' mass is missing from the model"
+
+    shares: tuple[Share, ...] = ()
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CONM2 at the grids, by their weights."""
+        m = self.parameters[0].value(x[0])
+        total: dict[int, float] = {}
+        for grid, weight in (pair for share in self.shares for pair in share):
+            total[grid] = total.get(grid, 0.0) + weight * m
+        return with_masses(assembly, tuple(total), np.array(list(total.values())))
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Nothing: the article is weighed without its sensors."""
@@ -26,12 +41,13 @@ def sensor_mass(where: Surroundings) -> list[SensorMass]:
     setup = where.setup
     if not setup.sensors:
         return []
-    grids = tuple(sorted(set(setup.sensors)))
-    scale = max(2e-3, 0.06 * setup.weight / len(grids))
+    shares = tuple(sorted(set(setup.sensors)))
+    scale = max(2e-3, 0.06 * setup.weight / len(shares))
     m = strength("M", "kg", scale, 1.3, (-2.0, -1.0, 0.0))
-    text = f"at the {len(grids)} sensors"
-    rows = where.translations(grids)
-    return [SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3))]
+    text = f"at the {len(shares)} sensors"
+    grids = tuple(sorted({max(share, key=lambda pair: pair[1])[0] for share in shares}))
+    rows = where.at_shares(shares)
+    return [SensorMass((m,), text, grids=grids, rows=rows, directions=np.eye(3), shares=shares)]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

@@ -61,7 +61,7 @@ class ShellGroups:
         self, matrices: np.ndarray, left: np.ndarray, right: np.ndarray | None = None
     ) -> np.ndarray:
         """Σ_{e in g} V_eᵀ A_e W_e for every group g (n_groups, r_left, r_right)."""
-        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), -1)
+        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
         order = np.argsort(self.group, kind="stable")
         ends = np.searchsorted(self.group[order], np.arange(len(self) + 1))
         one = self.structure.T @ left

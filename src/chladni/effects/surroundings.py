@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..fem.locate import Share
 from ..geometry.facets import point_normals
 from .shell_groups import ShellGroups
 
@@ -17,13 +18,13 @@ class Setup:
 
     Attributes
     ----------
-    sensors : grid ids of the outputs
+    sensors : of each output the (grid id, weight) it hangs on
     hangers : grid ids
     weight : mass of the structure [kg]
     top : highest frequency of interest [Hz]
     """
 
-    sensors: tuple[int, ...]
+    sensors: tuple[Share, ...]
     hangers: tuple[int, ...]
     weight: float
     top: float
@@ -99,3 +100,11 @@ class Surroundings:
         """Rows of all three translations of each grid (3k, n)."""
         ids = np.repeat(np.asarray(grids), 3)
         return self.groups.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
+
+    def at_shares(self, shares: Sequence[Share]) -> sp.csr_array:
+        """Rows of all three translations of places that hang on grids by weights (3k, n)."""
+        weighted = [
+            sp.csr_array(sum(w * self.translations([grid]) for grid, w in share))
+            for share in shares
+        ]
+        return sp.csr_array(sp.vstack(weighted))

@@ -217,7 +217,7 @@ def evaluate(
     p = identified.poles if poles is None else poles
     R = identified.residues if residues is None else residues
     shape = identified.lower.shape
-    r = R.reshape(len(p), -1)
+    r = R.reshape(len(p), shape[0] * shape[1])
     H = (1 / (s - p)) @ r + (1 / (s - p.conj())) @ r.conj()
     H = H + identified.lower.ravel() / s**2 + identified.upper.ravel()
     return (s ** DERIVATIVES[identified.quantity] * H).reshape(-1, *shape)

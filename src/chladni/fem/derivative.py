@@ -6,6 +6,7 @@ in E and ρ; a shell's t enters as A t + B t³ and, with residual bending, throu
 mean (RBE3) that fade smoothly with a radius R change the transformation, dA = dTᵀ A T + Tᵀ A dT.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ import scipy.sparse as sp
 
 from ..errors import ModelError
 from ..model.assembly import Assembly, Average, Bushes, Equation, Masses, RigidBody, Scalars
-from ..model.properties import Isotropic, Material, ShellSection, SolidSection
+from ..model.properties import BeamSection, Isotropic, Material, ShellSection, SolidSection
 from . import shell, solid, spring
 from .assemble import Structure, _families
 from .average import average_derivative, average_weights, lever
@@ -118,6 +119,35 @@ def _solid(structure: Structure, a: Assembly, section: SolidSection, name: str) 
         A = solid.stiffness_derivative(X, C, dC, 0 if section.full else section.modes)
         out = replace(out, K=out.K + _carried(structure, with_rotations(A), group.nodes))
     return out
+
+
+def of_part(structure: Structure, part: int, name: str) -> Slope:
+    """What a part of solids or beams has in K ("E": all moduli together) or M ("rho").
+
+    Both are linear in it: K (1 + c) is the part with every modulus times 1 + c, M likewise; what is
+    non-structural stays out.
+    """
+    a = only(structure.assembly, part)
+    section = a.parts[part].section
+    if isinstance(section, BeamSection):
+        bare = replace(section, nonstructural=0.0, nonstructural_inertia=0.0)
+        a = replace(a, parts=tuple(replace(p, section=bare) if k == part else p
+                                   for k, p in enumerate(a.parts)))  # fmt: skip
+    M, _, K, _ = _families(a, True)
+    none = _of(structure)
+    if name == "E":
+        return replace(none, K=congruence(structure.T, K))
+    return replace(none, M=congruence(structure.T, M))
+
+
+def of_lumps(structure: Structure, family: str, rows: Sequence[int]) -> Slope:
+    """What some members of "springs" or "bushes" have in K, or of "masses" in M."""
+    old = getattr(structure.assembly, family)
+    some = replace(old, **{name: column[list(rows)] for name, column in vars(old).items()})
+    K, _, M, _ = spring.matrices(_bare(structure.assembly, **{family: some}))
+    if family == "masses":
+        return replace(_of(structure), M=congruence(structure.T, M))
+    return replace(_of(structure), K=congruence(structure.T, K))
 
 
 def by_spring(structure: Structure, row: int) -> Slope:

@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.nearest import Feet, ShellSurface
+from ..model.assembly import Assembly
 from .assemble import Structure
 
 
@@ -35,3 +36,24 @@ def rows_of(
         shells = ShellSurface.whole(structure.assembly)
         out[off] = rows_at(structure, shells.feet(points[off]), directions[off])
     return sp.csr_array(out)
+
+
+Share = tuple[tuple[int, float], ...]  # (grid id, weight) of one place, the weights add up to 1
+
+
+def shares_of(assembly: Assembly, grids: np.ndarray, points: np.ndarray) -> list[Share]:
+    """What each place hangs on: its grid, or the corners of the nearest shell by their weights.
+
+    Parameters
+    ----------
+    grids : (k,) int        id, 0 where a place is no grid
+    points : (k, 3)         [m], used where there is no grid
+    """
+    out: list[Share] = [((int(grid), 1.0),) for grid in grids]
+    off = np.flatnonzero(grids <= 0)
+    if len(off):
+        found = ShellSurface.whole(assembly).feet(points[off])
+        for k, nodes, weights in zip(off, found.nodes, found.weight, strict=True):
+            pairs = zip(assembly.ids[nodes].tolist(), weights.tolist(), strict=True)
+            out[k] = tuple((grid, w) for grid, w in pairs if w > 0)
+    return out

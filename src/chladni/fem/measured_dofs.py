@@ -6,8 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import tangents
+from ..model.assembly import Assembly
 from .assemble import Structure
-from .locate import rows_of
+from .locate import Share, rows_of, shares_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,11 @@ class MeasuredDofs:
         if len(real):
             found[real] = rows_of(built, self.grids[real], self.points[real], self.directions[real])
         return sp.csr_array(found)
+
+    def shares(self, assembly: Assembly) -> tuple[Share, ...]:
+        """Grids each place hangs on with their weights; the motion of the base has none."""
+        real = np.flatnonzero(~self.base)
+        return tuple(shares_of(assembly, self.grids[real], self.points[real]))
 
     def around(self, built: Structure) -> sp.csr_array:
         """Rows at each place, then at four more round each that is uncertain (k + 4 m, n).

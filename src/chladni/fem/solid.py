@@ -245,7 +245,14 @@ def _condensed(K: np.ndarray, n: int) -> np.ndarray:
     """K_uu - K_ua K_aa⁻¹ K_au, the first n dofs kept."""
     if K.shape[1] == n:
         return K
-    return K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
+    try:
+        inner = np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
+    except np.linalg.LinAlgError as error:
+        raise ModelError(
+            "solids have a material without stiffness in some direction; look at E, G and NU of "
+            "their MAT1"
+        ) from error
+    return K[:, :n, :n] - K[:, :n, n:] @ inner
 
 
 def _shares(X: np.ndarray) -> np.ndarray:

@@ -73,6 +73,8 @@ def sentence(result: DiagnosisResult) -> str:
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
         return "Model and recording agree within what repeats and dispersion allow."
+    if verdict == "not in catalogue" and result.one_of:
+        return f"Nothing is named; the data cannot tell apart {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."

@@ -123,9 +123,9 @@ def products(
 def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Σ_e Tᵀ A_e T q of the shells' matrices (m, 24, 24)."""
     T, nodes = model.groups.structure.T, model.groups.nodes
-    dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), -1)
+    dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), 24)
     force = matrices @ (T @ q)[dofs]
     gather = sp.csr_array(
         (np.ones(dofs.size), (dofs.ravel(), np.arange(dofs.size))), shape=(T.shape[0], dofs.size)
     )
-    return T.T @ (gather @ force.reshape(dofs.size, -1))
+    return T.T @ (gather @ force.reshape(dofs.size, q.shape[1]))

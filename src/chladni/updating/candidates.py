@@ -23,7 +23,10 @@ WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 def candidates(search: Search, null: Trial) -> list[Candidate]:
     """The most promising of every family, scanned about the nominal and the calibrated model."""
     context = UpdatingContext(search, null)
-    return [candidate for family in families() for candidate in family.proposed(context)]
+    free = {e.text for e in search.base}  # what the user freed is in every fit already
+    return [
+        c for family in families() for c in family.proposed(context) if c.effect.text not in free
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,7 @@ class Diagnosis:
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
     adequacy : whether the explanation fits at all, where that was tested
+    one_of : what the data cannot tell apart, where they are too few to name anything
     """
 
     nominal: Trial
@@ -56,6 +57,7 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     written: Trial | None = None
     adequacy: FitTest | None = None
+    one_of: tuple[str, ...] = ()
 
     @property
     def found(self) -> Trial | None:

@@ -119,7 +119,7 @@ class Responses:
         r = np.concatenate([delta.real, delta.imag])
         if not gradient:
             return r, np.zeros((len(r), 0))
-        J = (self._slopes(state) / sd[None])[:, self.use].reshape(len(state.dK), -1).T
+        J = (self._slopes(state) / sd[None])[:, self.use].reshape(len(state.dK), len(r) // 2).T
         return r, np.concatenate([J.real, J.imag])
 
     def _slopes(self, state: State) -> np.ndarray:
@@ -133,7 +133,7 @@ class Responses:
             W = _real_times(state.dK.reshape(-1, r), q) + _real_times(
                 state.dM.reshape(-1, r), q * self.s**2
             )
-            W = W.reshape(n_p, r, -1) * d.T
+            W = W.reshape(n_p, r, len(d)) * d.T
             out[:, :, :, j] = -np.einsum("or,prf->pfo", phi_o, W, optimize=True)
         out /= H * LN10
         if state.doffset is not None:
@@ -146,6 +146,8 @@ class Responses:
 
     def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
         """Mean |δ|² over the lines and channels in use (``real`` is for poles)."""
+        if not use.any():
+            return float("nan")
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
 
 
@@ -200,6 +202,8 @@ class Poles:
     ) -> tuple[np.ndarray, np.ndarray, float]:
         """Positions (test pole, model mode) that belong together, and the price of lonely modes."""
         poles = np.flatnonzero(self.use if among is None else among)
+        if not len(poles):
+            return poles, poles, 0.0
         f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
         top = self.frequency[poles[-1]]
         modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * top))

@@ -119,10 +119,11 @@ def fit(
         r0, J0 = beside(effects, weighing, x, state)
         return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
 
-    x, damping, status = start.copy(), 1e-2, Status.OUT_OF_STEPS
+    x, damping = start.copy(), 1e-2
+    status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED
     r, J, state = objective(x, True)
     cost = float(r @ r)
-    for _ in range(max_steps):
+    for _ in range(max_steps if len(x) else 0):
         found = _step(objective, x, r, J, cost, damping, limit)
         if found is None:
             status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED

@@ -14,20 +14,25 @@ import scipy.sparse as sp
 from ..dynamics.frf import FRF
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
+from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
 from ..effects.model_families import model_families
-from ..effects.ordinary import PartScale, defaults, gain, ordinary, scatter
-from ..effects.surroundings import Setup
+from ..effects.ordinary import defaults, gain, scatter
+from ..effects.registry import family
+from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import Identified, equalised, identify, spread
 from ..ema.recording_noise import equalised_noise
+from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
+from ..model.free_parameter import FreeParameter
 from .hypothesis_fit import Search
+from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
-from .test_frequencies import band_of, counted, frequencies, widened
+from .test_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
@@ -39,13 +44,16 @@ FAR = 6.0  # reach of the basis for poles: material may be several times softer 
 
 def prepare(question: Question) -> Prepared:
     """Identify, decide how to compare, choose what is held out, build the workbench."""
-    uncertain = bool(
-        max(question.outputs.sd.max(initial=0), question.inputs.sd.max(initial=0))
-        > POSITION_UNCERTAIN
-    )
+    uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain)
     return _by_responses(question)
+
+
+def _place_sd(question: Question) -> float:
+    """Of the least known place of a sensor or shaker [m]."""
+    places = (question.outputs, question.inputs)
+    return max(float(p.sd.max(initial=0.0)) for p in places)
 
 
 def _by_responses(question: Question) -> Prepared:
@@ -57,10 +65,17 @@ def _by_responses(question: Question) -> Prepared:
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
-    nominal = modelled(question.assembly, SOLVED * top)
+    seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
+    if not seen.any():
+        raise FileError(
+            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
+            "nothing to fit a model to"
+        )
+    nominal = modelled(question.tested(question.assembly), SOLVED * top)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     bench = workbench(nominal, top, sp.csr_array(sp.vstack([rows_o, rows_i])))
+    bench = carrying(bench, freed_by(question, bench, top))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     data = []
@@ -87,9 +102,8 @@ def _by_responses(question: Question) -> Prepared:
     outside = (f >= held_band[0]) & (f <= held_band[1])
     held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
-    what = (
-        f"{len(names)} sensors ({', '.join(names[:8])}), band {held_band[0]:g}-{held_band[1]:g} Hz"
-    )
+    band = f"band {held_band[0]:g}-{held_band[1]:g} Hz"
+    what = f"{len(names)} sensors ({', '.join(names[:8])}), {band}" if names else band
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
@@ -98,9 +112,17 @@ def _by_responses(question: Question) -> Prepared:
     ]
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
+    if (sd := _place_sd(question)) > 0:
+        notes.append(
+            f"places are known to {1e3 * sd:.3g} mm at worst and count as exact; above "
+            f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
+        )
     notes += _mass_note(question)
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
-    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found)
+    few = too_little(int(seen.sum()), int(data[0].use.any(axis=0).sum()))
+    return Prepared(
+        search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
+    )
 
 
 def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
@@ -176,9 +198,10 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
     highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
-    nominal = modelled(question.assembly, max(FAR * top, SOLVED * highest))
+    nominal = modelled(question.tested(question.assembly), max(FAR * top, SOLVED * highest))
     built = nominal.structure
     bench = workbench(nominal, top, groups=48, reach=FAR)
+    bench = carrying(bench, freed_by(question, bench, top))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -193,9 +216,10 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     ).over(bench.model)  # fmt: skip
     nuisance = nuisances(bench, nominal, top)
     search = searched(question, bench, data, nuisance, top)
-    what = f"the {int(held.sum())} highest of {len(held)} frequencies"
+    what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
-    return Prepared(search, data, held, what, notes, nominal, None, found, ~held)
+    few = too_little(len(frequency), 0)
+    return Prepared(search, data, held, what, notes, nominal, None, found, few, ~held)
 
 
 def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = True) -> list[Effect]:
@@ -222,23 +246,57 @@ def searched(
     top: float,
 ) -> Search:
     """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
-    base = [*_ordinary(question, bench), *nuisance]
-    weight = mass_properties(question.assembly)[0]
-    sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
-    setup = Setup(sensors, question.hangers, weight, top)
+    base = [*freed_by(question, bench, top), *nuisance]
     return Search(
-        bench, data, question.weighing, tuple(base), tuple(nuisance), setup, question.outputs.labels
-    )
+        bench, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
+        setup_of(question, top), question.outputs.labels,
+    )  # fmt: skip
 
 
-def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
-    """The parameters the user frees, or E and rho of every material and t of every part."""
-    chosen = [
-        ordinary(bench.groups, name, [question.assembly.part(p) for p in parts])
-        for name, parts in question.parameters
-        if name in ("E", "rho", "t")
-    ]
-    return chosen or defaults(bench.groups)
+def setup_of(question: Question, top: float) -> Setup:
+    """What the effects may know of the test."""
+    weight = mass_properties(question.assembly)[0]
+    sensors = question.outputs.shares(question.assembly)
+    return Setup(sensors, question.hangers, weight, top)
+
+
+def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
+    """What the user frees, or E and rho of every material and t of every part of shells.
+
+    Without shells, E and rho of every material of solids and beams.
+    """
+    if question.parameters:
+        return [_freed(question, bench, top, p) for p in question.parameters]
+    if len(bench.groups):
+        return list(defaults(bench.groups))
+    return [freed(bench.groups, p) for p in defaults_without_shells(question.assembly)]
+
+
+def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -> Effect:
+    """One number, or an effect whose place is known, of the parts named."""
+    if p.field in UNITS:
+        return freed(bench.groups, p)
+    placed = family(p.field).placed
+    assert placed is not None
+    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup_of(question, top))
+    names = {question.assembly.parts[k].name for k in p.positions}
+    found = [e for e in placed(where) if not names or set(e.parts) <= names]
+    if not found:
+        raise FileError(
+            f"{p.field} cannot be freed: deck and test do not say where it acts (all parts of a "
+            "material for orthotropic-material, [test] hangers for suspension, sensors on the "
+            "structure for sensor-mass)"
+        )
+    return freed_effect(found[0], p.name)
+
+
+def carrying(bench: Workbench, effects: Sequence[Effect]) -> Workbench:
+    """The workbench over a basis that carries what is free in every fit."""
+    for effect in effects:
+        x = np.array([p.mean for p in effect.parameters])
+        model = bench.model_for(effect, x)
+        bench = bench if model is bench.model else replace(bench, model=model)
+    return bench
 
 
 def _mass_note(question: Question) -> list[str]:

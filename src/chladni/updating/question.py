@@ -1,6 +1,6 @@
 """What a diagnosis is asked: a structure, what was measured on it and where (SI, Hz)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from ..ema.identification import Identified
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..model.point_masses import with_masses
 from .hypothesis_fit import Search
 from .likelihood import Poles, Responses
 from .map_fit import Weighing
@@ -18,6 +20,7 @@ from .map_fit import Weighing
 class Question:
     """Everything a diagnosis is asked with (SI, Hz).
 
+    ``assembly`` is the article, as the deck has it; what was measured is ``tested`` of it.
     ``held_sensors`` and ``held_band`` are never fitted; None: chosen here.
     """
 
@@ -34,7 +37,22 @@ class Question:
     held_sensors: tuple[str, ...] | int | None = None
     held_band: tuple[float, float] | None = None
     gain_known: bool = True
-    parameters: tuple[tuple[str, tuple[str, ...]], ...] = ()  # (field, parts) the user frees
+    parameters: tuple[FreeParameter, ...] = ()  # what the user frees; none: a default set
+    carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
+
+    def tested(self, assembly: Assembly) -> Assembly:
+        """An article with the sensors of known mass on it, as it was measured."""
+        if not self.carried:
+            return assembly
+        grids, m = zip(*self.carried, strict=True)
+        return with_masses(assembly, grids, np.array(m))
+
+    @property
+    def weighed_with_sensors(self) -> Weighing | None:
+        """The weighing of the article and what the sensors add to it, as the model has them."""
+        if self.weighing is None:
+            return None
+        return replace(self.weighing, mass=self.weighing.mass + sum(m for _, m in self.carried))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,4 +78,5 @@ class Prepared:
     nominal: Modelled
     noise: np.ndarray | None = None
     identified: Identified | None = None
+    too_little: str = ""  # why the data cannot bear a name
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes

@@ -199,12 +199,16 @@ def evaluate(
     return State(lam, phi, dK, dM, weight, dweight, offset, doffset)
 
 
+FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
+
+
 def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     try:
         lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
     except (sl.LinAlgError, ValueError) as error:
         raise ModelError(f"an effect left no positive mass: {error}") from error
-    if lam[0] < -1e-6 * lam[len(lam) // 2]:
+    flexible = lam[lam > FLEXIBLE * lam[-1]]
+    if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
         raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
     return lam, phi
 
@@ -263,11 +267,11 @@ def _shells(
     dK, dM = np.zeros((n_p, r * r)), np.zeros((n_p, r * r))
     for stacks, power in ((model.linear, 1), (model.cubic, 3)):
         for name, stack in stacks.items():
-            w, flat = np.exp(stiffness_log(logs, name, power)), stack.reshape(len(stack), -1)
+            w, flat = np.exp(stiffness_log(logs, name, power)), stack.reshape(len(stack), r * r)
             K += w @ flat
             if gradient:
                 dK += _weighted(w[:, None] * stiffness_log(slopes, name, power), flat)
-    w, flat = np.exp(mass_log(logs)), model.mass.reshape(len(model.mass), -1)
+    w, flat = np.exp(mass_log(logs)), model.mass.reshape(len(model.mass), r * r)
     M += w @ flat
     if gradient:
         dM += _weighted(w[:, None] * mass_log(slopes), flat)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import Effect
 from ..effects.shell_groups import ShellGroups, shell_groups
@@ -16,6 +17,7 @@ from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
 
+FEWEST = 12  # modes of a basis whose structure has no flexible one below that: six, and six rigid
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
@@ -82,6 +84,9 @@ def workbench(
         model = modelled(model, reach * top)
     built, modes = model.structure, model.up_to(reach * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
+    if not len(flexible):  # stiffer than all that was measured
+        modes = normal_modes(built.system, min(FEWEST, len(built.system.dofs)))
+        flexible = modes.frequency[modes.frequency > 0.02 * top]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
     factor = shifted(built.system, hertz)
     blocks = [modes.shapes]

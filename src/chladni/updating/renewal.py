@@ -84,7 +84,7 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     x = trial.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
     data, top = old.data, old.setup.top
-    model = modelled(changed.assembly, SOLVED * top)
+    model = modelled(changed.tested(changed.assembly), SOLVED * top)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     bench = workbench(
         model, top, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48

@@ -98,7 +98,11 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         rows = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
         for parameter, row in zip(effect.parameters, rows, strict=True):
             given = parameter.value(parameter.mean)
-            out.append(CalibratedParameter(effect.text, estimate(row), given))
+            where = getattr(effect, "called", "") or effect.text
+            said = (
+                effect.text if where in (effect.text, parameter.name) else f"{where}: {effect.text}"
+            )
+            out.append(CalibratedParameter(said, estimate(row), given))
     return tuple(out)
 
 
@@ -108,6 +112,8 @@ def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
     if isinstance(prepared.score, Poles):
         real = real_poles(prepared, diagnosis.found or diagnosis.null)
         assert real is not None
+        if not real.any():
+            return Remainder(False, np.nan, np.nan, "no pole has a partner in the model")
         left = 100 * float(np.sqrt(prepared.score.Q(plain.fit.state, real, real))) * LN10
         known = 100 * float(np.median(prepared.score.sd[real]))
         text = f"{left:.2g} % rms of the frequencies, which are known to {known:.1g} %"

@@ -20,7 +20,12 @@ def frequencies(
         sd = question.frequency_sd
         f = np.asarray(question.frequency, float)
         sd = np.full(len(f), np.nan) if sd is None else sd
-        inside = (f >= question.band[0]) & (f <= question.band[1])
+        inside = (f >= question.band[0]) & (f <= question.band[1]) & _kept(f, question.exclude)
+        if not inside.any():
+            raise FileError(
+                f"none of the {len(f)} poles, {f.min():g} to {f.max():g} Hz, lies in the band "
+                f"{question.band[0]:g}-{question.band[1]:g} Hz"
+            )
         order = np.argsort(f[inside])
         sd = np.where(np.isnan(sd), 1e-3 * f, sd)
         note = "no FRF exists: natural frequencies were compared"
@@ -89,16 +94,23 @@ def band_of(question: Question, frf: FRF) -> tuple[float, float]:
 
 
 def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
-    """A little more than the band, so that modes at its ends are whole."""
+    """A little more than the band, so that modes at its ends are whole.
+
+    A fifth at most of the lower end, for a wide band says nothing of the modes below it.
+    """
     width = 0.04 * (band[1] - band[0])
-    return max(float(frf.frequency[0]), band[0] - width), min(
-        float(frf.frequency[-1]), band[1] + width
-    )
+    low = max(float(frf.frequency[0]), band[0] - min(width, 0.2 * band[0]))
+    return low, min(float(frf.frequency[-1]), band[1] + width)
 
 
 def counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
     """Lines of the recording that are in no gap (n_f,) bool."""
-    use = np.ones(len(frf.frequency), bool)
+    return _kept(frf.frequency, exclude)
+
+
+def _kept(f: np.ndarray, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Frequencies in no gap (n,) bool."""
+    use = np.ones(len(f), bool)
     for a, b in exclude:
-        use &= (frf.frequency < a) | (frf.frequency > b)
+        use &= (f < a) | (f > b)
     return use

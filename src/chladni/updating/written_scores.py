@@ -59,7 +59,7 @@ def seen(
     basis = modes.shapes
     if isinstance(score, Poles):
         lam = (2 * np.pi * modes.frequency) ** 2
-        if score.outputs is not None:
+        if score.outputs is not None and score.inputs is not None:
             a, b = (p.around(built) @ basis for p in (question.outputs, question.inputs))
             score = replace(score, a=a, b=b)
         return score, _state(lam, np.eye(len(lam)))

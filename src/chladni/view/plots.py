@@ -202,7 +202,8 @@ def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | N
 def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None = None) -> Path:
     """Deviation Q from the nominal model down, step by step, with what repeats alone would give."""
     figure = Figure(figsize=(max(4.6, 1.5 * len(steps)), 3.2), layout="constrained")
-    ax, names, Q = figure.subplots(), list(steps), np.array(list(steps.values()))
+    known = {name: value for name, value in steps.items() if np.isfinite(value)}
+    ax, names, Q = figure.subplots(), list(known), np.array(list(known.values()), dtype=float)
     colours = [BEFORE, *["#aab4bf"] * max(0, len(Q) - 2), AFTER][: len(Q)]
     ax.bar(names, Q, color=colours, width=0.62)
     for k in range(1, len(Q)):
@@ -213,7 +214,7 @@ def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None 
     if floor is not None and np.isfinite(floor):
         ax.axhline(floor, color=TEST, lw=0.9, ls="--")
         ax.annotate("noise floor", (len(Q) - 0.5, floor), ha="right", va="bottom", fontsize=8)
-    ax.set(ylabel="Q", ylim=(0, 1.22 * float(np.nanmax(Q)) or 1.0))
+    ax.set(ylabel="Q", ylim=(0, 1.22 * float(Q.max(initial=0.0)) or 1.0))
     ax.spines[["top", "right"]].set_visible(False)
     return save(figure, path)
 

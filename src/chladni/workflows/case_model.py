@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from ..case import Case
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, residual_flexibility
+from ..dynamics.frf import FRF, residual_flexibility, residual_shift
 from ..errors import FileError
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
@@ -30,7 +30,8 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
     modal = model.modes.with_damping(damping)
     pick = case.outputs.rows(s).T.toarray()
     load, carried = _drives(case, s)
-    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
+    shift = residual_shift(modal, f[-1])
+    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s), shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)

@@ -20,6 +20,7 @@ from .identify import firm
 from .unit_check import refuse_other_units
 
 BANDS = 6
+RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +69,9 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     test = case.frfs[0] if case.frfs else None
     top = _top(case, test)
     progress("modes of the model", 0.1)
-    model = modelled(case.assembly, REACH * top)
-    inside = ~rigid_modes(model.modes) & (model.modes.frequency <= 1.3 * top)
+    model = modelled(case.tested(case.assembly), REACH * top)
+    f = model.modes.frequency
+    inside = ~rigid_modes(model.modes) & (f > RIGID * top) & (f <= 1.3 * top)
     near = model.modes.sel(np.flatnonzero(inside))
     if test is None:
         return _by_poles(case, near)
@@ -87,7 +89,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
-        responses, (*case.notes, *notes),
+        responses, (*case.said("correlate"), *notes),
     )  # fmt: skip
 
 
@@ -107,11 +109,13 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
     poles = next(r.poles for r in case.recordings if r.poles is not None)
     f = poles.of(poles.states[0]).frequency
     return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),
-                       notes=case.notes)  # fmt: skip
+                       notes=tuple(case.said("correlate")))  # fmt: skip
 
 
 def _shapes(found: Identified) -> np.ndarray:
     """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
+    if not found.order:
+        return np.zeros((len(found.outputs), 0))
     size = np.linalg.norm(found.residues, axis=1)
     best = size.argmax(axis=1)
     return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)

@@ -24,6 +24,8 @@ from ..progress import Progress, within
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
+from ..updating.leaning import leaning
+from ..updating.least_data import withheld
 from ..updating.likelihood import Poles, Responses
 from ..updating.outcome import fitted_scores, held_out, judged, models, real_poles
 from ..updating.preparation import prepare
@@ -41,15 +43,24 @@ def answered(case: Case, search: bool, progress: Progress) -> DiagnosisResult:
     """Diagnose (or, without ``search``, only calibrate) a case, on one BLAS thread."""
     with threadpool_limits(1):
         progress("identifying the recording", 0.0)
+        if search and not len(case.assembly.shells):
+            raise FileError(
+                f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
+                "calibrate and correlate take any deck"
+            )
         asked = question(case)
         prepared = prepare(asked)
         found = compared(prepared.search, within(progress, 0.1, 0.85), search)
+        if search:
+            found = withheld(prepared, found)
         found, distrust = _judged(asked, prepared, found)
+        if found.one_of:
+            distrust = (f"nothing is named: {prepared.too_little}", *distrust)
         progress("the updated deck", 0.85)
         stages, lost = _updated(case, asked, prepared, found)
         progress("scores", 0.95)
         result = _result(asked, prepared, found, stages)
-        notes = (*result.notes, *lost, *case.notes)
+        notes = (*result.notes, *lost, *case.said("diagnose" if search else "calibrate"))
         return replace(result, notes=notes, distrust=distrust, searched=search)
 
 
@@ -76,15 +87,17 @@ def _updated(
 ) -> tuple[UpdatedModels, list[str]]:
     """The structures before and after, each solved once, changed ones as their decks have them."""
     stages, nominal = models(asked, found), prepared.nominal
-    calibrated, lost = _deck(case, nominal, stages.calibrated)
+    calibrated, lost = _deck(case, asked, nominal, stages.calibrated)
     final = calibrated
     if stages.final is not stages.calibrated:
-        final, lost = _deck(case, nominal, stages.final)
+        final, lost = _deck(case, asked, nominal, stages.final)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
 
 
-def _deck(case: Case, nominal: Modelled, changed: Assembly) -> tuple[ChangedDeck, list[str]]:
+def _deck(
+    case: Case, asked: Question, nominal: Modelled, changed: Assembly
+) -> tuple[ChangedDeck, list[str]]:
     """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
     if changed is case.assembly:
         return ChangedDeck(nominal, ()), []
@@ -92,9 +105,9 @@ def _deck(case: Case, nominal: Modelled, changed: Assembly) -> tuple[ChangedDeck
         edits = tuple(changes(case.deck, case.assembly, changed, case.units))
         written = written_assembly(case.deck, edits, case.units)
     except (FileError, LabelError, ModelError) as error:
-        known = modelled(changed, nominal.band)
+        known = modelled(asked.tested(changed), nominal.band)
         return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
-    return ChangedDeck(modelled(written, nominal.band), edits), []
+    return ChangedDeck(modelled(asked.tested(written), nominal.band), edits), []
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
@@ -125,7 +138,7 @@ def _result(
     asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
 ) -> DiagnosisResult:
     """All numbers and words, from the decks as written."""
-    last = found.found or found.null
+    last, deck = found.found or found.null, found.written or found.found or found.plain
     real = real_poles(prepared, last)
     every = (
         ("before", stages.nominal),
@@ -142,12 +155,13 @@ def _result(
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
-        mass=MassComparison(weighed, mass_properties(stages.final.model.assembly)[0]),
+        mass=MassComparison(weighed, _article_mass(asked, stages)),
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
         adequate=_adequate(found),
-        notes=(*prepared.notes, *found.notes, left.sentence),
+        notes=(*prepared.notes, *found.notes, *leaning(deck.fit), left.sentence),
+        one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
     )
@@ -160,6 +174,12 @@ def _adequate(found: Diagnosis) -> Adequacy | None:
         return None
     place: dict[str, object] = {"text": test.where, "parts": [], "modes_hz": []}
     return Adequacy(test.passes, test.p, test.what, () if test.passes else (place,))
+
+
+def _article_mass(asked: Question, stages: UpdatedModels) -> float:
+    """What the updated deck weighs: the structure as tested less its sensors [kg]."""
+    sensors = sum(m for _, m in asked.carried)
+    return mass_properties(stages.final.model.assembly)[0] - sensors
 
 
 def _scores(

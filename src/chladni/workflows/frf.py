@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from ..case import Case
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, residual_flexibility
+from ..dynamics.frf import FRF, residual_flexibility, residual_shift
 from ..errors import FileError
-from ..fem.modelled import Modelled, node_points
+from ..fem.modelled import Modelled, modelled, node_points
 from ..fem.solve import base_response, inertia_load
 from ..model.analysis import Analysis, Subcase
 from ..progress import Progress, silent
@@ -55,7 +55,8 @@ def frf(
         if frequency is None or not outputs:
             raise FileError("--input needs at least one --output, as --output 55:+Z")
         model = as_model(source)
-        return _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
+        found = _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
+        return replace(found, notes=(*model.notes, *found.notes))
     if isinstance(source, Case):
         return _of_recording(source, damping, progress)
     if isinstance(source, DeckModels):
@@ -72,8 +73,8 @@ def _of_recording(case: Case, damping: float, progress: Progress) -> FrequencyRe
     ratio = case.damping or damping
     note = f"Lines and places are those of the recording; every mode has {ratio:.2g}."
     progress("modes", 0.2)
-    model = as_model(case).solved(REACH * float(test.frequency[-1]))
-    return FrequencyResponses((model_frf(case, model, ratio, test),), (note,))
+    model = modelled(case.tested(case.assembly), REACH * float(test.frequency[-1]))
+    return FrequencyResponses((model_frf(case, model, ratio, test),), (note, *case.said("frf")))
 
 
 def _between(
@@ -97,7 +98,8 @@ def _between(
         return FrequencyResponses((found,), (note,))
     s, modal = made.structure, made.modes.with_damping(damping)
     pick, load = (side.T.toarray() for side in known)
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    shift = residual_shift(modal, frequency[-1])
+    rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)

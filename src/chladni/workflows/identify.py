@@ -83,19 +83,32 @@ def identify(
         If no recording holds an FRF.
     """
     recordings = source.recordings if isinstance(source, Case) else tuple(source)
+    gaps: tuple[tuple[float, float], ...] = ()
+    said: list[str] = []
+    if isinstance(source, Case):
+        band, gaps, said = band or source.band, source.exclude, source.said("identify")
+        if ("test", "use") in source.given:
+            recordings = recordings[:1]
     held = [r for r in recordings if r.frf is not None]
     if not held:
         where = f"{source.path} " if isinstance(source, Case) else "what was recorded "
-        raise FileError(f"{where}holds no frequency responses to identify from")
-    gaps: tuple[tuple[float, float], ...] = ()
-    if isinstance(source, Case):
-        band, gaps = band or source.band, source.exclude
+        raise FileError(f"{where}holds no frequency responses to identify from{_has(recordings)}")
     found = []
     with threadpool_limits(1):
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
             found.append(_modes(recording, band, gaps, averages))
-    return Identification(tuple(found), _notes(held, gaps), _doubts(found))
+    notes = [*said, *(note for note in _notes(held, gaps) if note not in said)]
+    return Identification(tuple(found), tuple(notes), _doubts(found))
+
+
+def _has(read: Sequence[Recording]) -> str:
+    """What the recordings hold instead."""
+    kinds = dict.fromkeys(f.kind for r in read for f in r.functions)
+    said = [f"records of kind {', '.join(kinds)}"] if kinds else []
+    said += ["a table of poles"] * any(r.poles is not None for r in read)
+    said += ["mode shapes"] * any(r.shapes is not None for r in read)
+    return f"; it holds {' and '.join(said)}" if said else ""
 
 
 def _modes(

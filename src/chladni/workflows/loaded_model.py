@@ -82,9 +82,13 @@ class Model:
 
 
 def load_model(
-    source: Path, units: str | None = None, allow: Sequence[str] = (), subcase: int | None = None
+    source: Path,
+    units: str | None = None,
+    allow: Sequence[str] = (),
+    subcase: int | None = None,
+    command: str = "modes",
 ) -> Model:
-    """The model of a bare deck, or of a case (folder or case.toml).
+    """The model of a bare deck, or of a case (folder or case.toml), for a command.
 
     Raises
     ------
@@ -97,7 +101,7 @@ def load_model(
         from ..case import load_case
 
         case = load_case(source)
-        return Model(source, case.assembly, length=case.units.length)
+        return as_model(case, command)
     return load_deck(source, units, allow).model(subcase)
 
 
@@ -126,13 +130,14 @@ class DeckModels:
         return Model(self.source, made, unit, tuple(notes), length)
 
 
-def as_model(source: "Case | Model | DeckModels") -> Model:
+def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Model:
     """The model of a case or of a deck; a model as it is."""
     if isinstance(source, Model):
         return source
     if isinstance(source, DeckModels):
         return source.model()
-    return Model(source.path, source.assembly)
+    notes = tuple(source.said(command))
+    return Model(source.path, source.assembly, notes=notes, length=source.units.length)
 
 
 def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:

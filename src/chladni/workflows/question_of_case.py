@@ -26,7 +26,7 @@ def question(case: Case) -> Question:
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
         raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
-    if case.inputs.base.any():
+    if frfs and case.inputs.base.any():
         raise FileError(
             f"{case.path}: diagnosis of a structure moved at its supports is not built yet; "
             "give responses to a force"
@@ -45,10 +45,8 @@ def question(case: Case) -> Question:
         held_sensors=case.held_sensors,
         held_band=case.held_band,
         gain_known=case.gain_known,
-        parameters=tuple(
-            (p.field, p.parts or tuple(part.name for part in case.assembly.parts))
-            for p in case.parameters
-        ),
+        parameters=case.parameters,
+        carried=case.carried,
     )
     if frfs:
         return replace(asked, frf=frfs[0])

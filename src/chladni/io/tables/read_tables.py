@@ -3,6 +3,7 @@
 import csv
 import difflib
 import zipfile
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,6 +82,8 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
             rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except UnicodeDecodeError as error:
         raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
+    except csv.Error as error:
+        raise FileError(f"{path.name} is no table: {error}") from error
     if not rows:
         raise FileError(f"{path.name} is empty; the first line names the columns {', '.join(due)}")
     header = [name.strip().lower() for name in rows[0][1]]
@@ -244,6 +247,11 @@ def _frf(
     if not np.isfinite(values).all():
         k, i, _ = (int(v[0]) for v in np.nonzero(~np.isfinite(values)))
         raise FileError(f"{name}: {tuple(outputs)[i]} is not a number at {frequency[k]:g} Hz")
+    for role, labels in (("output", list(outputs)), ("input", list(inputs))):
+        if twice := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:
+            raise FileError(f"{name}: {role} {twice[0]} is there twice")
+    if not (np.isfinite(frequency).all() and np.all(frequency >= 0)):
+        raise FileError(f"{name}: a frequency is negative or not a number")
     if values.size == 0 or not values.any():
         raise FileError(f"{name}: the FRF is empty ({values.shape[0]} lines, no value but zero)")
     try:
@@ -262,32 +270,62 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         raise FileError(f"no file {path}; beside it there are {_beside(path)[:6]}")
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            _only_known(path, file.files)
             arrays = {name: file[name] for name in file.files}
-    except (ValueError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
+    except FileError:
+        raise
+    except _DAMAGED as error:
         raise FileError(f"{path.name} cannot be read as NPZ: {error}") from error
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {list(arrays)}")
-    if unknown := [name for name in arrays if name not in (*_NPZ, *_NPZ_OPTIONAL)]:
-        raise FileError(
-            f"{path.name}: unknown array {', '.join(unknown)}; known are "
-            f"{', '.join((*_NPZ, *_NPZ_OPTIONAL))}"
-        )
     quantity = quantity or (str(arrays["quantity"]) if "quantity" in arrays else None)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
     frf = _frf(
         path.name,
-        arrays["values"].astype(complex),
-        arrays["frequency_hz"].astype(float),
+        _numbers(path, arrays, "values", "biufc").astype(complex),
+        _numbers(path, arrays, "frequency_hz").astype(float),
         [str(o) for o in np.atleast_1d(arrays["outputs"])],
         [str(i) for i in np.atleast_1d(arrays["inputs"])],
         quantity,
         **{
-            name: arrays[name].astype(float) for name in ("coherence", "variance") if name in arrays
+            name: _numbers(path, arrays, name).astype(float)
+            for name in ("coherence", "variance")
+            if name in arrays
         },
     )
-    level = float(arrays["level"]) if "level" in arrays else None
+    level = None
+    if "level" in arrays:
+        if (found := _numbers(path, arrays, "level")).size != 1:
+            raise FileError(f"{path.name}: level holds {found.size} values; it is one number")
+        level = float(found.reshape(-1)[0])
     return Recording(path.name, frf, level=level, article=str(arrays.get("article", "")))
+
+
+_DAMAGED = (
+    *(ValueError, TypeError, OSError, EOFError, RuntimeError, MemoryError, KeyError),
+    *(zipfile.BadZipFile, zlib.error, NotImplementedError, OverflowError, SyntaxError),
+)
+
+
+def _only_known(path: Path, names: Sequence[str]) -> None:
+    """Refuse arrays nobody reads before they are unpacked."""
+    if unknown := [name for name in names if name not in (*_NPZ, *_NPZ_OPTIONAL)]:
+        missing = [name for name in _NPZ if name not in names]
+        lacks = f"; there is no array {', '.join(missing)}" if missing else ""
+        raise FileError(
+            f"{path.name}: unknown array {', '.join(unknown)}{lacks}; known are "
+            f"{', '.join((*_NPZ, *_NPZ_OPTIONAL))}"
+        )
+
+
+def _numbers(
+    path: Path, arrays: dict[str, np.ndarray], name: str, kinds: str = "biuf"
+) -> np.ndarray:
+    """An array of numbers of these kinds."""
+    if arrays[name].dtype.kind not in kinds:
+        raise FileError(f"{path.name}: {name} holds {arrays[name].dtype}, not numbers")
+    return arrays[name]
 
 
 def read_poles(path: str | Path) -> PoleTable:

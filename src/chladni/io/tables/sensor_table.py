@@ -57,6 +57,8 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
     place = xyz if np.isfinite(xyz).all() else None
     if np.isnan(grid) and place is None:
         grid = _node(label, where)
+    if np.isfinite(grid) and grid != int(grid):
+        raise FileError(f"{where}: grid {grid:g} is no whole number")
     return Sensor(
         label=label,
         grid=int(grid) if np.isfinite(grid) else None,
@@ -72,7 +74,7 @@ def _node(label: str, where: str) -> float:
     node = label.partition(":")[0]
     if node == "base":
         return np.nan
-    if not node.isdigit():
+    if not (node.isdecimal() and node.isascii()):
         raise FileError(f"{where}: {label!r} names no node; give a grid or x, y, z")
     return float(node)
 

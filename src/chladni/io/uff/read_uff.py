@@ -5,7 +5,7 @@ sentences about what is wrong are ours. Source of the format: SDRC universal fil
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
             pile.units = file_units(dataset)
     for number, dataset in datasets:
         if take := _TAKE.get(int(dataset["type"])):
-            take(pile, number, dataset, quantity)
+            _taken(take, pile, number, dataset, quantity)
     return Recording(
         name=path.name,
         frf=_frf(pile, quantity),
@@ -76,6 +76,24 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         functions=tuple(pile.functions),
         notes=tuple(pile.notes),
     )
+
+
+_BROKEN = (ValueError, IndexError, KeyError, TypeError, OverflowError, ZeroDivisionError)
+
+
+def _taken(
+    take: Callable[..., None], pile: _Pile, number: int, d: dict, quantity: str | None
+) -> None:
+    """One dataset taken in; one whose lines do not fit together is damaged."""
+    try:
+        take(pile, number, d, quantity)
+    except ChladniError:
+        raise
+    except _BROKEN as error:
+        raise FileError(
+            f"{pile.path.name}, dataset {number} (type {int(d['type'])}) is damaged: its lines do "
+            f"not fit together ({type(error).__name__}: {error})"
+        ) from error
 
 
 def _datasets(path: Path) -> Iterator[tuple[int, dict]]:
@@ -102,13 +120,18 @@ def _why(error: BaseException) -> str:
 
 def _dof(node: int, direction: int) -> str:
     """Label of a node and a direction code; 0 (scalar) is read as the normal."""
+    if abs(direction) > 6:
+        raise FileError(f"direction {direction} of node {node} is not one of -6 to 6")
     return f"{node}:n" if direction == 0 else label(node, abs(direction), direction)
 
 
 def _take_function(pile: _Pile, number: int, d: dict, quantity: str | None) -> None:
     where = f"{pile.path.name}, dataset {number} (type 58)"
     _check_points(d, where)
-    output, input = _dof(d["rsp_node"], d["rsp_dir"]), _dof(d["ref_node"], d["ref_dir"])
+    try:
+        output, input = _dof(d["rsp_node"], d["rsp_dir"]), _dof(d["ref_node"], d["ref_dir"])
+    except FileError as error:
+        raise FileError(f"{where}: {error}") from error
     kind = int(d["func_type"])
     if kind in (4, 5, 6) and d["ref_node"] == 0 and d["ref_dir"] != 0:
         input = label(0, abs(d["ref_dir"]), d["ref_dir"]).replace("0:", "base:")
@@ -126,6 +149,8 @@ def _take_function(pile: _Pile, number: int, d: dict, quantity: str | None) -> N
 def _check_points(d: dict, where: str) -> None:
     """Every number there, every number finite."""
     data, x, due = d["data"], d["x"], int(d["num_pts"])
+    if due < 0:
+        raise FileError(f"{where}: it says it holds {due} values")
     if len(data) < due or len(x) < due:
         raise FileError(f"{where}: {len(data)} of {due} values are there; the file is truncated")
     d["data"], d["x"] = data[:due], x[:due]
@@ -164,7 +189,10 @@ def _take_frf(
 def _hertz(d: dict) -> np.ndarray:
     unit = str(d["abscissa_axis_units_lab"]).strip().lower()
     factor = {"rad/s": 1 / (2 * np.pi), "khz": 1e3}.get(unit, 1.0)
-    return np.asarray(d["x"], float) * factor
+    f = np.asarray(d["x"], float) * factor
+    if np.any(f < 0):
+        raise FileError(f"a frequency of {f.min():g} Hz is negative")
+    return f
 
 
 def _take_nodes(pile: _Pile, number: int, d: dict, _: str | None) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 
 from ....errors import ModelError
 from ....model.assembly import Assembly, Shells
-from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, ShellSection
+from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import UNITS, Units
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
+from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
 from .split_properties import bending_changes, split_changes, with_new_properties
 
@@ -20,7 +21,7 @@ _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, properties, thickness, masses, springs to ground that differ.
+    """Edits of the deck: materials, properties, thickness, joints and masses that differ.
 
     Raises
     ------
@@ -34,6 +35,7 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     out += _materials(deck, before, after, units, free)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
+    out += joint_changes(deck, before, after)
     out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
@@ -75,9 +77,23 @@ def _materials(
                 continue
             new = next(free)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
-            out += [SetField("PSHELL", after.parts[k].id, _MID[name], new) for k, name in at]
+            out += [_of_material(deck, after.parts[k], name, new) for k, name in at]
     oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
     return out + (_axes(deck, before, after) if oriented else [])
+
+
+def _of_material(deck: Deck, part: Part, name: str, material: int) -> Change:
+    """The property card of a part names another material."""
+    if name in _MID:
+        return SetField("PSHELL", part.id, _MID[name], material)
+    kinds = ("PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
+    for kind in kinds:
+        if part.id in _ids(deck, kind):
+            return SetField(kind, part.id, "MID", material)
+    raise ModelError(
+        f"part {part.name} shares a material with others and none of {', '.join(kinds)} names it, "
+        "so it cannot have one of its own"
+    )
 
 
 def _equal(a: Material, b: Material) -> bool:

@@ -10,6 +10,8 @@ from ....errors import FileError
 from . import numbers
 from .cards import FIELDS
 
+_BEYOND = 1e60  # no number of a structure in any units is larger; products of them would overflow
+
 
 @dataclass(frozen=True, eq=False)
 class Cards:
@@ -92,6 +94,9 @@ class Cards:
         values, bad = numbers.reals(text, 0.0 if blank is None else blank)
         if bad >= 0:
             raise self._bad(bad, k, text[bad], "a number")
+        if np.any(beyond := np.abs(values) > _BEYOND):
+            at = int(np.argmax(beyond))
+            raise self._bad(at, k, text[at], "a number of any structure")
         return values
 
     def _bad(self, i: int, k: int, word: bytes, kind: str) -> FileError:

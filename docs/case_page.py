@@ -1,0 +1,93 @@
+"""``docs/case.md``, written from the table of the words a case may hold."""
+
+import sys
+from collections.abc import Sequence
+
+from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, Key, sections
+
+
+def page() -> str:
+    """``docs/case.md``."""
+    return "\n".join([_HEAD, *(_section(name) for name in sections()), _TAIL, _columns(), _FILES])
+
+
+def _section(name: str) -> str:
+    head = f"[[{name}]]" if name == "parameter" else f"[{name}]"
+    return f"## `{head}`\n\n{_table([k for k in SCHEMA if k.section == name])}"
+
+
+def _columns() -> str:
+    return f"## `sensors.csv`\n\n{_table(COLUMNS)}"
+
+
+def _table(keys: Sequence[Key]) -> str:
+    rows = ["| key | what | unit | default | meaning | example | used by |", "|" + "---|" * 7]
+    for k in keys:
+        what = f"{k.kind}: {', '.join(k.choices)}" if k.choices else k.kind
+        used = "all commands" if k.used == COMMANDS else ", ".join(k.used)
+        cells = (f"`{k.name}`", what, k.unit, k.default, k.meaning, f"`{k.example}`", used)
+        rows.append("| " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+_HEAD = """\
+# The case
+
+A folder with one `case.toml` says what a model is compared with. Every command takes it. Words that
+are not listed here are refused with the line they stand in. Words that a command makes no use of
+are named in its notes. Numbers are SI whatever the deck is in. This page is written from
+`chladni/case/schema.py`.
+
+```toml
+[model]
+deck = "panel.bdf"
+units = "mm-t-s"
+
+[test]
+recordings = ["panel.uff"]
+sensors = "sensors.csv"
+mass = 1.926
+
+[band]
+fit = [6.0, 30.0]
+
+[[parameter]]
+parts = ["panel"]
+field = "E"
+sd = 0.03
+low = 0.9
+high = 1.1
+```
+"""
+
+_TAIL = """\
+Without any `[[parameter]]`, E and rho of every material and t of every part of shells are free; in
+a deck without shells E and rho of every material of solids and beams.
+
+What can be freed, and of what: E, rho, nu and t of isotropic shells; E, rho, t, E1, E2, G12 and
+nu12 of orthotropic ones; E, rho and t of laminates (E is one factor on all moduli); E, rho and nu
+of solids; E and rho of beams; K of springs (`PELAS`, `CELAS2`) and bushes (`PBUSH`); M of `CONM2`.
+`global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,
+`adhesive-stiffness` is E of the solid parts named. `orthotropic-material`, `sensor-mass` and
+`suspension` are freed as they are; they take no sd, low and high. An effect whose place is unknown
+is found by `diagnose` and cannot be freed here. Every change is written into the updated deck.
+"""
+
+_FILES = """\
+## Recordings
+
+- FRF as `.csv`: columns `frequency_hz`, `output`, `input`, `real`, `imag`; optional `coherence` and
+  `variance` (the noise), `level` and `article` (one recording each).
+- FRF as `.npz`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`, `inputs`;
+  optional `coherence`, `variance`, `quantity`, `level`, `article`.
+- Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
+  never fitted), `state` (the first is compared, or the one `use` names).
+- Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes
+  in which nodes measure, 55 shapes, 151 and 164 header and units.
+
+Time histories, spectra and mode shapes are named in the notes and not used.
+"""
+
+
+if __name__ == "__main__":  # python docs/case_page.py > docs/case.md
+    sys.stdout.write(page())

@@ -1,0 +1,133 @@
+"""The recordings of a case: which one is compared with the model, what of the rest is not used."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.setup import PoleTable, Recording
+from ..errors import FileError
+from .toml_sections import TomlSection
+
+
+def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Recording, ...]:
+    """The recordings with the one that is compared in front.
+
+    That is the one ``use`` names; else the first with FRFs, else the first with poles.
+    """
+    wanted = test.text("use")
+    ranked = sorted(read, key=lambda r: (r.frf is None, r.poles is None))
+    if not wanted:
+        return tuple(ranked)
+    chosen = [r for r in ranked if wanted in _names(r)]
+    if len(chosen) != 1:
+        known = ", ".join(dict.fromkeys(n for r in read for n in _names(r))) or "none"
+        count = f"{len(chosen)} recordings are" if chosen else "no recording is"
+        raise FileError(f"{test.at('use')} = {wanted!r}: {count} called so; there are {known}")
+    first = chosen[0]
+    rest = [r for r in ranked if r is not first]
+    if first.frf is None and first.poles is None:
+        raise FileError(f"{test.at('use')} = {wanted!r} holds neither FRFs nor poles")
+    if first.poles is not None and wanted in first.poles.states:
+        first = replace(first, poles=_state_first(first.poles, wanted))
+    return (first, *rest)
+
+
+def without_dead_channels(r: Recording) -> Recording:
+    """The recording without outputs that are zero throughout, and a note that names them."""
+    if r.frf is None:
+        return r
+    pairs = [(o, bool(r.frf.values[:, k].any())) for k, o in enumerate(r.frf.outputs)]
+    if all(lives for _, lives in pairs):
+        return r
+    dead = ", ".join(o for o, lives in pairs if not lives)
+    note = f"{r.name}: {dead} is zero throughout and left out"
+    return replace(r, frf=r.frf.sel(outputs=[o for o, lives in pairs if lives]),
+                   notes=(*r.notes, note))  # fmt: skip
+
+
+def _names(r: Recording) -> list[str]:
+    """All a recording may be called by."""
+    level = "" if r.level is None else f"{r.level:g}"
+    states = () if r.poles is None else r.poles.states
+    names = (r.name, r.name.partition(", ")[0], r.article, level, *states)
+    return [n for n in dict.fromkeys(names) if n]
+
+
+def _state_first(poles: PoleTable, state: str) -> PoleTable:
+    """The poles with those of one state in front."""
+    order = np.argsort([s != state for s in poles.state], kind="stable")
+    return PoleTable(
+        poles.frequency[order],
+        poles.frequency_sd[order],
+        poles.damping[order],
+        poles.mode[order],
+        tuple(poles.state[k] for k in order),
+    )
+
+
+def notes_of(recordings: Sequence[Recording]) -> list[str]:
+    """Which recording is compared, what is not, and how far the others are from it."""
+    out = [note for r in recordings for note in r.notes]
+    if not recordings:
+        return out
+    first = recordings[0]
+    others = [_other(first, r) for r in recordings[1:]]
+    if others:
+        out.append(f"{first.name} is compared with the model; not used: {'; '.join(others)}")
+    if first.frf is None and first.poles is not None:
+        out += _poles(first)
+    elif first.level is not None or first.article:
+        level = "" if first.level is None else f"level {first.level:g}"
+        said = ", ".join(s for s in (first.article and f"article {first.article}", level) if s)
+        out.append(f"{first.name} ({said}) is one state of the object; nothing scales with level")
+    for r in recordings:
+        out += _idle(r)
+    return out
+
+
+def _other(first: Recording, r: Recording) -> str:
+    if first.frf is None or r.frf is None:
+        return r.name
+    away = deviation(first.frf, r.frf)
+    return (
+        f"{r.name} (at other lines)" if away is None else f"{r.name} ({away:.2g} decades rms off)"
+    )
+
+
+def deviation(a: FRF, b: FRF) -> float | None:
+    """Root mean square of |log10 (H_b / H_a)| over the lines both have; None where none is."""
+    _, i, j = np.intersect1d(a.frequency, b.frequency, return_indices=True)
+    x, y = np.abs(a.values[i]), np.abs(b.values[j])
+    use = (x > 0) & (y > 0)
+    if not use.any():
+        return None
+    return float(np.sqrt(np.mean(np.log10(y[use] / x[use]) ** 2)))
+
+
+def _poles(r: Recording) -> list[str]:
+    """What of a table of poles is left."""
+    assert r.poles is not None
+    out = []
+    states = r.poles.states
+    if len(states) > 1:
+        rest = ", ".join(repr(s) for s in states[1:])
+        out.append(
+            f"{r.name}: the poles of state {states[0]!r} are compared; not used: {rest} "
+            "([test] use names another)"
+        )
+    if np.isfinite(r.poles.damping).any():
+        out.append(f"{r.name}: the damping of the poles is not used, no damping is fitted")
+    return out
+
+
+def _idle(r: Recording) -> list[str]:
+    """What a file holds beside FRFs and poles."""
+    out = []
+    if r.functions:
+        kinds = ", ".join(dict.fromkeys(f.kind for f in r.functions))
+        out.append(f"{r.name}: {len(r.functions)} records that are no FRFs are not used ({kinds})")
+    if r.shapes is not None:
+        out.append(f"{r.name}: its {len(r.shapes.frequency)} mode shapes are not used")
+    return out

@@ -1,0 +1,157 @@
+"""Every word a case may hold, in one table: what reads it, its unit, its default, an example.
+
+The reader takes its known words and choices from here, ``docs/case.md`` is written from here and a
+test goes over it: a word that nobody reads cannot be added without being noticed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+from ..dynamics.frf import Quantity
+from ..units import UNITS
+
+COMMANDS = ("identify", "correlate", "calibrate", "diagnose", "frf", "modes", "render", "plan")
+_FIT = ("calibrate", "diagnose")
+_TEST = ("correlate", *_FIT)
+_FRF = ("frf", *_TEST)
+_READ = ("identify", *_FRF)
+
+
+@dataclass(frozen=True)
+class Key:
+    """One word of a section, or one column of a table.
+
+    ``kind`` is what is written there; ``default`` says what holds where it is missing; ``used`` are
+    the commands it matters to.
+    """
+
+    section: str
+    name: str
+    kind: str
+    unit: str
+    default: str
+    meaning: str
+    example: str
+    used: tuple[str, ...]
+    choices: tuple[str, ...] = ()
+
+
+FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
+ALIASES = {  # effects that are an ordinary number by another name
+    "global-stiffness": "E",
+    "part-stiffness": "E",
+    "global-density": "rho",
+    "thickness-scale": "t",
+    "adhesive-stiffness": "E",
+}
+PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
+PLANNED = (  # names of the public contract that no model stands behind yet
+    *("stiffness-patch", "membrane-prestress", "viscoelastic-joint", "hem-contact"),
+    *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),
+    *("joint-friction", "mass-patch", "local-resonator", "shaker-restraint", "compliant-support"),
+)
+FREEABLE = (*FIELDS, *ALIASES, *PLACED)
+
+SCHEMA = (
+    Key("model", "deck", "file", "", "needed", "The Nastran deck.", '"tailgate.bdf"', COMMANDS),
+    Key("model", "units", "word", "", "needed", "The deck's unit system.", '"mm-t-s"', COMMANDS,
+        tuple(UNITS)),
+    Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
+        "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
+    Key("test", "recordings", "list of files", "", "none",
+        "Universal files, .npz or .csv: FRFs or poles. One file may hold several articles or "
+        "levels. The first is compared with the model (or the one `use` names), the others are "
+        "measured against it and named in the notes; `identify` reads all.",
+        '["article_A.uff", "article_B.uff"]', _READ),
+    Key("test", "use", "text", "", "the first",
+        "Which recording is compared: the name of its file, its article, its level or, of a table "
+        "of poles, its state.", '"article_B.uff"', _READ),
+    Key("test", "quantity", "word", "", "what the file says", "What the FRFs are.",
+        '"accelerance"', _READ, get_args(Quantity)),
+    Key("test", "gain", "word", "", "known",
+        "Unknown: one real factor common to all channels is free.", '"unknown"', _TEST,
+        ("known", "unknown")),
+    Key("test", "sensors", "file", "", "nodes of the recording are grids of the deck",
+        "Where sensors and shakers sit: the table below.", '"sensors.csv"', _FRF),
+    Key("test", "mass", "number", "kg", "not weighed",
+        "Weighed mass of the article, its sensors taken off.", "10.508", _TEST),
+    Key("test", "mass_sd", "number above 0", "kg", "0.2 % of the mass",
+        "Standard deviation of the weighing.", "0.005", _FIT),
+    Key("test", "hangers", "list of grids", "", "none",
+        "Where cords hold the article: the springs of `suspension` sit there.", "[101, 102]",
+        ("diagnose",)),
+    Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
+        "Band that is identified and fitted.", "[26.0, 195.0]", ("identify", *_TEST)),
+    Key("band", "exclude", "list of [low, high]", "Hz", "none",
+        "Bands within it that are left out.", "[[23.0, 27.5]]", ("identify", *_TEST)),
+    Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
+        "Outputs no fit may see.", '["412:+Z"]', _FIT),
+    Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
+        "Band no fit may see.", "[200.0, 300.0]", _FIT),
+    Key("parameter", "name", "text", "", "the field", "What the page calls it.", '"E steel"',
+        _FIT),
+    Key("parameter", "parts", "list of parts", "", "all that have the field",
+        "Names or property ids of parts; of joints and masses the card: `PBUSH 7`, `PELAS 3`, "
+        "`CELAS2 12`, `CONM2 5`.", '["inner", "outer upper"]', _FIT),
+    Key("parameter", "field", "word", "", "needed",
+        "The number that is free, one factor for all its parts; or an effect's name, where it "
+        "acts being known.", '"E"', _FIT, FREEABLE),
+    Key("parameter", "sd", "number, 0.001 to 2", "of the deck's value",
+        "0.06 (E, rho), 0.05 (t), 0.1 (nu), 0.3 (others)",
+        "Tolerance: standard deviation of the prior of ln(value / deck's value).", "0.03", _FIT),
+    Key("parameter", "low", "number below 1", "of the deck's value", "none",
+        "Bound: the value stays above low times the deck's.", "0.8", _FIT),
+    Key("parameter", "high", "number above 1", "of the deck's value", "none",
+        "Bound: the value stays below high times the deck's.", "1.25", _FIT),
+)  # fmt: skip
+
+COLUMNS = (
+    Key("sensors.csv", "label", "text", "", "needed",
+        "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _FRF),
+    Key("sensors.csv", "grid", "whole number", "", "the node of the label",
+        "Grid of the deck it sits at.", "412", _FRF),
+    Key("sensors.csv", "x", "number", "m", "", "Place, basic frame, in place of a grid.", "0.25",
+        _FRF),
+    Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _FRF),
+    Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _FRF),
+    Key("sensors.csv", "direction", "+X -X +Y -Y +Z -Z n", "", "the direction of the label",
+        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _FRF),
+    Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _FRF),
+    Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _FRF),
+    Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _FRF),
+    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _FRF,
+        ("output", "input")),
+    Key("sensors.csv", "mass", "number", "kg", "0",
+        "Mass on the article while it is measured. It is in the model before anything is asked and "
+        "in no deck that is written. Rows of one place and role are one device.", "0.005", _FRF),
+    Key("sensors.csv", "position_sd", "number", "m", "0",
+        "Uncertainty of the place. Above 5 mm natural frequencies are compared, not FRFs.",
+        "0.01", _FIT),
+)  # fmt: skip
+
+
+def sections() -> tuple[str, ...]:
+    """Names of all sections."""
+    return tuple(dict.fromkeys(k.section for k in SCHEMA))
+
+
+def known(section: str) -> tuple[str, ...]:
+    """Keys of a section."""
+    return tuple(k.name for k in SCHEMA if k.section == section)
+
+
+def key(section: str, name: str) -> Key:
+    """One word of the table."""
+    return next(k for k in (*SCHEMA, *COLUMNS) if (k.section, k.name) == (section, name))
+
+
+def unread(given: Sequence[tuple[str, str]], command: str) -> list[str]:
+    """A sentence that names the given words a command makes no use of; none where it uses all."""
+    idle: dict[str, list[str]] = {}
+    for section, name in given:
+        if command not in key(section, name).used:
+            names = idle.setdefault(section, [])
+            names += [name] * (name not in names)
+    said = [f"[{section}] {', '.join(names)}" for section, names in idle.items()]
+    return [f"Not used by {command}: {'; '.join(said)}."] if said else []

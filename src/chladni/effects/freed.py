@@ -1,0 +1,286 @@
+"""The numbers a user frees: a field of parts, joints or masses, one factor e^y for all of them.
+
+y(x) is x within bounds and bends towards them, y = b tanh(x / b), so a bound is never passed and
+the slope at the deck's own value is one. Parts of several kinds share the factor: shells by their
+fields, solids, beams, springs, bushes and masses by their operators. Operators of two numbers of
+one part add up; their product, of second order, is left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..fem.assemble import Structure
+from ..fem.derivative import Slope, by_part, of_lumps, of_part
+from ..fem.energy import mass_properties
+from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..model.properties import Isotropic, Part, ShellSection
+from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
+from .linear_parameter import LinearScale, linear_scale
+from .ordinary import SPREAD, ordinary, scaled, value
+from .shell_groups import ShellGroups
+
+UNITS = {
+    **dict.fromkeys(("E", "E1", "E2", "G12"), "Pa"),
+    **{"rho": "kg/m3", "t": "m", "nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
+}
+SD = {**SPREAD, "nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
+SD_OTHERS = 0.3  # joints and directional moduli are known worse
+NEAR_BOUND = 0.9  # of the way to a bound: the answer leans on it
+SAME = 1e-9
+AWAY = 1e-3  # relative step to the points between which the second slope is taken
+SERVES = 0.3  # of the way of nu to 1/2: as far as two terms of 1/(1 - 2 nu) serve, to 3 %
+
+
+@dataclass(frozen=True, eq=False)
+class Freed(Effect):
+    """Members that share their parameters; of a single one, bounds of ln factor."""
+
+    name = "part-scale"
+    claim = "an ordinary value of the deck is off"
+    kind = "ordinary"
+
+    members: tuple[Effect, ...] = ()
+    low: float = -np.inf
+    high: float = np.inf
+    called: str = ""  # by the user
+
+    def y(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """The members' parameters and dy/dx; several parameters have no bounds."""
+        if len(x) > 1:
+            return x, 1.0
+        bound = self.high if x[0] > 0 else -self.low
+        if not np.isfinite(bound):
+            return x, 1.0
+        y = bound * np.tanh(x[0] / bound)
+        return np.array([y]), float(1 - (y / bound) ** 2)
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """Those of all members."""
+        y, slope = self.y(x)
+        return tuple(
+            replace(c, gradient=slope * c.gradient) for m in self.members for c in m.fields(y)
+        )
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """Those of all members."""
+        y, slope = self.y(x)
+        return tuple(
+            replace(t, gradient=slope * t.gradient) for m in self.members for t in m.terms(y)
+        )
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """Those of all members."""
+        y, slope = self.y(x)
+        return tuple(
+            replace(t, gradient=slope * t.gradient) for m in self.members for t in m.matrices(y)
+        )
+
+    def outputs(self, x: np.ndarray) -> ChannelChange | None:
+        """Of the first member that has any; only effects of the test have."""
+        found = (m.outputs(self.y(x)[0]) for m in self.members)
+        return next((c for c in found if c is not None), None)
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """What all members add to the scales."""
+        y, slope = self.y(x)
+        each = [m.weight(y) for m in self.members]
+        return sum(w for w, _ in each), slope * np.sum([g for _, g in each], axis=0)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """All members written."""
+        y, _ = self.y(x)
+        for member in self.members:
+            assembly = member.apply(assembly, y)
+        return assembly
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+        """Value and interval within the bounds, and whether the value leans on one."""
+        if len(x) > 1 or not len(self.parameters):
+            return self.members[0].reported(x, sd)
+        p, reach = self.parameters[0], 1.96 * WIDER * sd
+        low, here, high = (p.value(float(self.y(x + s * reach)[0][0])) for s in (-1, 0, 1))
+        row = {"name": p.name, "value": here, "unit": p.unit, "low": low, "high": high}
+        return [{**row, "on_bound": True}] if self.on_bound(x) else [row]
+
+    def on_bound(self, x: np.ndarray) -> bool:
+        """True where the value is all but at a bound, so that it may stand for something else."""
+        y = float(self.y(x)[0][0])
+        return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
+
+    def location(self, x: np.ndarray) -> dict[str, Any]:
+        """Where it is."""
+        return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
+
+
+def freed(groups: ShellGroups, free: FreeParameter) -> Freed:
+    """The effect of one number a user frees."""
+    built = groups.structure
+    parts = built.assembly.parts
+    shells = [k for k in free.positions if isinstance(parts[k].section, ShellSection)]
+    members: list[Effect] = []
+    plain = [k for k in shells if free.field in ("E", "rho", "t")]
+    if plain:
+        members.append(ordinary(groups, free.field, plain))
+    members += [_of_part(built, k, free.field) for k in free.positions if k not in plain]
+    members += [_of_lumps(built, family, rows) for family, rows in _lumps(free) if rows]
+    values = _values(built.assembly, free)
+    alike = len(values) > 0 and np.ptp(values) <= SAME * abs(values[0])
+    scale, unit = (values[0], UNITS[free.field]) if alike else (1.0, "of the deck's")
+    sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
+    names = tuple(parts[k].name for k in free.positions)
+    text = f"{free.field} of {', '.join(free.parts or names) or 'all'}"
+    unknown = (Parameter(free.field, unit, 0.0, sd, float(scale), step=min(0.3, 2 * sd)),)
+    low, high = _bounds(parts, free)
+    return Freed(
+        unknown, text, names, members=tuple(members), low=low, high=high, called=free.name
+    )  # fmt: skip
+
+
+def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:
+    """Bounds of ln(value / deck's value): the user's, and of nu how far its expansion serves."""
+    low = -np.inf if free.low is None else float(np.log(free.low))
+    high = np.inf if free.high is None else float(np.log(free.high))
+    if free.field == "nu":
+        nu = max(number(parts[k], "nu") for k in free.positions)
+        reach = SERVES * (1 - 2 * nu) / (2 * nu)
+        low, high = max(low, -reach), min(high, reach)
+    return low, high
+
+
+def freed_effect(effect: Effect, called: str) -> Freed:
+    """An effect whose place is known, free in every fit."""
+    return Freed(
+        effect.parameters, effect.text, effect.parts, effect.grids, replaces=effect.replaces,
+        members=(effect,), called=called,
+    )  # fmt: skip
+
+
+def defaults_without_shells(assembly: Assembly) -> list[FreeParameter]:
+    """E and rho of every material of solids and beams."""
+    by_material: dict[object, list[int]] = {}
+    for k, part in enumerate(assembly.parts):
+        if not isinstance(part.section, ShellSection):
+            by_material.setdefault(part.section.material, []).append(k)
+    return [
+        FreeParameter(name, name, positions=tuple(at))
+        for at in by_material.values()
+        for name in ("E", "rho")
+    ]
+
+
+def _lumps(free: FreeParameter) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    return ("springs", free.springs), ("bushes", free.bushes), ("masses", free.masses)
+
+
+def _of_part(built: Structure, k: int, name: str) -> LinearScale:
+    """E or rho of solids and beams, Poisson's ratio, moduli of an orthotropic sheet."""
+    part, write = built.assembly.parts[k], PartWriter(k, name)
+    text = f"{name} of {part.name}"
+    if name in ("E", "rho"):
+        whole = mass_properties(built.assembly)[0]
+        heavier = mass_properties(write(built.assembly, 2.0))[0] if name == "rho" else whole
+        slope = of_part(built, k, name)
+        return linear_scale(text, name, "-", 1.0, slope, write, weight_slope=heavier - whole)
+    v = number(part, name)
+    first = _scaled(by_part(built, k, name), v)
+    up, down = (
+        _three(by_part(replace(built, assembly=write(built.assembly, 1 + h)), k, name))
+        for h in (AWAY, -AWAY)
+    )
+    bent = Slope(*(v * (b - a) / (2 * AWAY) for a, b in zip(down, up, strict=True)))
+    return linear_scale(text, name, "-", 1.0, first, write, bent=bent)
+
+
+def _three(slope: Slope) -> tuple[Any, Any, Any]:
+    return slope.M, slope.V, slope.K
+
+
+def _scaled(slope: Slope, v: float) -> Slope:
+    """By the factor on the value: v times the slope by the value."""
+    return Slope(*(v * A for A in _three(slope)))
+
+
+def _of_lumps(built: Structure, family: str, rows: Sequence[int]) -> LinearScale:
+    """K of springs or bushes, M of concentrated masses."""
+    weight = sum(_mass(built.assembly, row) for row in rows) if family == "masses" else 0.0
+    field = "M" if family == "masses" else "K"
+    return linear_scale(
+        f"{field} of {family}", field, "-", 1.0, of_lumps(built, family, rows),
+        LumpWriter(family, tuple(rows)), weight_slope=weight,
+    )  # fmt: skip
+
+
+def _mass(assembly: Assembly, row: int) -> float:
+    return float(np.trace(assembly.masses.matrix[row, :3, :3]) / 3)
+
+
+@dataclass(frozen=True)
+class PartWriter:
+    """Puts a factor on a field of one part."""
+
+    position: int
+    field: str
+
+    def __call__(self, assembly: Assembly, factor: float) -> Assembly:
+        """The assembly with the field times the factor."""
+        parts = list(assembly.parts)
+        parts[self.position] = changed(parts[self.position], self.field, factor)
+        return assembly.with_parts(tuple(parts))
+
+
+@dataclass(frozen=True)
+class LumpWriter:
+    """Puts a factor on the values of some springs, bushes or masses."""
+
+    family: str
+    rows: tuple[int, ...]
+
+    def __call__(self, assembly: Assembly, factor: float) -> Assembly:
+        """The assembly with these values times the factor."""
+        column = {"springs": "value", "bushes": "stiffness", "masses": "matrix"}[self.family]
+        members = getattr(assembly, self.family)
+        values = getattr(members, column).copy()
+        values[list(self.rows)] *= factor
+        return replace(assembly, **{self.family: replace(members, **{column: values})})
+
+
+def _values(assembly: Assembly, free: FreeParameter) -> np.ndarray:
+    """The deck's values of what shares the factor."""
+    out = [number(assembly.parts[k], free.field) for k in free.positions]
+    out += [float(assembly.springs.value[r]) for r in free.springs]
+    stiff = assembly.bushes.stiffness[list(free.bushes)]
+    out += stiff[stiff != 0].tolist()
+    return np.array(out + [_mass(assembly, r) for r in free.masses])
+
+
+def number(part: Part, name: str) -> float:
+    """The deck's value of a field of a part."""
+    section = part.section
+    if isinstance(section, ShellSection):
+        if name in ("E", "rho", "t"):
+            return value(part, name)
+        return float(getattr(section.membrane or section.bending, name))
+    return float(getattr(section.material, name))
+
+
+def changed(part: Part, name: str, factor: float) -> Part:
+    """The part with a field times a factor; E takes all moduli along."""
+    section = part.section
+    if isinstance(section, ShellSection):
+        if name in ("E", "rho", "t"):
+            return scaled(part, name, factor)
+        new = {
+            n: replace(m, **{name: getattr(m, name) * factor})
+            for n in ("membrane", "bending", "shear", "coupling")
+            if (m := getattr(section, n)) is not None and hasattr(m, name)
+        }
+        return part.with_section(**new)
+    material = section.material
+    new_values = {name: getattr(material, name) * factor}
+    if name == "E" and isinstance(material, Isotropic) and material.G is not None:
+        new_values["G"] = material.G * factor
+    return part.with_section(material=replace(material, **new_values))

@@ -1,0 +1,118 @@
+"""Changed joints and masses put into their cards: K of PBUSH, PELAS and CELAS2, M of CONM2."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ....errors import ModelError
+from ....model.assembly import Assembly
+from .. import Deck, SetField
+from ..text.table import Cards
+from .changes import Change
+
+_SAME = 1e-9
+
+
+def joint_changes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
+    """Edits of the cards of springs, bushes and masses that are in both and differ by a factor.
+
+    A property is changed where all its elements changed alike.
+
+    Raises
+    ------
+    ModelError
+        If elements of one property changed otherwise, or no card here holds the value.
+    """
+    return [
+        *_springs(deck, _factors(before, after, "springs", "value")),
+        *_bushes(deck, _factors(before, after, "bushes", "stiffness")),
+        *_masses(deck, _factors(before, after, "masses", "matrix")),
+    ]
+
+
+def _factors(before: Assembly, after: Assembly, family: str, column: str) -> dict[int, float]:
+    """{element id: new / old} of all members that were there before."""
+    old, new = getattr(before, family), getattr(after, family)
+    out = {}
+    for id, a, b in zip(old.ids.tolist(), getattr(old, column), getattr(new, column), strict=False):
+        scale = float(np.abs(a).max())
+        factor = 1.0 if scale == 0 else float(np.sum(a * b) / np.sum(a * a))
+        if np.abs(b - factor * a).max() > 1e-6 * max(scale, 1e-300):
+            raise ModelError(f"element {id}: its values did not change by one factor")
+        out[id] = factor
+    return out
+
+
+def _springs(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
+    """K of CELAS2 and CELAS4, and of the PELAS that CELAS1 and CELAS3 share."""
+    users: dict[int, list[int]] = {}
+    for cards in deck.present("CELAS1", "CELAS2", "CELAS3", "CELAS4"):
+        ids, second = cards.integers(1).tolist(), cards.words(2)
+        for row, id in enumerate(ids):
+            if cards.name in ("CELAS1", "CELAS3"):
+                users.setdefault(int(second[row]) if second[row] else id, []).append(id)
+            elif abs(factor[id] - 1) > _SAME:
+                yield SetField(cards.name, id, "K", cards.reals(2)[row] * factor[id])
+    for pid, members in users.items():
+        f = _common(f"PELAS {pid}", [factor[id] for id in members])
+        if abs(f - 1) > _SAME:
+            yield _pelas(deck, pid, f)
+
+
+def _pelas(deck: Deck, pid: int, factor: float) -> Change:
+    """K of a property; a card holds up to two."""
+    for cards in deck.present("PELAS"):
+        for at in (1, 5):
+            ids = cards.words(at)
+            for row in np.flatnonzero([w == str(pid).encode() for w in ids]):
+                k = cards.take(np.array([row])).reals(at + 1)[0]
+                return SetField("PELAS", int(cards.words(1)[row]), at + 1, k * factor)
+    raise ModelError(f"{deck.path} has no PELAS {pid}")
+
+
+def _bushes(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
+    """K1 to K6 of the PBUSH that its CBUSH share."""
+    users: dict[int, list[int]] = {}
+    for cards in deck.present("CBUSH"):
+        ids, pid = cards.integers(1), cards.integers(2, 0)
+        for id, p in zip(ids.tolist(), np.where(pid == 0, ids, pid).tolist(), strict=True):
+            users.setdefault(int(p), []).append(id)
+    for property, members in users.items():
+        f = _common(f"PBUSH {property}", [factor[id] for id in members])
+        if abs(f - 1) > _SAME:
+            yield from _pbush(deck["PBUSH"], property, f)
+
+
+def _pbush(cards: Cards, pid: int, factor: float) -> Iterator[Change]:
+    row = int(np.flatnonzero(cards.integers(1) == pid)[0])
+    one = cards.single(row)
+    words = one.fields(0)
+    for key in (k for k in range(2, len(words) + 1, 8) if words[k - 1] == "K"):
+        for j in range(key + 1, min(key + 6, len(words)) + 1):
+            if words[j - 1]:
+                yield SetField("PBUSH", pid, j, float(one.reals(j)[0]) * factor)
+
+
+def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
+    """M and the inertia of CONM2, its offset kept."""
+    known = {}
+    for cards in deck.present("CONM2"):
+        known.update({int(id): cards.single(row) for row, id in enumerate(cards.integers(1))})
+    for id, f in factor.items():
+        if abs(f - 1) <= _SAME:
+            continue
+        if id not in known:
+            raise ModelError(f"{deck.path}: mass {id} is no CONM2 and cannot be changed")
+        for field in (4, *range(9, 15)):
+            value = float(known[id].reals(field, 0.0)[0])
+            if value:
+                yield SetField("CONM2", id, field, value * f)
+
+
+def _common(name: str, factors: list[float]) -> float:
+    """The one factor of all elements of a property."""
+    if np.ptp(factors) > 1e-6:
+        raise ModelError(
+            f"elements of {name} changed differently; give them properties of their own"
+        )
+    return factors[0]

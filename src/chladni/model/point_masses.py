@@ -1,0 +1,28 @@
+"""Masses put onto a structure at its grids."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .assembly import Assembly, Masses
+
+
+def with_masses(
+    assembly: Assembly,
+    grids: Sequence[int],
+    m: float | np.ndarray,
+    offset: np.ndarray | None = None,
+) -> Assembly:
+    """The assembly with m [kg] (one, or one a grid) at each grid, ``offset`` (3,) from it [m]."""
+    old = assembly.masses
+    first = int(old.ids.max(initial=0)) + 1
+    x, y, z = np.zeros(3) if offset is None else offset
+    arm = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])  # motion of the mass
+    each = np.broadcast_to(np.asarray(m, float), len(grids))[:, None, None]
+    new = Masses(
+        np.append(old.ids, first + np.arange(len(grids))),
+        np.append(old.node, assembly.rows(list(grids))),
+        np.concatenate([old.matrix, each * (arm.T @ arm)]),
+    )
+    return replace(assembly, masses=new)

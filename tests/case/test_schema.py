@@ -1,0 +1,239 @@
+"""No word of a case is read and dropped: whatever accepted value changes, what is asked changes."""
+
+import hashlib
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.case import load_case
+from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, known, sections, unread
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.frf import FRF
+from chladni.effects.effect import Effect
+from chladni.errors import ChladniError
+from chladni.fem.assemble import structure
+from chladni.fem.modelled import modelled
+from chladni.io.nastran import assembly, read_deck
+from chladni.io.tables.read_tables import read_table
+from chladni.io.tables.sensor_table import _OPTIONAL
+from chladni.io.tables.write_tables import write_npz
+from chladni.units import UNITS
+from chladni.updating.preparation import prepare
+from chladni.workflows.case_model import model_frf
+from chladni.workflows.question_of_case import question
+
+from .test_case import deck
+
+CASE = """\
+[model]
+deck = "plate.bdf"
+units = "mm-t-s"
+damping = 0.01
+[test]
+recordings = ["a.npz", "b.npz"]
+use = "a.npz"
+quantity = "accelerance"
+gain = "known"
+sensors = "sensors.csv"
+mass = 1.413
+mass_sd = 0.002
+hangers = [1, 35]
+[band]
+fit = [5.0, 60.0]
+exclude = [[20.0, 21.0]]
+[held_out]
+sensors = ["16:+Z"]
+band = [50.0, 60.0]
+[[parameter]]
+name = "E of the sheet"
+parts = ["sheet"]
+field = "E"
+sd = 0.05
+low = 0.8
+high = 1.3
+"""
+SENSORS = """\
+label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd
+3:+Z,3,,,,+Z,,,,output,0.003,
+12:+Z,12,,,,,0,0.1,1,output,,
+16:+Z,,0.31,0.07,0.0,+Z,,,,output,0.004,0.001
+22:+Z,22,,,,+Z,,,,output,,
+8:+Z,8,,,,+Z,,,,input,,
+"""
+OTHER = {  # another accepted value of every word
+    ("model", "deck"): '"thicker.bdf"',
+    ("model", "units"): '"mm-kg-ms"',
+    ("model", "damping"): "0.02",
+    ("test", "recordings"): '["a.npz"]',
+    ("test", "use"): '"b.npz"',
+    ("test", "quantity"): '"mobility"',
+    ("test", "gain"): '"unknown"',
+    ("test", "sensors"): '"others.csv"',
+    ("test", "mass"): "1.42",
+    ("test", "mass_sd"): "0.003",
+    ("test", "hangers"): "[1]",
+    ("band", "fit"): "[5.0, 59.0]",
+    ("band", "exclude"): "[[20.0, 22.0]]",
+    ("held_out", "sensors"): "1",
+    ("held_out", "band"): "[48.0, 60.0]",
+    ("parameter", "name"): '"stiffness"',
+    ("parameter", "parts"): '["CELAS2 99"]',
+    ("parameter", "field"): '"nu"',
+    ("parameter", "sd"): "0.06",
+    ("parameter", "low"): "0.7",
+    ("parameter", "high"): "1.2",
+}
+CELLS = {  # column: (a row as it stands, the same row with another accepted cell)
+    "label": ("22:+Z,22,,", "21:+Z,22,,"),
+    "grid": ("22:+Z,22,,", "22:+Z,21,,"),
+    "x": ("0.31,", "0.32,"),
+    "y": ("0.07,", "0.08,"),
+    "z": ("0.07,0.0,", "0.07,0.001,"),
+    "direction": ("22,,,,+Z,", "22,,,,-Z,"),
+    "nx": (",,0,0.1,1,", ",,0.1,0.1,1,"),
+    "ny": (",,0,0.1,1,", ",,0,0.2,1,"),
+    "nz": (",,0,0.1,1,", ",,0,0.1,2,"),
+    "role": ("8,,,,+Z,,,,input", "8,,,,+Z,,,,output"),
+    "mass": ("output,0.003", "output,0.005"),
+    "position_sd": ("0.004,0.001", "0.004,0.002"),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A case of a plate that uses every word, with two recordings of it."""
+    place = tmp_path_factory.mktemp("case")
+    spring = deck().replace("ENDDATA", "CELAS2,99,0.1,17,3\nENDDATA")
+    (place / "plate.bdf").write_text(spring)
+    (place / "thicker.bdf").write_text(spring.replace("PSHELL,1,1,1.0", "PSHELL,1,1,1.1"))
+    (place / "sensors.csv").write_text(SENSORS)
+    (place / "others.csv").write_text(SENSORS.replace("0.31,0.07", "0.33,0.07"))
+    built = structure(assembly(read_deck(place / "plate.bdf"), UNITS["mm-t-s"]))
+    modal = normal_modes(built.system, 30)
+    for name, factor in (("a.npz", 1.01), ("b.npz", 1.03)):
+        write_npz(place / name, measured(built, modal, factor))
+    return place
+
+
+def measured(built, modal, factor: float) -> FRF:
+    """Accelerances of the plate with all its frequencies times a factor, 1 % noise."""
+    f = np.arange(4.0, 65.0, 0.1)
+    phi_o = built.rows(np.array([(g, 3) for g in (3, 12, 16, 22)])) @ modal.shapes
+    phi_i = built.rows(np.array([(8, 3)])) @ modal.shapes
+    s, w = 2j * np.pi * f[:, None], 2 * np.pi * factor * modal.frequency
+    d = s**2 / (s**2 + 0.02 * w * s + w**2)
+    H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i)
+    noise = np.random.default_rng(0).normal(size=(2, *H.shape))
+    values = H * (1 + 0.01 * (noise[0] + 1j * noise[1]))
+    labels = tuple(f"{g}:+Z" for g in (3, 12, 16, 22))
+    return FRF(values, f, labels, ("8:+Z",), "accelerance")
+
+
+def effect_bytes(effect: Effect) -> bytes:
+    """What an ordinary effect is and does on either side of the deck's value."""
+    said = [effect.name, effect.text, getattr(effect, "called", ""), *map(str, effect.parameters)]
+    for shift in (-0.3, 0.3):
+        x = np.array([shift] * len(effect.parameters))
+        said += [f"{c.field}{c.value.tolist()}" for c in effect.fields(x)]
+        said += [f"{t.matrix}{t.coefficient}{t.operator.sum()}" for t in effect.matrices(x)]
+    return repr(said).encode()
+
+
+def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
+    """A fingerprint of all that a fit would start from, the notes and the model's responses.
+
+    A sentence of refusal is an answer, too.
+    """
+    (folder / "case.toml").write_text(text)
+    (folder / "sensors.csv").write_text(sensors)
+    try:
+        case = load_case(folder)
+        ready = prepare(question(case))
+    except ChladniError as error:
+        return f"refused: {error}"
+    search, mark = ready.search, hashlib.sha256()
+    for array in (search.bench.model.K0, search.bench.model.M0, search.bench.frequency):
+        mark.update(np.ascontiguousarray(array).tobytes())
+    for data in (search.data, ready.score):
+        for array in vars(data).values():
+            if isinstance(array, np.ndarray):
+                mark.update(np.ascontiguousarray(array).tobytes())
+    for effect in search.base:
+        if effect.kind == "ordinary" or effect.name == "gain":
+            mark.update(effect_bytes(effect))
+    mark.update(repr((search.weighing, search.setup.hangers, search.setup.sensors)).encode())
+    mark.update(repr((ready.held.tolist(), ready.what, ready.notes)).encode())
+    mark.update(repr([case.said(c) for c in COMMANDS]).encode())
+    model = modelled(case.tested(case.assembly), 200.0)
+    curves = model_frf(case, model, case.damping or 0.01, case.frfs[0])
+    mark.update(np.round(curves.values / np.abs(curves.values).max(), 9).tobytes())
+    return mark.hexdigest()
+
+
+@pytest.fixture(scope="module")
+def as_it_stands(folder: Path) -> str:
+    first = asked(folder, CASE)
+    assert not first.startswith("refused"), first
+    assert asked(folder, CASE) == first  # the same words ask the same
+    return first
+
+
+def test_every_word_has_another_value_here() -> None:
+    """A word added to the schema is not forgotten by this test, nor one to the table of sensors."""
+    assert set(OTHER) == {(k.section, k.name) for k in SCHEMA}
+    assert set(CELLS) == {k.name for k in COLUMNS} == {"label", *_OPTIONAL}
+    for section, name in OTHER:
+        assert f"{name} = " in CASE.split(f"[{section}]")[1].split("\n[")[0]
+
+
+@pytest.mark.parametrize(("section", "name"), OTHER)
+def test_no_word_is_dropped(folder: Path, as_it_stands: str, section: str, name: str) -> None:
+    head, rest = CASE.split(f"[{section}]", 1)
+    lines = rest.split("\n")
+    at = next(k for k, line in enumerate(lines) if line.startswith(f"{name} = "))
+    lines[at] = f"{name} = {OTHER[section, name]}"
+    assert asked(folder, head + f"[{section}]" + "\n".join(lines)) != as_it_stands
+
+
+@pytest.mark.parametrize("column", CELLS)
+def test_no_column_is_dropped(folder: Path, as_it_stands: str, column: str) -> None:
+    old, new = CELLS[column]
+    assert old in SENSORS
+    assert asked(folder, CASE, SENSORS.replace(old, new)) != as_it_stands
+
+
+def test_sections_know_their_words() -> None:
+    assert sections() == ("model", "test", "band", "held_out", "parameter")
+    for section in sections():
+        assert len(set(known(section))) == len(known(section))
+    assert all(set(k.used) <= set(COMMANDS) and k.used for k in (*SCHEMA, *COLUMNS))
+
+
+def test_words_a_command_makes_no_use_of_are_named() -> None:
+    given = (("model", "deck"), ("test", "hangers"), ("test", "mass"), ("held_out", "band"))
+    assert unread(given, "identify") == [
+        "Not used by identify: [test] hangers, mass; [held_out] band."
+    ]
+    assert unread(given, "diagnose") == []
+
+
+def test_the_page_is_written_from_the_table() -> None:
+    """docs/case.md names every word, as docs/case_page.py writes it."""
+    docs = Path(__file__).parents[2] / "docs"
+    text = (docs / "case.md").read_text(encoding="utf-8")
+    assert text == runpy.run_path(str(docs / "case_page.py"))["page"]()
+    for k in (*SCHEMA, *COLUMNS):
+        assert f"| `{k.name}` |" in text
+
+
+def test_the_examples_of_the_page_are_accepted(folder: Path) -> None:
+    """Every example is a value of the kind its row says."""
+    import tomllib
+
+    for k in SCHEMA:
+        value = tomllib.loads(f"v = {k.example}")["v"]
+        if k.choices:
+            assert value in k.choices
+    assert read_table(folder / "sensors.csv", ("label",), _OPTIONAL)

@@ -1,0 +1,115 @@
+"""Changed solids, bars, springs, bushes and masses are written into the cards that hold them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.freed import freed
+from chladni.effects.shell_groups import shell_groups
+from chladni.errors import ModelError
+from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, read_deck, write_deck
+from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.free_parameter import FreeParameter
+from chladni.units import UNITS
+
+DECK = """\
+SOL 103
+CEND
+BEGIN BULK
+MAT1,1,210000.,,.3,7.85-9
+MAT1,2,2000.,,.4,1.2-9
+PSHELL,1,1,1.0,1,,1
+PSOLID,2,2
+PSOLID,3,2
+PROD,4,1,10.,5.
+GRID,1,,0.,0.,0.
+GRID,2,,100.,0.,0.
+GRID,3,,100.,100.,0.
+GRID,4,,0.,100.,0.
+GRID,5,,0.,0.,10.
+GRID,6,,100.,0.,10.
+GRID,7,,100.,100.,10.
+GRID,8,,0.,100.,10.
+GRID,9,,0.,0.,20.
+GRID,10,,100.,0.,20.
+GRID,11,,100.,100.,20.
+GRID,12,,0.,100.,20.
+CQUAD4,1,1,1,2,3,4
+CHEXA,2,2,1,2,3,4,5,6,+
++,7,8
+CHEXA,3,3,5,6,7,8,9,10,+
++,11,12
+CROD,4,4,1,3
+CELAS1,21,5,1,3
+CELAS1,22,6,2,3
+PELAS,5,100.,,,6,250.,0.02
+CELAS2,23,40.,3,3
+CBUSH,31,7,4,,,,,0
+CBUSH,32,7,3,,,,,0
+PBUSH,7,K,10.,20.,,,,5.,+
++,,B,0.1
+CONM2,41,12,,0.003,1.,2.,3.,,+
++,0.4,,0.5,,,0.6
+ENDDATA
+"""
+
+
+@pytest.fixture
+def deck(tmp_path):
+    path = tmp_path / "deck.bdf"
+    path.write_text(DECK)
+    found = read_deck(path)
+    return found, assembly(found, UNITS["mm-t-s"])
+
+
+def position(made, id):
+    return next(k for k, p in enumerate(made.parts) if p.id == id)
+
+
+def rewritten(deck, before, after):
+    path = deck.path.with_name("updated.bdf")
+    write_deck(deck, path, changes(deck, before, after, UNITS["mm-t-s"]))
+    new = path.read_text().splitlines()
+    gone = [line for line in deck.path.read_text().splitlines() if line not in new]
+    return assembly(read_deck(path), UNITS["mm-t-s"]), gone
+
+
+KINDS = {  # what is freed, and the cards whose lines change
+    "E of both solids": (dict(field="E", parts=(2, 3)), ["MAT1"]),
+    "E of one solid": (dict(field="E", parts=(2,)), ["PSOLID"]),
+    "nu of one solid": (dict(field="nu", parts=(3,)), ["PSOLID"]),
+    "E of the bar": (dict(field="E", parts=(4,)), ["PROD"]),
+    "rho of sheet and bar": (dict(field="rho", parts=(1, 4)), ["MAT1"]),
+    "K of one PELAS": (dict(field="K", springs=(1,)), ["PELAS"]),
+    "K of a CELAS2": (dict(field="K", springs=(2,)), ["CELAS2"]),
+    "K of the PBUSH": (dict(field="K", bushes=(0, 1)), ["PBUSH"]),
+    "M": (dict(field="M", masses=(0,)), ["CONM2", "+"]),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_was_freed_is_in_the_deck(deck, kind):
+    """The deck read again has the K and M of the changed structure; other lines stay."""
+    found, before = deck
+    given, cards = KINDS[kind]
+    at = tuple(position(before, id) for id in given.get("parts", ()))
+    cloth = shell_groups(structure(before), 4)
+    what = {k: v for k, v in given.items() if k != "parts"}
+    effect = freed(cloth, FreeParameter(kind, positions=at, **what))
+    after = effect.apply(before, np.array([0.05]))
+    got, gone = rewritten(found, before, after)
+    due, was, is_now = (structure(a).system for a in (after, before, got))
+    for name in ("K", "M"):
+        A, B, C = (getattr(s, name).toarray() for s in (due, was, is_now))
+        assert_allclose(C, A, atol=1e-7 * np.abs(A).max())
+        if (name == "M") == (given["field"] in ("rho", "M")):
+            assert np.abs(A - B).max() > 1e-6 * np.abs(B).max()
+    assert [line.split(",")[0] for line in gone] == cards
+
+
+def test_part_of_a_property_is_refused(deck):
+    found, before = deck
+    effect = freed(shell_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
+    with pytest.raises(ModelError, match="PBUSH 7 changed differently"):
+        changes(found, before, effect.apply(before, np.array([0.2])), UNITS["mm-t-s"])
