@@ -47,6 +47,7 @@ LIBRARIES = {
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "cli": {"typer", "rich", "threadpoolctl"},
+    "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
