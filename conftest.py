@@ -3,9 +3,7 @@
 import os
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[name] = (
-        "1"  # set before numpy loads: threads fight for the cores
-    )
+    os.environ[name] = "1"  # set before numpy loads: threads fight for the cores
 
 import numpy as np
 import pytest

@@ -20,7 +20,8 @@ import numpy as np
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import count
 from chladni.effects.ordinary import ordinary
-from chladni.effects.points import MassEffect, Suspension, strength
+from chladni.effects.points import MassEffect, strength
+from chladni.effects.suspension import Suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy
@@ -49,9 +50,9 @@ def effects(bench):
     grids = tuple(int(places.grids[k]) for k in (3, 7))
     mass = strength("m", "kg", 0.05, 1.0, (0.0,))
     spring = strength("k", "N/m", 5e3, 1.0, (0.0,))
-    thin = thickness_distribution(bench.sheet, 0, 1)
+    thin = thickness_distribution(bench.groups, 0, 1)
     return [
-        *(ordinary(bench.sheet, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
+        *(ordinary(bench.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
         MassEffect((mass,), "", grids=grids[:1], rows=one),
         Suspension((spring,), "", grids=grids[1:], rows=other, directions=np.eye(3)[2:]),
         thin,

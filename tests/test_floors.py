@@ -2,10 +2,14 @@
 
 import ast
 import sys
+import tomllib
+from collections import defaultdict
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+from chladni.cli.app import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = {  # every package of ours and where its source is
@@ -23,12 +27,12 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "dynamics": GROUND | {"sparse"},
     "ema": GROUND | {"dynamics"},
     "fem": GROUND | {"model", "geometry", "sparse", "dynamics"},
-    "io": GROUND | {"model", "dynamics", "ema"},
+    "io": GROUND | {"model", "geometry", "dynamics", "ema"},
     "bench": GROUND | {"dynamics", "ema"},
-    "effects": GROUND | {"model", "dynamics", "fem", "ema"},
+    "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
 MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
-MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io"}
+MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
 BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
 MAY_IMPORT["planning"] = BELOW | {"view"}
@@ -49,6 +53,16 @@ LIBRARIES = {
     "cli": {"typer", "rich", "threadpoolctl"},
     "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
+}
+WAITING_FOR = {  # module no command, environment or public name reaches: what will
+    "chladni/effects/linear_parameter": "calibration of joints",
+    "chladni/fem/derivative": "calibration of joints",
+    "chladni/ema/signals": "estimates of FRFs from time data",
+    "chladni/ema/screening": "screening of a recording before anything is fitted",
+    "chladni/ema/shapes": "shapes of identified modes, their covariance and complexity",
+    "chladni/ema/realisation": "an identified model as a state space",
+    "chladni/geometry/thickness_alignment": "thickness mapping",
+    "chladni/geometry/thickness_prior": "thickness mapping",
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
 SOURCES = sorted(
@@ -114,6 +128,46 @@ def test_no_cycles():
     graph = {module(p): imports(p)[0] for p in SOURCES if p.name != "__init__.py"}
     whole = {m: {n for n in needs if n not in packages} for m, needs in graph.items()}
     TopologicalSorter(whole).prepare()  # raises CycleError
+
+
+def reached(roots):
+    """Modules that are loaded, at once or by a call, by whoever loads the roots."""
+    needs = {module(p): imports(p)[0] for p in SOURCES}
+    found, ahead = set(), set(roots)
+    while ahead:
+        found |= ahead
+        above = {m[:k] for m in ahead for k in range(1, len(m))}  # a package loads before it
+        ahead = {n for m in ahead for n in needs.get(m, ())} | above
+        ahead = (ahead & needs.keys()) - found
+    return found
+
+
+def entry_points():
+    """Modules that pyproject.toml names: scripts and entry points."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = [project.get("scripts", {}), *project.get("entry-points", {}).values()]
+    return {tuple(text.split(":")[0].split(".")) for group in groups for text in group.values()}
+
+
+def test_nothing_is_out_of_reach():
+    """Commands, environments and public names reach every module, or it waits for something."""
+    commands = {("chladni", "cli", name) for name in COMMANDS}
+    environments = {m for m in MODULES if m[0] == "chladni_envs"}
+    public = imports(ROOT / "src/chladni/__init__.py")[0]
+    used = reached(commands | environments | public | entry_points())
+    assert {"/".join(m) for m in MODULES - used} == set(WAITING_FOR)
+
+
+def test_names_stand_once():
+    """A class or a file can be spoken of by its name; a command's file is called as the command."""
+    classes, files = defaultdict(list), defaultdict(list)
+    for path in SOURCES:
+        if path.stem not in ("__init__", "__main__") and module(path)[:2] != ("chladni", "cli"):
+            files[path.stem].append(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                classes[node.name].append("/".join(module(path)))
+    assert not {name: at for name, at in (classes | files).items() if len(at) > 1}
 
 
 def test_files_stay_readable():

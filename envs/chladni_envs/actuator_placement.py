@@ -11,7 +11,7 @@ from chladni.planning import best_layout, rattle_margin, shaking
 
 from . import drawing
 from .sensor_placement import Reset, Step, of_case
-from .small_specimens import Specimen, plate
+from .small_specimens import ModalSpecimen, plate
 
 WORST = 1e6  # condition numbers beyond this are no worse than useless
 
@@ -49,7 +49,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
 
     def __init__(
         self,
-        specimen: Specimen | None = None,
+        specimen: ModalSpecimen | None = None,
         n_actuators: int = 2,
         *,
         sensors: np.ndarray | None = None,

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from . import drawing
-from .calibration_questions import Question, plate_question
+from .calibration_questions import CalibrationQuestion, plate_question
 from .sensor_placement import Reset, Step
 
 DONE = 1e-5  # Q at which model and recording are one
@@ -40,7 +40,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        question: Question | None = None,
+        question: CalibrationQuestion | None = None,
         *,
         case: str | None = None,
         bands: int = 8,

@@ -9,7 +9,7 @@ from .small_specimens import plate
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class CalibrationQuestion:
     """A model over parameters in [-1, 1] and what was recorded.
 
     Attributes
@@ -26,7 +26,7 @@ class Question:
     recorded: np.ndarray | None = None
 
 
-def plate_question(modes: int = 8, lines: int = 96) -> Question:
+def plate_question(modes: int = 8, lines: int = 96) -> CalibrationQuestion:
     """Mobility of a simply supported plate with E and ρ off by up to 20 %, a mass, a spring.
 
     In its nominal modes K = E/E_0 diag ω² + k φ_s φ_sᵀ and M = ρ/ρ_0 I + m φ_m φ_mᵀ.
@@ -50,4 +50,4 @@ def plate_question(modes: int = 8, lines: int = 96) -> Question:
         h = 1j * omega[:, None] / (lam * (1 + 0.02j) - omega[:, None] ** 2)
         return np.asarray((h * (drive @ psi)) @ (out @ psi).T)
 
-    return Question(("E", "rho", "mass", "spring"), frequency, predict)
+    return CalibrationQuestion(("E", "rho", "mass", "spring"), frequency, predict)

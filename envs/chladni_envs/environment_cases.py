@@ -7,7 +7,7 @@ import numpy as np
 from chladni.case import load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
-from chladni.planning import Linearised, Wishes, find_places
+from chladni.planning import Linearised, Wishes, find_sensor_candidates
 from chladni.planning.rattle import openings
 from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
@@ -17,13 +17,15 @@ from chladni.updating.reduced_model import State, evaluate
 from chladni.workflows.loaded_model import load_model
 from chladni.workflows.question_of_case import question
 
-from .calibration_questions import Question as Calibration
-from .small_specimens import Specimen
+from .calibration_questions import CalibrationQuestion
+from .small_specimens import ModalSpecimen
 
 REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
 
 
-def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None = None) -> Specimen:
+def specimen(
+    case: str, modes: int, *, candidates: int = 300, units: str | None = None
+) -> ModalSpecimen:
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
 
     With them goes what decides where to shake: a straight way to the place, and the clearances of
@@ -37,12 +39,12 @@ def specimen(case: str, modes: int, *, candidates: int = 300, units: str | None 
     units : str          unit system of a bare deck
     """
     model = load_model(Path(case), units)
-    places = find_places(model.assembly, candidates, unit=model.unit)
+    places = find_sensor_candidates(model.assembly, candidates, unit=model.unit)
     target, _, _ = target_modes(model.structure, Wishes(modes=modes))
     mounts, moving = mounts_at(places), motion(model.structure, target)
     labels, seen = mounts.labels[: len(places)], model.seen
     gaps = openings(model.assembly, moving)
-    return Specimen(
+    return ModalSpecimen(
         places.points,
         seen_at(places, mounts, moving)[: len(places)],
         target.frequency,
@@ -92,7 +94,7 @@ class Recorded:
         h, H = self.score.only(self.prepared.held).residual(state, True)
         return Linearised(r, J * self.sd, h, H * self.sd)
 
-    def calibration(self) -> Calibration:
+    def calibration(self) -> CalibrationQuestion:
         """The fitted lines and channels; bounds at two prior standard deviations."""
         lines = np.flatnonzero(self.score.use.any(axis=1))
         outputs = np.flatnonzero(self.score.use.any(axis=0))
@@ -104,7 +106,7 @@ class Recorded:
             return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))
 
         frequency = self.score.s.imag[lines] / (2 * np.pi)
-        return Calibration(self.names, frequency, predict, fitted(self.score.values))
+        return CalibrationQuestion(self.names, frequency, predict, fitted(self.score.values))
 
 
 def _name(effect: Effect, parameter: Parameter) -> str:

@@ -10,13 +10,13 @@ from chladni.errors import LabelError
 from chladni.planning import Candidates, Rules, Walk, candidates
 
 from . import drawing
-from .small_specimens import Specimen, plate
+from .small_specimens import ModalSpecimen, plate
 
 Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 
 
-def of_case(case: str, modes: int) -> Specimen:
+def of_case(case: str, modes: int) -> ModalSpecimen:
     """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
     from .environment_cases import specimen  # loads the finite element part of the package only now
 

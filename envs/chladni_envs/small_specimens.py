@@ -6,7 +6,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Specimen:
+class ModalSpecimen:
     """Modes at places where something may be mounted.
 
     Attributes
@@ -41,7 +41,7 @@ def plate(
     width: float = 0.5,
     thickness: float = 1e-3,
     zeta: float = 0.01,
-) -> Specimen:
+) -> ModalSpecimen:
     """A simply supported steel plate: ω_mn = √(D/ρt) ((mπ/a)² + (nπ/b)²), φ = 2/√(ρtab) sin sin.
 
     Leissa, Vibration of Plates (NASA SP-160, 1969), 4.1. Places on a grid of nx by ny inside the
@@ -59,4 +59,4 @@ def plate(
     phi *= 2 / np.sqrt(rho * thickness * length * width)
     labels = tuple(f"{k + 1}:+Z" for k in range(len(X)))
     points = np.column_stack([X, Y])
-    return Specimen(points, phi, omega[low] / (2 * np.pi), np.full(modes, zeta), labels)
+    return ModalSpecimen(points, phi, omega[low] / (2 * np.pi), np.full(modes, zeta), labels)

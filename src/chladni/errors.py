@@ -28,3 +28,7 @@ class ModelError(ChladniError, ValueError):
 
 class AccuracyError(ChladniError, ArithmeticError):
     """A computed result failed the check its own theory provides."""
+
+
+class ExtensionError(ChladniError, ImportError):
+    """A package that adds to this one and cannot be used as it stands."""

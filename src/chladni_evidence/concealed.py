@@ -14,19 +14,31 @@ import numpy as np
 from chladni.bench.article import Front, measured
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
-from chladni.effects import catalogue, points
+from chladni.effects import registry
+from chladni.effects.family import Article
 from chladni.fem.assemble import Structure, structure
-from chladni.fem.energy import mass_properties
+from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.nastran import write_assembly
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
-from chladni.model.properties import Isotropic, Orthotropic, ShellSection
+from chladni.model.properties import Isotropic
 from chladni.output import write_json, write_text
 from chladni.units import units
 from chladni_specimens.holed_plate import holed_plate
 from chladni_specimens.plates import STEEL, folded_panel
 
-EFFECTS = (*catalogue.NAMES, "nothing", "calibration")
+from .score import NULLS
+
+NUMBERED = 7  # families before the nulls in the order that seeds the random numbers of a case
+
+
+def concealable() -> tuple[str, ...]:
+    """Names of all that can be concealed: every family of effects, and the nulls.
+
+    The order seeds the cases, so that what comes later must stand later.
+    """
+    names = registry.names()
+    return (*names[:NUMBERED], *NULLS, *names[NUMBERED:])
 
 
 @dataclass(frozen=True)
@@ -78,20 +90,20 @@ def made(specimen: Specimen, effect: str, seed: int) -> Concealed:
     thickness scatter 0.6 %, E and rho off by 1 % (sd), noise 1 % per line, modal damping 0.4-1.2 %.
     "calibration" has one of E, rho, t off by up to 10 %, "nothing" none, both with scatter.
     """
-    rng = np.random.default_rng([seed, EFFECTS.index(effect), len(specimen.name)])
-    deck, article = specimen.build(1), specimen.build(2)
+    rng = np.random.default_rng([seed, concealable().index(effect), len(specimen.name)])
+    deck, made = specimen.build(1), specimen.build(2)
     outputs, drive, hangers = _layout(deck, specimen, rng)
-    article = _ordinary(article, effect, rng)
-    article, truth, gains = _concealed(article, deck, effect, outputs, hangers, rng)
-    article = _scattered(article, 0.006, rng)
-    built = structure(article, residual_bending=bool(rng.integers(2)))
-    frf = _recording(built, deck, outputs, drive, specimen, rng)
-    frf = replace(
-        frf, values=frf.values * gains[:, None], outputs=tuple(f"{g}:+Z" for g in outputs)
-    )
-    off_scale = truth["value"] * len(outputs) if effect == "sensor-mass" else 0.0
-    mass = (_mass(article) - off_scale) * (1 + 5e-4 * rng.normal())
-    truth = {"effect": effect, "seed": seed, "specimen": specimen.name, **truth}
+    made = _ordinary(made, effect, rng)
+    article = Article(made, deck, outputs, hangers, np.ones(len(outputs)))
+    if effect not in NULLS:
+        article = registry.family(effect).conceal(article, rng)
+    article = replace(article, assembly=_scattered(article.assembly, 0.006, rng))
+    built = structure(article.assembly, residual_bending=bool(rng.integers(2)))
+    frf = _recording(built, article, drive, specimen, rng)
+    labels = tuple(f"{g}:+Z" for g in outputs)
+    frf = replace(frf, values=frf.values * article.gains[:, None], outputs=labels)
+    mass = (article.weight - article.off_scale) * (1 + 5e-4 * rng.normal())
+    truth = {"effect": effect, "seed": seed, "specimen": specimen.name, **article.truth}
     return Concealed(specimen, deck, frf, mass, hangers, truth)
 
 
@@ -111,9 +123,8 @@ def _layout(
     """Grids of sensors, shaker and hangers, on the faces that look up."""
     X = deck.points
     used = np.unique(deck.shells.nodes[deck.shells.part == 0])
-    chosen = used[
-        catalogue.spread(X[used] + 0.01 * rng.normal(size=(len(used), 3)), specimen.sensors)
-    ]
+    shaken = X[used] + 0.01 * rng.normal(size=(len(used), 3))
+    chosen = used[farthest_point_sample(shaken, specimen.sensors)]
     low = np.quantile(X[used], 0.12, axis=0), np.quantile(X[used], 0.3, axis=0)
     corner = [k for k in used if np.all((X[k, :2] > low[0][:2]) & (X[k, :2] < low[1][:2]))]
     edge = used[np.argsort(X[used, 1])[-max(4, len(used) // 15) :]]
@@ -146,100 +157,15 @@ def _scattered(article: Assembly, sd: float, rng: np.random.Generator) -> Assemb
     return replace(article, shells=replace(article.shells, thickness=t))
 
 
-def _concealed(
-    article: Assembly, deck: Assembly, effect: str, outputs: np.ndarray, hangers: np.ndarray,
-    rng: np.random.Generator,
-) -> tuple[Assembly, dict[str, Any], np.ndarray]:  # fmt: skip
-    """The article with the effect in it, what it is, and the factors on the channels."""
-    gains = np.ones(len(outputs))
-    weight = _mass(article)
-    if effect in ("nothing", "calibration"):
-        return article, {}, gains
-    if effect == "sensor-fault":
-        at = int(rng.integers(len(outputs)))
-        gains[at] = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0, -1.3]))
-        return article, {"channel": f"{outputs[at]}:+Z", "value": float(gains[at])}, gains
-    if effect == "orthotropic-material":
-        return *_grained(article, rng), gains
-    if effect == "thickness-distribution":
-        return *_thinned(article, rng), gains
-    if effect == "sensor-mass":
-        each = float(rng.uniform(0.0025, 0.006)) * weight
-        return _at(article, deck, outputs, points.with_masses, each), {"value": each}, gains
-    if effect == "suspension":
-        K = float(np.exp(rng.uniform(np.log(800), np.log(6000))))
-        return _at(article, deck, hangers, _springs, K), {"value": K}, gains
-    used = np.unique(deck.shells.nodes)
-    spot = int(rng.choice(used))
-    truth: dict[str, Any] = {"point_m": deck.points[spot].tolist()}
-    if effect == "point-mass":
-        m = float(rng.uniform(0.015, 0.08)) * weight
-        return (
-            _at(article, deck, deck.ids[[spot]], points.with_masses, m),
-            {**truth, "value": m},
-            gains,
-        )
-    k = float(np.exp(rng.uniform(np.log(2e3), np.log(5e4))))
-    return _at(article, deck, deck.ids[[spot]], _springs, k), {**truth, "value": k}, gains
-
-
-def _grained(article: Assembly, rng: np.random.Generator) -> tuple[Assembly, dict[str, Any]]:
-    section = article.parts[0].section
-    assert isinstance(section, ShellSection)
-    old = section.membrane
-    assert isinstance(old, Isotropic)
-    ratio = float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.3))
-    E1, E2 = old.E * np.exp(ratio / 2), old.E * np.exp(-ratio / 2)
-    G = old.shear_modulus
-    G12 = G * float(np.exp(rng.uniform(-0.15, 0.15)))
-    grain = Orthotropic(E1, E2, old.nu * np.sqrt(E1 / E2), G12, G, G, old.rho)
-    parts = tuple(p.with_section(membrane=grain, bending=grain) for p in article.parts)
-    axis = np.broadcast_to([1.0, 0, 0], article.shells.axis.shape)
-    changed = replace(article.with_parts(parts), shells=replace(article.shells, axis=axis))
-    return changed, {"E1": E1, "E2": E2, "G12": G12}
-
-
-def _thinned(article: Assembly, rng: np.random.Generator) -> tuple[Assembly, dict[str, Any]]:
-    top = article.shells.nodes[article.shells.part == 0]
-    centre = article.points[rng.choice(np.unique(top))]
-    alpha, R = float(rng.uniform(0.08, 0.25)), float(rng.uniform(0.04, 0.09))
-    q = np.exp(-((article.points - centre) ** 2).sum(axis=1) / (2 * R**2))
-    t = article.shells.thickness * (1 - alpha * q)[article.shells.nodes]
-    truth = {"point_m": centre.tolist(), "value": alpha, "radius_m": R}
-    return replace(article, shells=replace(article.shells, thickness=t)), truth
-
-
-def _at(
-    article: Assembly, deck: Assembly, grids: np.ndarray, add: Callable[..., Assembly], value: float
-) -> Assembly:
-    """The same thing at the article's nodes that lie where the deck's grids are."""
-    return add(article, tuple(_same(article, deck, grids)), value)
-
-
-def _same(article: Assembly, deck: Assembly, grids: np.ndarray) -> list[int]:
-    where = deck.points[deck.rows(grids)]
-    d2 = ((article.points[None] - where[:, None]) ** 2).sum(axis=-1)
-    return [int(i) for i in article.ids[d2.argmin(axis=1)]]
-
-
-def _springs(article: Assembly, grids: tuple[int, ...], k: float) -> Assembly:
-    up = np.tile([0.0, 0.0, 1.0], (len(grids), 1))
-    return points.with_springs(article, grids, up, k)
-
-
-def _mass(article: Assembly) -> float:
-    return mass_properties(article)[0]
-
-
 def _recording(
-    built: Structure, deck: Assembly, outputs: np.ndarray, drive: int, specimen: Specimen,
-    rng: np.random.Generator,
+    built: Structure, article: Article, drive: int, specimen: Specimen, rng: np.random.Generator,
 ) -> FRF:  # fmt: skip
     """Accelerance with noise at the deck's sensor grids."""
     modes = normal_modes(built.system, band=2.5 * specimen.top)
     zeta = 0.007 * np.exp(0.3 * rng.normal(size=len(modes.frequency)))
-    ids = np.array(_same(built.assembly, deck, outputs))
-    at = np.array(_same(built.assembly, deck, np.array([drive])))
+    outputs = article.outputs
+    ids = np.array(article.grids_at(outputs))
+    at = np.array(article.grids_at(np.array([drive])))
     phi_o = built.along(ids, np.tile([0.0, 0, 1], (len(ids), 1))) @ modes.shapes
     phi_i = built.along(at, np.array([[0.0, 0, 1]])) @ modes.shapes
     f = np.arange(4.0, specimen.top, 0.25)

@@ -38,9 +38,7 @@ def scored(answer: Row, truth: Row) -> Row:
 
 def _covered(effect: Row, truth: Row) -> tuple[int, int]:
     """How many intervals hold the truth, of how many whose truth is known."""
-    known = {name: truth.get("value") for name in ("M", "K", "thinning", "gain")}
-    known |= {name: truth.get(name) for name in ("E1", "E2", "G12")}
-    known["R"] = truth.get("radius_m")
+    known = truth.get("parameters", {})
     held = [
         p["low"] <= value <= p["high"]
         for p in effect.get("parameters", [])

@@ -9,18 +9,21 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects import catalogue, points
 from chladni.effects import discretisation as mesh
-from chladni.effects import movable_attachment as somewhere
-from chladni.effects import orthotropic_material as material
 from chladni.effects import sensor_fault as sensors
-from chladni.effects import shell_groups as sheet
 from chladni.effects.effect import Effect
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import gain, ordinary, scatter
+from chladni.effects.orthotropic_material import material_axes
+from chladni.effects.point_mass import PointMass
+from chladni.effects.sensor_mass import sensor_mass
+from chladni.effects.shell_groups import shell_groups
+from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
+from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
-from chladni.model.refine import refined
 from chladni.updating.reduced_model import Reduced, evaluate
 from chladni.updating.reduced_problem import workbench
 from chladni_specimens.plates import plate
@@ -51,54 +54,42 @@ def bench():
 
 @pytest.fixture(scope="module")
 def cases(bench):
-    cloth = bench.sheet
+    groups = bench.groups
     corners = (1, 7, 57, 63)
-    setup = catalogue.Setup(corners, (7, 63), float(cloth.weight.sum()), TOP)
+    setup = Setup(corners, (7, 63), float(groups.weight.sum()), TOP)
+    where = Surroundings(groups, bench.grids, bench.candidates, setup)
     k = bench.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
-    ortho = catalogue.grains(cloth)[0]
+    ortho = material_axes(where)[0]
     over = mesh.mesh_error(bench.structure, TOP)
     own = mesh.jitter(bench.structure, TOP, over)
-    waves = scatter(cloth, "t", 0.03)
+    waves = scatter(groups, "t", 0.03)
     n = len(waves.parameters)
     means = np.array([p.mean for p in ortho.parameters])
     found = {
-        "E": (ordinary(cloth, "E", [0]), [0.07], [0]),
-        "rho": (ordinary(cloth, "rho", [0]), [-0.05], [0]),
-        "t": (ordinary(cloth, "t", [0]), [0.04], [0]),
+        "E": (ordinary(groups, "E", [0]), [0.07], [0]),
+        "rho": (ordinary(groups, "rho", [0]), [-0.05], [0]),
+        "t": (ordinary(groups, "t", [0]), [0.04], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
         "gain": (gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
-        "point-mass": (
-            catalogue.point_mass(cloth, setup, bench.grids, k, 9), [0.2, 0.1, -0.1], [-20, 0, 0],
-        ),
-        "extra-support": (
-            catalogue.extra_support(cloth, setup, bench.grids, k, 9), [-1, 0, 0], [-20, 0, 0],
-        ),
-        "sensor-mass": (catalogue.sensor_mass(cloth, setup)[0], [-0.5], [-20]),
-        "suspension": (catalogue.suspension(cloth, setup, bench.grids)[1], [-0.7], [-20]),
+        "point-mass": (PointMass.near(where, k), [0.2, 0.1, -0.1], [-20, 0, 0]),
+        "extra-support": (ExtraSupport.near(where, k), [-1, 0, 0], [-20, 0, 0]),
+        "sensor-mass": (sensor_mass(where)[0], [-0.5], [-20]),
+        "suspension": (suspension(where)[1], [-0.7], [-20]),
         "thickness-distribution": (
-            thickness_distribution(cloth, 0, 9), local, [-40, *local[1:]],
+            thickness_distribution(groups, 0, 9), local, [-40, *local[1:]],
         ),
         "sensor-fault": (sensors.sensor_fault("7+Z", 1, CHANNELS, 1, 0.4), [0.4], [0]),
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
     return {
-        name: Case(e, np.array(x, float), np.array(idle, float), model_for(bench, e))
+        name: Case(
+            e, np.array(x, float), np.array(idle, float), bench.model_for(e, np.array(x, float))
+        )
         for name, (e, x, idle) in found.items()
     }
-
-
-def model_for(bench, effect: Effect) -> Reduced:
-    """A model whose basis carries the effect's rows, with the components it needs."""
-    if isinstance(effect, material.OrthotropicMaterial):
-        return bench.model.with_components()
-    if isinstance(effect, somewhere.Somewhere):
-        return bench.with_attachments(effect.carried())
-    if isinstance(effect, points.AtPoints):
-        return bench.with_attachments(effect.rows)
-    return bench.model
 
 
 @pytest.fixture(params=NAMES)
@@ -200,7 +191,7 @@ def test_support_between_grids_keeps_its_sum_and_its_place(cases):
 
 def test_scatter_agrees_with_the_same_thickness_in_every_shell(cases, bench):
     case, shells = cases["scatter"], bench.structure.assembly.shells
-    factor = np.exp(case.effect.functions @ case.x)[bench.sheet.group]
+    factor = np.exp(case.effect.functions @ case.x)[bench.groups.group]
     thick = replace(shells, thickness=shells.thickness * factor[:, None])
     got = hertz(evaluate(case.model, [case.effect], case.x, False).lam[FLEXIBLE])
     assert_allclose(got, full(replace(bench.structure.assembly, shells=thick)), rtol=0.003)
@@ -243,7 +234,7 @@ def test_pickles(case):
 def test_can_be_written_as_json(case):
     sd = np.full(len(case.x), 0.1)
     rows = case.effect.reported(case.x, sd)
-    json.dumps([rows, case.effect.settled(case.x), case.effect.where()], allow_nan=False)
+    json.dumps([rows, case.effect.location(case.x), case.effect.where()], allow_nan=False)
     assert all(row["low"] <= row["value"] <= row["high"] for row in rows)
 
 
@@ -255,8 +246,8 @@ def test_reversed_channel_is_reported_with_its_sign(cases):
     assert_allclose(fault.outputs(np.zeros(1)).value[1], 1j * np.pi / np.log(10))
 
 
-def test_sheet_groups_hold_all_of_the_sheet(bench):
-    cloth = sheet.sheet(bench.structure, 16)
-    assert len(cloth) == 16
-    assert_allclose(cloth.area.sum(), 0.12)
-    assert_allclose(cloth.weight.sum(), 7850 * 0.12 * 1.5e-3)
+def test_groups_hold_all_of_the_shells(bench):
+    groups = shell_groups(bench.structure, 16)
+    assert len(groups) == 16
+    assert_allclose(groups.area.sum(), 0.12)
+    assert_allclose(groups.weight.sum(), 7850 * 0.12 * 1.5e-3)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.effects.shell_groups import sheet
+from chladni.effects.shell_groups import shell_groups
 from chladni.effects.thickness_distribution import surface, thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Shells
@@ -14,7 +14,7 @@ from chladni_specimens.plates import folded_panel, plate
 
 @pytest.fixture(scope="module")
 def panel():
-    return sheet(structure(folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3)))
+    return shell_groups(structure(folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3)))
 
 
 def test_a_fold_does_not_end_a_thinning(panel):
@@ -34,13 +34,13 @@ def test_sheets_that_share_no_grid_are_two():
     """A second plate 1.5 mm above the first keeps its thickness."""
     one = plate(0.4, 0.3, 8, 6, 1e-3)
     two = stacked(one, 1.5e-3)
-    cloth = sheet(structure(two))
-    assert len(set(cloth.connected.tolist())) == 2
-    effect = thickness_distribution(cloth, 0, 2)
+    groups = shell_groups(structure(two))
+    assert len(set(groups.connected.tolist())) == 2
+    effect = thickness_distribution(groups, 0, 2)
     shells = two.shells
     changed = effect.apply(two, np.array([1.0, -1.0, 0.0, 0.0])).shells.thickness
     ratio = (changed / shells.thickness).min(axis=1)
-    mine = shells.part == cloth.part[0]
+    mine = shells.part == groups.part[0]
     assert ratio[mine].min() < 0.9
     assert ratio[~mine].min() == 1.0
 
@@ -72,8 +72,8 @@ def test_the_centre_stays_on_a_curved_sheet():
     flat = plate(0.6, 0.6, 24, 24, 1e-3)
     X = flat.points - [0.3, 0.3, 0.0]
     bowl = replace(flat, points=np.c_[X[:, :2], (X[:, :2] ** 2).sum(axis=1)])
-    cloth = sheet(structure(bowl))
-    own = surface(cloth, int(np.argmin((cloth.centre**2).sum(axis=1))), 0.6)
+    groups = shell_groups(structure(bowl))
+    own = surface(groups, int(np.argmin((groups.centre**2).sum(axis=1))), 0.6)
     near = bowl.points[((bowl.points - own.origin) ** 2).sum(axis=1) < 0.1**2]
     u = (near - own.origin) @ own.axes.T
     assert np.array([own.at(v) for v in u]) == pytest.approx(near, abs=1e-3)
@@ -85,7 +85,7 @@ def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     effect = thickness_distribution(panel, group, 1)
     away = (np.array([-0.1, 0.15, 0.0]) - effect.surface.origin) @ effect.surface.axes.T
     x = np.array([0.0, np.log(0.1 / effect.size), *(away / effect.size)])
-    place = np.array(effect.settled(x)["point_m"])
+    place = np.array(effect.location(x)["point_m"])
     depth = effect.reported(x, np.zeros(4))[0]["value"]
     assembly = panel.structure.assembly
     thinnest = (effect.apply(assembly, x).shells.thickness / assembly.shells.thickness).min()

@@ -10,10 +10,8 @@ from chladni.ema.correlation import (
     auto_mac,
     comac,
     deviation,
-    frac,
     mac,
     quality,
-    response_assurance,
     subspace_mac,
     wrapped,
 )
@@ -102,14 +100,6 @@ def test_wrapping_keeps_the_number_the_logarithm_stands_for(re: float, im: float
     w = wrapped(z)
     np.testing.assert_allclose(10**w, 10**z, rtol=1e-10)
     assert abs(w[0].imag) <= np.pi / np.log(10) * (1 + 1e-12)
-
-
-def test_assurance_of_responses() -> None:
-    H = frf(shapes(5, 30, 3)[:, :, None])
-    other = frf(H.values * np.array([1.0, 2.0, -3j])[None, :, None])
-    np.testing.assert_allclose(frac(other, H), 1, atol=1e-12)
-    assert (response_assurance(other, H) < 1).all()
-    np.testing.assert_allclose(response_assurance(frf(2j * H.values), H), 1, atol=1e-12)
 
 
 def test_what_cannot_be_compared_is_refused() -> None:

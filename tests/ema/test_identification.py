@@ -171,7 +171,7 @@ def test_slope_is_the_derivative() -> None:
     H = truth.frf(EVEN, "mobility", 1e-6)
     top = 2 * np.pi * EVEN[-1]
     y, w = H.values.reshape(500, -1), 1 / np.sqrt(H.variance.reshape(500, -1))  # type: ignore[union-attr]
-    data = fitting.Data(2j * np.pi * EVEN / top, y / top, w * top, 1)
+    data = fitting.PoleData(2j * np.pi * EVEN / top, y / top, w * top, 1)
     p = truth.poles / top * (1 + 1e-4)
     _, slope = fitting.solve(data, p, slope=True)
     assert slope is not None
@@ -191,7 +191,7 @@ def test_vector_fitting_finds_poles_from_afar() -> None:
     H = truth.frf(LOG, "receptance", 0.0)
     top = 2 * np.pi * LOG[-1]
     y = H.values.reshape(500, -1)
-    data = fitting.Data(2j * np.pi * LOG / top, y, 1 / np.abs(y), 0)
+    data = fitting.PoleData(2j * np.pi * LOG / top, y, 1 / np.abs(y), 0)
     p = np.linspace(0.15, 0.95, 6) * (-0.01 + 1j)
     for _ in range(15):
         p = fitting.relocated(data, p)

@@ -12,7 +12,7 @@ from chladni.bench.article import Front, measured
 from chladni.cli.diagnose import opened
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
-from chladni.model.refine import _edges
+from chladni.geometry.refine import _edges
 from chladni.updating.diagnosis import diagnose
 from chladni.updating.outcome import effect_entry, judged, scores
 from chladni.updating.preparation import prepare

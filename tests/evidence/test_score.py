@@ -67,7 +67,7 @@ def test_intervals_are_held_against_the_truth_that_is_known():
         {"name": "R", "low": 0.1, "high": 0.2},
         {"name": "other", "low": 0.0, "high": 1.0},
     ]
-    sealed = truth("thickness-distribution", value=0.2, radius_m=0.09, point_m=[0, 0, 0])
+    sealed = truth("thickness-distribution", parameters={"thinning": 0.2, "R": 0.09})
     row = scored(named, sealed)
     assert row["covered"] == (1, 2)
     assert summary([row]).endswith("; intervals hold the truth 1 of 2")

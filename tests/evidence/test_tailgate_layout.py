@@ -10,7 +10,8 @@ import pytest
 
 from chladni import planning as pretest
 from chladni.fem.assemble import structure
-from chladni.fem.locate import locate, rows_at
+from chladni.fem.locate import rows_at
+from chladni.geometry.nearest import ShellSurface
 from chladni.planning import Wishes, plan
 from chladni.planning.drawn_models import drawn, ensemble
 from chladni.planning.whole_plan import recovered, seen_at, target_modes
@@ -79,7 +80,7 @@ def test_the_modes_of_the_real_hem_are_told_apart(robust, plain, size):
     worst = []
     for planned in (robust, plain):
         at = planned.mounts.points[planned.layout]
-        located = locate(article.points, article.shells.nodes, at)
+        located = ShellSurface.whole(article).feet(at)
         assert located.distance.max() < 1e-3
         rows = rows_at(built, located, planned.mounts.directions[planned.layout])
         worst.append(float(alike(rows @ modal.shapes)))

@@ -3,6 +3,7 @@ import pytest
 
 from chladni.errors import ModelError
 from chladni.fem import shell
+from chladni.fem.shell_geometry import to_element
 from chladni.model.assembly import Shells
 
 Q = np.array([[2.3, 0.7, 0.1], [0.7, 1.1, 0.05], [0.1, 0.05, 0.6]]) * 1e11  # fully anisotropic
@@ -57,6 +58,23 @@ def test_only_the_six_rigid_motions_are_free(points, triangle, offset):
     assert np.abs(lam[:6]).max() < 1e-12 * lam[-1]
     assert lam[6] > 1e-7 * lam[-1]
     assert np.abs(K @ rigid(points, geo.nodes[0])[used]).max() < 1e-12 * np.abs(K).max()
+
+
+def test_a_force_hangs_on_its_corner_and_the_two_beside_it():
+    """Rule of NASTRAN-95's QDMM1D: normal forces there balance its couple, none opposite.
+
+    Loads at the nodes are Bᵀ of those at the flattened corners: for each, forces and moments of
+    the six normal forces about the mean plane are those of the force in the plane.
+    """
+    geo, _ = one(WARPED @ rotation().T)
+    B = to_element(geo)[0].reshape(4, 6, 4, 6)[:, :2, :, :3] @ geo.frames[0].T  # element frame
+    n, z = B[..., 2], geo.warp[0]
+    assert np.abs(z).min() > 0.01
+    for i in range(4):
+        assert n[i, :, (i + 2) % 4] == pytest.approx(0, abs=1e-14)
+    assert n.sum(axis=2) == pytest.approx(0, abs=1e-14)
+    couple = np.einsum("iak,kb->iab", n, geo.corners[0])
+    np.testing.assert_allclose(couple, z[:, None, None] * np.eye(2), atol=1e-14)
 
 
 @SHAPES

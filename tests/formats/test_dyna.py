@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from chladni.errors import FileError, ModelError, ShapeError
+from chladni.geometry.formed_mesh import FormedMesh
 from chladni.io.dyna import read_formed, read_keyword, write_keyword
-from chladni.model.formed_mesh import FormedMesh
 from chladni_specimens.mesher.flat_regions import grid
 
 

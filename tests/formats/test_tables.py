@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.setup import Poles
+from chladni.ema.setup import PoleTable
 from chladni.errors import FileError
 from chladni.io.tables.read_tables import read_poles, read_recordings
 from chladni.io.tables.sensor_table import read_sensors
@@ -61,7 +61,7 @@ def test_levels_and_articles_are_recordings_of_their_own(tmp_path: Path) -> None
 
 def test_poles_come_back(tmp_path: Path) -> None:
     nan = np.nan
-    poles = Poles(
+    poles = PoleTable(
         np.array([10.1, 20.2, 9.9]), np.array([0.1, nan, nan]), np.array([nan, 0.01, nan]),
         np.array([1, 2, 1]), ("bare", "bare", "with mass"),
     )  # fmt: skip

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from chladni.geometry.clearance import clearances, gaps
+from chladni.geometry.clearance import all_gaps, gaps, summary
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.joints.builders import spot_welds
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.plates import folded_panel
 from chladni_specimens.tailgate.tailgate import of_sheets
 
@@ -19,9 +19,14 @@ def two(surface_a, surface_b, h=0.01, t=1e-3):
     made, parts = {}, []
     for k, (name, f) in enumerate((("a", surface_a), ("b", surface_b)), start=1):
         points = np.column_stack([plan, f(*plan.T)])
-        made[name] = Sheet(name, points, points, quads, np.full(len(quads), MAIN))
+        made[name] = PressedSheet(name, points, points, quads, np.full(len(quads), MAIN))
         parts.append(Part(k, name, ShellSection(t, STEEL, STEEL)))
     return of_sheets(made, tuple(parts))[0]
+
+
+def clearances(assembly, within=0.010):
+    """What there is to say about every pair of parts."""
+    return [summary(assembly, g) for g in all_gaps(assembly, within=within)]
 
 
 def flat(z):
@@ -35,7 +40,7 @@ def test_plane_sheets():
     assert pair.least == pytest.approx(0.002)
     assert pair.uncertainty == pytest.approx(0, abs=1e-9)
     assert not pair.touching
-    assert clearances(assembly, within=0.002) == ()
+    assert clearances(assembly, within=0.002) == []
 
 
 @pytest.mark.parametrize("h", [0.02, 0.01])

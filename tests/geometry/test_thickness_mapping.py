@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from chladni.errors import AccuracyError, ModelError
+from chladni.geometry.formed_mesh import FormedMesh
 from chladni.geometry.thickness_alignment import Alignment, align, moved, rigid
 from chladni.geometry.thickness_mapping import map_thickness, shell_area, shell_mass
 from chladni.geometry.thickness_prior import learn, predict, with_predicted
-from chladni.model.formed_mesh import FormedMesh
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.formed_thickness import forming_mesh
 from chladni_specimens.tailgate.skin import Skin
@@ -39,7 +39,9 @@ def sheets(*levels, h=0.012):
     made, parts = {}, []
     for k, z in enumerate(levels):
         points = bent(plan, z)
-        made[f"sheet {k}"] = Sheet(f"sheet {k}", points, points, quads, np.full(len(quads), MAIN))
+        made[f"sheet {k}"] = PressedSheet(
+            f"sheet {k}", points, points, quads, np.full(len(quads), MAIN)
+        )
         parts.append(Part(k + 1, f"sheet {k}", ShellSection(0.7e-3, STEEL, STEEL)))
     return of_sheets(made, tuple(parts))[0]
 
@@ -109,7 +111,7 @@ def test_a_wall_does_not_take_the_floor():
     t = np.full(quads.shape, 1.2e-3)
     source = FormedMesh(np.arange(1, len(wall) + 1), wall, quads, np.ones(len(quads), int), t)
     part = Part(1, "floor", ShellSection(0.7e-3, STEEL, STEEL))
-    sheet = Sheet("floor", floor, floor, quads, np.full(len(quads), MAIN))
+    sheet = PressedSheet("floor", floor, floor, quads, np.full(len(quads), MAIN))
     assembly, _ = of_sheets({"floor": sheet}, (part,))
     with pytest.raises(ModelError, match="none of the formed parts"):
         map_thickness(assembly, source)
@@ -126,7 +128,7 @@ def test_beside_a_wall_the_floor_counts():
     source = FormedMesh(ids, np.vstack([floor, rib]), cells, np.ones(len(cells), int), t)
     flat = floor + np.array([0, 0, 0.001])
     part = Part(1, "floor", ShellSection(0.7e-3, STEEL, STEEL))
-    sheet = Sheet("floor", flat, flat, quads, np.full(len(quads), MAIN))
+    sheet = PressedSheet("floor", flat, flat, quads, np.full(len(quads), MAIN))
     assembly, _ = of_sheets({"floor": sheet}, (part,))
     result = map_thickness(assembly, source, pairs={"floor": 1})
     np.testing.assert_allclose(result.assembly.shells.thickness, 0.6e-3)

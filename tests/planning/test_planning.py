@@ -9,10 +9,10 @@ import pytest
 from chladni import planning as pretest
 from chladni.errors import ModelError, ShapeError
 from chladni.fem.assemble import structure
+from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
-from chladni.planning import Wishes, find_places, plan, sensors_csv, summary
-from chladni.planning.sensor_candidates import spread
+from chladni.planning import Wishes, find_sensor_candidates, plan, sensors_csv, summary
 from chladni.planning.whole_plan import target_modes
 from chladni_specimens.plates import box, folded_panel, plate
 
@@ -36,7 +36,7 @@ def found(panel, built):
 
 def test_places_keep_off_edges_and_folds(panel):
     """No place within a foot of the outline of panel or flanges; all grids are of the panel."""
-    places = find_places(panel, 1000, foot=0.015)
+    places = find_sensor_candidates(panel, 1000, foot=0.015)
     x, y, _ = places.points.T
     on_top = np.abs(places.normals[:, 2]) > 0.9
     assert 50 < len(places) < len(panel.points)
@@ -46,7 +46,7 @@ def test_places_keep_off_edges_and_folds(panel):
 
 def test_normals_are_those_of_the_surface():
     """On a flat plate they are the normal, all with the sense of its shells."""
-    places = find_places(plate(0.4, 0.3, 8, 6, 1e-3), 1000)
+    places = find_sensor_candidates(plate(0.4, 0.3, 8, 6, 1e-3), 1000)
     np.testing.assert_allclose(places.normals, np.tile([0, 0, 1.0], (len(places), 1)), atol=1e-12)
     assert len(places) == 7 * 5
     assert np.all(places.side == 1)
@@ -55,7 +55,7 @@ def test_normals_are_those_of_the_surface():
 def test_a_closed_box_is_reached_from_outside_only():
     """The side that can be reached is the one that looks away from the middle."""
     specimen = box()
-    places = find_places(specimen, 500)
+    places = find_sensor_candidates(specimen, 500)
     outward = np.einsum("ij,ij->i", places.normals, places.points - specimen.points.mean(axis=0))
     np.testing.assert_array_equal(places.side, np.sign(outward))
 
@@ -66,12 +66,12 @@ def test_a_covered_sheet_is_not_reachable():
     for gap in (0.02, 0.003):
         upper = replace(lower, points=lower.points + gap * UP)
         both = _joined(lower, upper)
-        places = find_places(both, 500)
+        places = find_sensor_candidates(both, 500)
         assert np.all(places.side == np.where(places.points[:, 2] > gap / 2, 1, -1))
         three = _joined(both, replace(lower, points=lower.points + gap / 2 * UP))
-        middle = find_places(three, 500).points[:, 2]
+        middle = find_sensor_candidates(three, 500).points[:, 2]
         inner = np.abs(middle - gap / 2) < 1e-9
-        assert not inner.any() or find_places(three, 500).points[inner][:, 0].min() < 0.1
+        assert not inner.any() or find_sensor_candidates(three, 500).points[inner][:, 0].min() < 0.1
 
 
 def test_a_sensor_needs_room():
@@ -81,7 +81,7 @@ def test_a_sensor_needs_room():
     strip = replace(strip, points=strip.points + np.array([0.0, 0.146, 0.01]))
     both = _joined(lower, strip)
     for room, below in ((0.03, True), (0.004, False)):
-        places = find_places(both, 500, room=room)
+        places = find_sensor_candidates(both, 500, room=room)
         under = (np.abs(places.points[:, 1] - 0.15) < 0.006) & (places.points[:, 2] == 0)
         assert under.sum() > 5
         assert np.all((places.side[under] == -1) == below)
@@ -109,20 +109,20 @@ def _joined(a, b):
 
 def test_places_do_not_depend_on_the_unit_of_length(panel):
     """A deck in an unknown unit gets a foot in proportion to its size: the same places in mm."""
-    here = find_places(panel, 100, unit="")
+    here = find_sensor_candidates(panel, 100, unit="")
     mm = replace(panel, points=1e3 * panel.points)
-    np.testing.assert_array_equal(find_places(mm, 100, unit="").ids, here.ids)
+    np.testing.assert_array_equal(find_sensor_candidates(mm, 100, unit="").ids, here.ids)
 
 
 def test_a_mesh_of_edges_only_is_refused():
     with pytest.raises(ModelError, match="refine the mesh"):
-        find_places(plate(0.012, 0.012, 1, 1, 1e-3))
+        find_sensor_candidates(plate(0.012, 0.012, 1, 1, 1e-3))
 
 
 def test_a_strip_without_inner_grids_has_places_at_its_centres(tmp_path):
     """One shell across 20 mm: no grid keeps 8 mm off the edge, the middles do."""
     strip = plate(0.4, 0.02, 20, 1, 1e-3)
-    places = find_places(strip, 500)
+    places = find_sensor_candidates(strip, 500)
     assert not places.is_grid.any()
     assert not set(places.ids) & set(strip.ids)
     np.testing.assert_allclose(places.points[:, 1], 0.01)
@@ -137,7 +137,7 @@ def test_a_strip_without_inner_grids_has_places_at_its_centres(tmp_path):
 
 def test_a_wide_sheet_has_places_at_grids(panel):
     """Where a corner of a shell will do its centre is not offered."""
-    places = find_places(panel, 1000)
+    places = find_sensor_candidates(panel, 1000)
     corners = {int(g) for g in places.ids[places.is_grid]}
     rows = places.nodes[~places.is_grid]
     assert not any(corners & set(panel.ids[r].tolist()) for r in rows)
@@ -163,7 +163,7 @@ def test_shakers_are_vetoed_by_rattle_and_access(found):
 def test_spread_covers():
     """Every point is within the distance of the last one chosen (Gonzalez)."""
     points = np.random.default_rng(0).uniform(size=(200, 2))
-    order = spread(points, 20)
+    order = farthest_point_sample(points, 20)
     assert len(set(order)) == 20
     nearest = np.linalg.norm(points[:, None] - points[order], axis=2).min(axis=1)
     before = np.linalg.norm(points[order[-1]] - points[order[:-1]], axis=1).min()

@@ -7,7 +7,7 @@ from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni.planning import rattle_margin
 from chladni.planning.rattle import first_rattle, openings
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.tailgate import of_sheets
 
 STEEL = Isotropic(210e9, 0.3, 7850.0)
@@ -20,7 +20,7 @@ def sheets(*heights, t=1e-3):
     made, parts = {}, []
     for k, z in enumerate(heights, start=1):
         points = np.column_stack([plan, np.full(len(plan), z)])
-        made[f"s{k}"] = Sheet(f"s{k}", points, points, quads, np.full(len(quads), MAIN))
+        made[f"s{k}"] = PressedSheet(f"s{k}", points, points, quads, np.full(len(quads), MAIN))
         parts.append(Part(k, f"s{k}", ShellSection(t, STEEL, STEEL)))
     return of_sheets(made, tuple(parts))[0]
 

@@ -10,8 +10,8 @@ from tests.specimens.test_connections import STEEL, sheet
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
+from chladni.geometry.refine import _edges
 from chladni.model.properties import Isotropic, Part, ShellSection
-from chladni.model.refine import _edges
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import of_sheets, tailgate

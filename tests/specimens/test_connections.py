@@ -8,13 +8,13 @@ from chladni.errors import LabelError, ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.geometry.mesh_quality import check_mesh
-from chladni.geometry.nearest import Surface, barycentric_foot
+from chladni.geometry.nearest import ShellSurface, barycentric_foot
 from chladni.model.assembly import Assembly
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni_specimens.joints.bolts import accelerometers, grip, hem, screw, tied_hole
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds
 from chladni_specimens.mesher.flat_regions import grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.tailgate import of_sheets
 
 STEEL = Isotropic(210e9, 0.3, 7850.0)
@@ -24,7 +24,7 @@ GAP = 0.0015
 def sheet(name, x, y, z):
     plan, quads = grid(x, y)
     points = np.column_stack([plan, np.full(len(plan), z)])
-    return Sheet(name, points, points, quads, np.full(len(quads), MAIN))
+    return PressedSheet(name, points, points, quads, np.full(len(quads), MAIN))
 
 
 def pair(h=0.010, gap=GAP, length=0.2, width=0.06):
@@ -183,7 +183,7 @@ def test_nearest_shell_is_not_the_nearest_centre():
     """A long shell beside short ones: its centre is far, its face is not."""
     x = np.r_[0.0, np.linspace(0.5, 0.6, 21)]
     points, quads = grid(x, np.array([0.0, 0.004]))
-    surface = Surface.over("s", np.column_stack([points, 0 * points[:, 0]]), quads)
+    surface = ShellSurface.over("s", np.column_stack([points, 0 * points[:, 0]]), quads)
     feet = surface.feet(np.array([(0.48, 0.002, 0.001)]))
     assert feet.shell[0] == 0
     assert feet.distance[0] == pytest.approx(0.001)
@@ -194,7 +194,7 @@ def test_patch_tends_to_the_disc():
     for h in (0.004, 0.002, 0.001):
         n = round(0.06 / h)
         points, quads = grid(np.linspace(0, 0.06, n + 1), np.linspace(0, 0.06, n + 1))
-        surface = Surface.over("s", np.column_stack([points, 0 * points[:, 0]]), quads)
+        surface = ShellSurface.over("s", np.column_stack([points, 0 * points[:, 0]]), quads)
         centre = np.array([0.0303, 0.0297, 0.0])
         nodes, weight = surface.patch(centre, 0.006)
         assert weight.sum() == pytest.approx(1)

@@ -5,10 +5,10 @@ import pytest
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
-from chladni.geometry.nearest import Surface
+from chladni.geometry.nearest import ShellSurface
 from chladni_specimens.joints.bolts import free_edges, rim
 from chladni_specimens.mesher.flat_regions import fill, grid
-from chladni_specimens.mesher.pressed_sheets import MAIN, Sheet
+from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.mesher.round_holes import bored
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate_specimen
@@ -26,7 +26,7 @@ def space(plan):
 
 def sheet(points, quads):
     plan = np.column_stack([points, 0 * points[:, 0]])
-    return Sheet("sheet", plan, space(plan), quads, np.full(len(quads), MAIN))
+    return PressedSheet("sheet", plan, space(plan), quads, np.full(len(quads), MAIN))
 
 
 def lattice(h):
@@ -48,7 +48,7 @@ def test_a_hole_takes_its_area_and_nothing_else(h, area):
     assert euler(made) == euler(whole) - 1
     assert whole.area.sum() - made.area.sum() == pytest.approx(area, rel=1e-12)
     assert np.linalg.norm(centre - place) < min(1.8 * R, h / np.sqrt(2))
-    ring = rim(Surface.over("sheet", made.points, made.quads), np.r_[place, 0], 0.006)
+    ring = rim(ShellSurface.over("sheet", made.points, made.quads), np.r_[place, 0], 0.006)
     assert len(ring) == (4 if h > 0.02 else 8)
     np.testing.assert_allclose(made.points[ring].mean(axis=0)[:2], centre, atol=1e-12)
     x = made.points[made.quads]

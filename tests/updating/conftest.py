@@ -27,5 +27,5 @@ def responses(bench):
     use = np.ones((40, 4), bool)
     use[5:9, 1] = False
     empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).over(bench.model)
-    stiffer = evaluate(bench.model, [ordinary(bench.sheet, "E", [0])], np.array([0.04]))
+    stiffer = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.04]))
     return replace(empty, values=empty.model(stiffer))

@@ -5,8 +5,11 @@ import pytest
 import scipy.linalg as sl
 from numpy.testing import assert_allclose
 
-from chladni.effects import catalogue
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import ordinary
+from chladni.effects.point_mass import PointMass
+from chladni.effects.sensor_mass import sensor_mass
+from chladni.effects.surroundings import Setup, Surroundings
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy, products
@@ -26,21 +29,20 @@ def bench():
 @pytest.fixture(scope="module")
 def changes(bench):
     """Effect and x of each kind of change."""
-    cloth = bench.sheet
+    groups = bench.groups
     sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
-    setup = catalogue.Setup(sensors, (), float(cloth.weight.sum()), TOP)
+    setup = Setup(sensors, (), float(groups.weight.sum()), TOP)
+    where = Surroundings(groups, bench.grids, bench.candidates, setup)
     k = bench.grids.position(int(bench.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0])
     return {
-        "thickness": (ordinary(cloth, "t", [0]), np.array([0.2])),
-        "thinner": (ordinary(cloth, "t", [1]), np.array([-0.2])),
-        "stiffer": (ordinary(cloth, "E", [0]), np.array([0.5])),
-        "thinning": (thickness_distribution(cloth, 0, 1), start),
-        "mass": (catalogue.point_mass(cloth, setup, bench.grids, k, 1), np.array([1.0, 0.2, 0.1])),
-        "masses": (catalogue.sensor_mass(cloth, setup)[0], np.array([0.5])),
-        "spring": (
-            catalogue.extra_support(cloth, setup, bench.grids, k, 1), np.array([2.0, 0.1, 0.2]),
-        ),
+        "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
+        "thinner": (ordinary(groups, "t", [1]), np.array([-0.2])),
+        "stiffer": (ordinary(groups, "E", [0]), np.array([0.5])),
+        "thinning": (thickness_distribution(groups, 0, 1), start),
+        "mass": (PointMass.near(where, k), np.array([1.0, 0.2, 0.1])),
+        "masses": (sensor_mass(where)[0], np.array([0.5])),
+        "spring": (ExtraSupport.near(where, k), np.array([2.0, 0.1, 0.2])),
     }  # fmt: skip
 
 
@@ -102,7 +104,7 @@ def test_attachments_of_the_place_make_a_mass_accurate(bench, changes):
     """What Search.trial adds to the basis is what the estimate asks for."""
     for name in ("mass", "spring"):
         effect, x = changes[name]
-        with_them = bench.with_attachments(effect.carried())
+        with_them = bench.model_for(effect, x)
         bare = accuracy(bench, bench.model, [effect], x, TOP)
         carried = accuracy(bench, with_them, [effect], x, TOP)
         assert carried.worst < 0.1 * bare.worst

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.catalogue import Setup, extra_support, point_mass
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import gain, ordinary
+from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
+from chladni.effects.surroundings import Setup, Surroundings
 from chladni.updating.likelihood import Poles
 from chladni.updating.reduced_model import evaluate
 
@@ -16,11 +18,11 @@ from chladni.updating.reduced_model import evaluate
 @pytest.fixture(scope="module")
 def effects(bench):
     setup = Setup((1, 63), (7,), 1.41, 200.0)
+    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup)
     spot = bench.grids.position(26)
     return [
-        ordinary(bench.sheet, "E", [0]), ordinary(bench.sheet, "t", [0]),
-        point_mass(bench.sheet, setup, bench.grids, spot, 1),
-        extra_support(bench.sheet, setup, bench.grids, spot + 12, 1),
+        ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "t", [0]),
+        PointMass.near(where, spot), ExtraSupport.near(where, spot + 12),
         gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
     ]  # fmt: skip
 
@@ -30,7 +32,7 @@ X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.15, -0.3])
 
 @pytest.fixture(scope="module")
 def poles(bench):
-    state = evaluate(bench.model, [ordinary(bench.sheet, "E", [0])], np.array([0.004]), False)
+    state = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.004]), False)
     f = np.sqrt(state.lam[6:11]) / (2 * np.pi)
     every = np.ones(5, bool)
     return Poles(f, np.full(5, 1e-3), every, np.ones(5), (20.0, 1.01 * f[-1]))
@@ -64,12 +66,12 @@ def test_slopes_of_other_quantities(bench, responses, quantity, effects):
 
 
 def test_slopes_of_poles(bench, poles):
-    pair = [ordinary(bench.sheet, q, [0]) for q in ("E", "rho")]
+    pair = [ordinary(bench.groups, q, [0]) for q in ("E", "rho")]
     check_slopes(poles, bench.model, pair, np.array([0.002, -0.001]))
 
 
 def test_nothing_is_left_at_the_truth(bench, responses, poles):
-    stiffer = [ordinary(bench.sheet, "E", [0])]
+    stiffer = [ordinary(bench.groups, "E", [0])]
     r, _ = responses.residual(evaluate(bench.model, stiffer, np.array([0.04])), True)
     assert_allclose(r, 0, atol=1e-8)
     assert len(r) == 2 * 2 * responses.use.sum()
@@ -78,14 +80,14 @@ def test_nothing_is_left_at_the_truth(bench, responses, poles):
 
 
 def test_a_gain_is_its_logarithm_on_every_line(bench, responses):
-    stiffer, level = ordinary(bench.sheet, "E", [0]), gain(4, 0.5)
+    stiffer, level = ordinary(bench.groups, "E", [0]), gain(4, 0.5)
     state = evaluate(bench.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
     assert_allclose(responses.deviation(state), np.log10(2.0), atol=1e-9)
 
 
 def test_a_reversed_channel_is_half_a_turn_on_that_channel(bench, responses):
     wrong = sensor_fault("x", 2, 4, -1, 0.0)
-    state = evaluate(bench.model, [ordinary(bench.sheet, "E", [0]), wrong], np.array([0.04, 0.0]))
+    state = evaluate(bench.model, [ordinary(bench.groups, "E", [0]), wrong], np.array([0.04, 0.0]))
     turn = np.abs(responses.deviation(state).imag) * np.log(10)
     assert_allclose(turn[:, 2], np.pi, atol=1e-8)
     assert_allclose(turn[:, [0, 1, 3]], 0, atol=1e-8)
@@ -93,7 +95,7 @@ def test_a_reversed_channel_is_half_a_turn_on_that_channel(bench, responses):
 
 def test_stiffness_scales_every_frequency_by_its_root(bench, poles):
     """ln f = ln E / 2, seen through the pairing."""
-    stiffer = [ordinary(bench.sheet, "E", [0])]
+    stiffer = [ordinary(bench.groups, "E", [0])]
     state = evaluate(bench.model, stiffer, np.array([0.004 + 0.01]))
     delta, test, model = poles.deviation(state)
     assert test.tolist() == [0, 1, 2, 3, 4]

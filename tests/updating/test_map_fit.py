@@ -50,12 +50,12 @@ def model():
     return workbench(plate(0.4, 0.3, 3, 2, 1.5e-3), 100.0).model
 
 
-def linear(A, w, places=1, which=slice(None)):
+def linear(A, w, trials_factor=1, which=slice(None)):
     unknown = tuple(
         Parameter(f"x{k}", "-", m, s, kind="linear", step=100.0)
         for k, (m, s) in enumerate(zip(MEAN[which], SD[which], strict=True))
     )
-    return Linear(unknown, "a toy", places=places, A=A[:, which], w=w[which])
+    return Linear(unknown, "a toy", trials_factor=trials_factor, A=A[:, which], w=w[which])
 
 
 def problem(seed):
@@ -76,7 +76,7 @@ def exact(A, y, sd, mean, prior):
 @pytest.mark.parametrize("weighed", [False, True])
 def test_evidence_mean_and_covariance_are_exact(model, seed, weighed):
     A, w, y = problem(seed)
-    plain = model.sheet.weight.sum()
+    plain = model.groups.weight.sum()
     weighing = Weighing(plain + 0.4, 0.05) if weighed else None
     found = fit(model, [linear(A, w)], Offsets(y), weighing, np.zeros(3), **EXACT)
     rows = np.vstack([A, w]) if weighed else A

@@ -57,7 +57,7 @@ def test_grown_model_is_the_model_of_the_grown_basis(bench, split):
     model = bench.model.with_components() if split else bench.model
     vectors = np.random.default_rng(3).normal(size=(len(model.basis), 4))
     grown = model.extended(vectors)
-    direct = reduce(bench.sheet, grown.basis)
+    direct = reduce(bench.groups, grown.basis)
     direct = direct.with_components() if split else direct
     assert grown.basis.shape[1] == model.basis.shape[1] + 4
     assert grown.linear.keys() == direct.linear.keys()

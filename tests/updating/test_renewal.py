@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.effects.effect import Effect
 from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
 
@@ -12,7 +13,7 @@ from chladni.updating.accuracy import Accuracy
 def a_trial():
     fit = SimpleNamespace(effects=(), x=np.zeros(0))
     data = SimpleNamespace(over=lambda model: model)
-    return SimpleNamespace(effect=object(), fit=fit, model="narrow", data=data)
+    return SimpleNamespace(effect=Effect(), fit=fit, model="narrow", data=data)
 
 
 @pytest.mark.parametrize(("error", "model"), [(4e-4, "narrow"), (2e-3, "wide")])

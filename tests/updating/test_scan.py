@@ -29,7 +29,7 @@ class Weight(AtPoints):
 
 @pytest.fixture(scope="module")
 def base(bench, responses):
-    effects = [ordinary(bench.sheet, q, [0]) for q in ("E", "rho")]
+    effects = [ordinary(bench.groups, q, [0]) for q in ("E", "rho")]
     return baseline(bench.model, effects, responses, WEIGHED, np.array([0.02, -0.03]))
 
 
@@ -92,7 +92,7 @@ def test_score_has_the_base_profiled_out(base):
 
 def test_slopes_of_all_groups_together_are_the_slope_of_t(bench, responses, base):
     slopes = thickness_slopes(base, bench.model, responses)
-    whole = ordinary(bench.sheet, "t", [0])
+    whole = ordinary(bench.groups, "t", [0])
     state = evaluate(bench.model, [*base.effects, whole], np.append(base.x, 0.0))
     _, J = responses.residual(state, True)
     expected = np.append(J[:, -1], state.dweight[-1] / WEIGHED.sd)

@@ -19,8 +19,8 @@ from chladni.updating.reduced_model import evaluate
 
 @pytest.fixture(scope="module")
 def trial(bench, responses):
-    effect = thickness_distribution(bench.sheet, 0, 1)
-    effects = [ordinary(bench.sheet, "E", [0]), scatter(bench.sheet, "t", 0.05), effect]
+    effect = thickness_distribution(bench.groups, 0, 1)
+    effects = [ordinary(bench.groups, "E", [0]), scatter(bench.groups, "t", 0.05), effect]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
     data = responses.over(bench.model)
     return Trial(effect, fit(bench.model, effects, data, None, start), bench.model)

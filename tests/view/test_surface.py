@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from tests.specimens.test_calculix import WELDS, coupon
 
 from chladni.errors import ShapeError
+from chladni.geometry.solid_faces import skin
 from chladni.model.assembly import Assembly, Solids
 from chladni.view.camera import best_view, needed_views, visible
-from chladni.view.surface import Surface, skin, surface
+from chladni.view.surface import Surface, surface
 from chladni_specimens.joints.builders import spot_welds
 from chladni_specimens.plates import box, folded_panel, plate
 

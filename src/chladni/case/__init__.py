@@ -3,4 +3,3 @@
 from .load import Case as Case
 from .load import FreeParameter as FreeParameter
 from .load import load_case as load_case
-from .sensor_places import Places as Places

@@ -13,25 +13,19 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
+from ..effects.registry import names
 from ..ema.setup import Recording, TestSetup
 from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..units import UNITS, Units
-from .sensor_places import Places, grid_row, places
-from .toml_sections import KeyFile, Section, read_keys
+from .sensor_places import grid_row, places
+from .toml_sections import KeyFile, TomlSection, read_keys
 
 FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
-EFFECTS = (
-    *("global-stiffness", "global-density", "part-stiffness", "stiffness-patch"),
-    *("thickness-scale", "thickness-distribution", "orthotropic-material", "membrane-prestress"),
-    *("adhesive-stiffness", "viscoelastic-joint", "hem-contact", "weld-missing"),
-    *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
-    *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
-    *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault"),
-)
 _TABLES = ("model", "test", "band", "held_out", "parameter")
 _TEST = ("recordings", "quantity", "gain", "sensors", "mass", "mass_sd", "hangers")
 _MASS_SD = 0.002  # of the mass, where the user gives none
@@ -57,7 +51,7 @@ class Case:
     damping : float           fraction of critical the model is given, where nothing else says
     recordings : tuple        one per file, article and level; FRFs share labels and quantity
     setup : TestSetup         sensors as the user describes them, hangers, weighed mass
-    outputs, inputs : Places  of the FRFs' dofs, in the FRFs' order
+    outputs, inputs : MeasuredDofs  of the FRFs' dofs, in the FRFs' order
     band : (low, high) or None   to fit [Hz]; None: all
     exclude : bands left out [Hz]
     held_sensors : int, labels or None   None: chosen automatically
@@ -74,8 +68,8 @@ class Case:
     damping: float | None
     recordings: tuple[Recording, ...]
     setup: TestSetup
-    outputs: Places
-    inputs: Places
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
     band: tuple[float, float] | None = None
     exclude: tuple[tuple[float, float], ...] = ()
     held_sensors: int | tuple[str, ...] | None = None
@@ -140,7 +134,7 @@ def load_case(path: str | Path) -> Case:
     )
 
 
-def _file(section: Section, key: str, name: str) -> Path:
+def _file(section: TomlSection, key: str, name: str) -> Path:
     """A file the case names, beside it."""
     path = section.file.parent / name
     if not path.is_file():
@@ -151,7 +145,7 @@ def _file(section: Section, key: str, name: str) -> Path:
     return path
 
 
-def _recordings(test: Section) -> tuple[Recording, ...]:
+def _recordings(test: TomlSection) -> tuple[Recording, ...]:
     """All recordings, the FRFs with the labels of the first in its order."""
     quantity = test.text("quantity", among=get_args(Quantity))
     read: list[Recording] = []
@@ -161,7 +155,7 @@ def _recordings(test: Section) -> tuple[Recording, ...]:
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in read)
 
 
-def _like(first: Recording, other: Recording, test: Section) -> Recording:
+def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
     """The recording with the labels of the first, in its order."""
     a, b = first.frf, other.frf
     assert a is not None
@@ -180,7 +174,7 @@ def _like(first: Recording, other: Recording, test: Section) -> Recording:
     return replace(other, frf=b.sel(a.outputs, a.inputs))
 
 
-def _setup(test: Section, made: Assembly) -> TestSetup:
+def _setup(test: TomlSection, made: Assembly) -> TestSetup:
     """Sensors, hangers and weighing as the user gives them."""
     name = test.text("sensors")
     sensors = read_sensors(_file(test, "sensors", name)) if name else ()
@@ -209,7 +203,7 @@ def _bands(
 
 
 def _inside(
-    section: Section,
+    section: TomlSection,
     key: str,
     band: tuple[float, float],
     recordings: Sequence[Recording],
@@ -260,9 +254,9 @@ def _held(
 _PARAMETER = ("name", "parts", "field")
 
 
-def _parameter(section: Section, made: Assembly) -> FreeParameter:
+def _parameter(section: TomlSection, made: Assembly) -> FreeParameter:
     """A parameter the user frees."""
-    what = section.text("field", due=True, among=(*FIELDS, *EFFECTS)) or ""
+    what = section.text("field", due=True, among=(*FIELDS, *names())) or ""
     parts: list[str] = []
     given = section.values.get("parts", [])
     for name in given if isinstance(given, list) else [given]:

@@ -1,53 +1,28 @@
 """Where the dofs of recordings are on the structure: grids, places on shells, the base."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..ema.setup import Role, Sensor, TestSetup
 from ..errors import LabelError
+from ..fem.measured_dofs import MeasuredDofs
+from ..geometry.grid_normals import grid_normals
+from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
-from .toml_sections import Section
+from .toml_sections import TomlSection
 
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
 
 
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Where dofs of the recordings are on the structure.
-
-    Attributes
-    ----------
-    labels : (k,) text
-    grids : (k,) int       id, 0 where the place is no grid
-    points : (k, 3)        [m], basic frame; nan for the motion of the base
-    directions : (k, 3)    unit vectors, basic frame
-    sd : (k,)              uncertainty of the place [m]
-    mass : (k,)            of the sensor [kg]
-    """
-
-    labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    sd: np.ndarray
-    mass: np.ndarray
-
-    @property
-    def base(self) -> np.ndarray:
-        """True where the dof is the enforced motion of the supports (k,)."""
-        return np.isnan(self.points[:, 0])
-
-
 def places(
-    test: Section, setup: TestSetup, made: Assembly, labels: Sequence[str], role: Role
-) -> Places:
+    test: TomlSection, setup: TestSetup, made: Assembly, labels: Sequence[str], role: Role
+) -> MeasuredDofs:
     """Every label of the recording on the structure."""
     known = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
     rows = [_place(test, known.get(label), label, made) for label in labels]
-    return Places(
+    return MeasuredDofs(
         labels=tuple(labels),
         grids=np.array([r[0] for r in rows], dtype=np.int64),
         points=np.array([r[1] for r in rows]).reshape(-1, 3),
@@ -57,7 +32,7 @@ def places(
     )
 
 
-def _spoken(label: str, test: Section) -> Sensor:
+def _spoken(label: str, test: TomlSection) -> Sensor:
     """What a label says by itself: node and direction."""
     where = test.at("recordings")
     node = label.partition(":")[0].strip()
@@ -68,7 +43,7 @@ def _spoken(label: str, test: Section) -> Sensor:
 
 
 def _place(
-    test: Section, given: Sensor | None, label: str, made: Assembly
+    test: TomlSection, given: Sensor | None, label: str, made: Assembly
 ) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
     """(grid or 0, place, direction, sensor) of one dof; None given: what the label says.
 
@@ -108,9 +83,7 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
             int(made.ids[row]),
         )
     else:
-        from ..fem.locate import locate
-
-        found = locate(made.points, made.shells.nodes, place[None])
+        found = ShellSurface.whole(made).feet(place)
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(
@@ -124,14 +97,11 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
 
 
 def _normal(made: Assembly, row: int, where: str) -> np.ndarray:
-    """Unit normal of the shells around a grid, all counted on the side of the first."""
-    around = made.shells.nodes[(made.shells.nodes == row).any(axis=1)]
-    if len(around) == 0:
+    """Unit normal of the surface at a grid (3,)."""
+    normal = grid_normals(made, np.array([row]))[0]
+    if not normal.any():
         raise LabelError(f"{where}: the grid is on no shell, so it has no normal; give +X, +Y, +Z")
-    X = made.points[around]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    n = n * np.where(n @ n[0] < 0, -1.0, 1.0)[:, None]
-    return np.asarray(n.sum(axis=0) / np.linalg.norm(n.sum(axis=0)))
+    return normal
 
 
 def grid_row(made: Assembly, grid: int, where: str) -> int:

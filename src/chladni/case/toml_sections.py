@@ -12,7 +12,7 @@ from ..errors import FileError
 
 
 @dataclass(frozen=True)
-class Section:
+class TomlSection:
     """A table of the file.
 
     Attributes
@@ -117,20 +117,20 @@ class KeyFile:
     """A parsed file: its tables, single or repeated."""
 
     path: Path
-    tables: dict[str, list[Section]]
+    tables: dict[str, list[TomlSection]]
 
-    def section(self, name: str, known: Sequence[str], due: bool = False) -> Section:
+    def section(self, name: str, known: Sequence[str], due: bool = False) -> TomlSection:
         """The one table of this name; empty where the file has none."""
         found = self.tables.get(name, [])
         if not found and due:
             raise FileError(f"{self.path.name} needs a section [{name}]")
         if len(found) > 1:
             raise FileError(f"{self.path.name}, line {found[1].line}: [{name}] occurs twice")
-        section = found[0] if found else Section(self.path, name, {}, {}, 1)
+        section = found[0] if found else TomlSection(self.path, name, {}, {}, 1)
         section.only(known)
         return section
 
-    def sections(self, name: str, known: Sequence[str]) -> list[Section]:
+    def sections(self, name: str, known: Sequence[str]) -> list[TomlSection]:
         """Every [[name]]."""
         found = self.tables.get(name, [])
         for section in found:
@@ -171,7 +171,7 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
         if not all(isinstance(item, dict) for item in items):
             raise FileError(f"{path.name}, line {where[0]}: write [{name}] on a line of its own")
         tables[name] = [
-            Section(path, name, item, {k: lines.get((name, n, k), 1) for k in item}, line)
+            TomlSection(path, name, item, {k: lines.get((name, n, k), 1) for k in item}, line)
             for n, (item, line) in enumerate(zip(items, where * len(items), strict=False))
         ]
     return KeyFile(path, tables)

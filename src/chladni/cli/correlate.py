@@ -13,11 +13,11 @@ from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
 from ..ema.identification import Identified, identify
-from ..ema.mode_pairing import Pairs, pair
+from ..ema.mode_pairing import ModePairs, pair
 from ..errors import ChladniError, FileError
 from ..report.blocks import Block, Facts, Picture, Table
 from ..report.words import number, percent
-from ..workflows.case_model import DAMPING, markers, model_frf, rows
+from ..workflows.case_model import DAMPING, markers, model_frf
 from ..workflows.loaded_model import Model, is_case
 from .frf import REACH
 from .identify import firm
@@ -37,7 +37,7 @@ class Correlation:
     f_test: np.ndarray
     f_model: np.ndarray
     mac: np.ndarray | None  # (model, test)
-    pairs: Pairs
+    pairs: ModePairs
     comac: np.ndarray | None
     quality: Quality | None
     model: FRF | None
@@ -85,7 +85,7 @@ def correlated(job: Run, case: Case, model: Model) -> Correlation:
     job.progress("modes of the test", 0.4)
     found = identify(test, case.band, use=case.lines(test.frequency))
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
-    phi = rows(case.outputs, model.structure) @ near.shapes
+    phi = case.outputs.rows(model.structure) @ near.shapes
     psi = _shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)

@@ -8,7 +8,7 @@ import typer
 
 from ..dynamics.frf import FRF, UNIT
 from ..ema.identification import Identified, evaluate, identify
-from ..ema.setup import Poles, Recording
+from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
 from ..io.tables.write_tables import write_poles
 from ..report.blocks import Block, Picture, Table
@@ -92,10 +92,12 @@ def firm(modal: Identified) -> np.ndarray:
     return np.asarray(known & (modal.damping_sd < 0.5 * modal.damping))
 
 
-def _poles(modal: Identified) -> Poles:
+def _poles(modal: Identified) -> PoleTable:
     modal = modal.sel(firm(modal))
     r = len(modal.poles)
-    return Poles(modal.frequency, modal.frequency_sd, modal.damping, np.arange(1, r + 1), ("",) * r)
+    return PoleTable(
+        modal.frequency, modal.frequency_sd, modal.damping, np.arange(1, r + 1), ("",) * r
+    )
 
 
 def _table(modal: Identified) -> Table:

@@ -15,13 +15,13 @@ from chladni_specimens.plates import box, folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.formed_thickness import forming_mesh
 from chladni_specimens.tailgate.skin import Skin
-from chladni_specimens.tailgate.tailgate import Specimen, tailgate_specimen
+from chladni_specimens.tailgate.tailgate import FormedSpecimen, tailgate_specimen
 
 from ..errors import ChladniError, FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
+from ..geometry.formed_mesh import FormedMesh
 from ..geometry.thickness_mapping import Mapped
 from ..model.assembly import Assembly
-from ..model.formed_mesh import FormedMesh
 from ..output import write_text
 from ..report.blocks import Facts, Picture
 from ..report.words import number
@@ -30,7 +30,7 @@ from ..workflows.loaded_model import on_faces
 from .run import Out, Run, started
 
 if TYPE_CHECKING:
-    from ..planning import Places
+    from ..planning import SensorCandidates
 
 
 def run(
@@ -66,14 +66,14 @@ def run(
         _page(job, specimen, mapped)
 
 
-def _page(job: Run, specimen: Specimen, mapped: Mapped | None) -> None:
+def _page(job: Run, specimen: FormedSpecimen, mapped: Mapped | None) -> None:
     from ..geometry.mesh_quality import check_mesh
-    from ..planning import find_places
+    from ..planning import find_sensor_candidates
     from ..view import scene
     from ..view.surface import surface
 
     made = specimen.assembly
-    places, check = find_places(made), check_mesh(made)
+    places, check = find_sensor_candidates(made), check_mesh(made)
     joints = Counter(j.kind for j in specimen.joints)
     write_text(job.keep("candidates.csv", "where sensors could sit"), _candidates(places))
     after = mapped.assembly if mapped else made
@@ -123,14 +123,14 @@ def _setting(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
 
 
-def _builder(name: str) -> Callable[[float | None, dict[str, Any]], Specimen]:
+def _builder(name: str) -> Callable[[float | None, dict[str, Any]], FormedSpecimen]:
     known = {"tailgate": _tailgate, "panel": _panel, "box": _box, "plate": _plate}
     if name not in known:
         raise LabelError(f"no specimen {name!r}; there are {', '.join(known)}")
     return known[name]
 
 
-def _tailgate(size: float | None, values: dict[str, Any]) -> Specimen:
+def _tailgate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
     return tailgate_specimen(_made(TailgateDesign, _sized("size", size, values)))
 
 
@@ -139,19 +139,19 @@ _FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
 }
 
 
-def _bare(assembly: Assembly) -> Specimen:
-    return Specimen(assembly, {}, {}, ())
+def _bare(assembly: Assembly) -> FormedSpecimen:
+    return FormedSpecimen(assembly, {}, {}, ())
 
 
-def _panel(size: float | None, values: dict[str, Any]) -> Specimen:
+def _panel(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
     return _bare(_made(folded_panel, _sized("h", size, values)))
 
 
-def _box(size: float | None, values: dict[str, Any]) -> Specimen:
+def _box(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
     return _bare(_made(box, _sized("h", size, values)))
 
 
-def _plate(size: float | None, values: dict[str, Any]) -> Specimen:
+def _plate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
     """500 x 400 x 1.2 mm unless told."""
     given = {"length": 0.5, "width": 0.4, "t": 1.2e-3, **values}
     h = 0.025 if size is None else 1e-3 * size
@@ -192,7 +192,7 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
         raise ModelError(f"a setting has the wrong kind of value: {error}") from error
 
 
-def _candidates(places: "Places") -> str:
+def _candidates(places: "SensorCandidates") -> str:
     rows = (
         f"{g}:n,{f'{g},,,' if is_grid else ',{:.7g},{:.7g},{:.7g}'.format(*x)},"
         f"{n[0]:.6f},{n[1]:.6f},{n[2]:.6f},output"

@@ -21,15 +21,16 @@ def run(
     out: Out = None,
 ) -> None:
     """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
-    from chladni_evidence.concealed import EFFECTS, SPECIMENS
+    from chladni_evidence.concealed import SPECIMENS, concealable
     from chladni_evidence.score import confusion, summary
 
     first, _, last = seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal()):
         raise LabelError(f"seeds {seeds!r} are no range; write 100-109")
-    chosen = [e for e in effects.split(",") if e] or list(EFFECTS)
-    if unknown := sorted(set(chosen) - set(EFFECTS)):
-        raise LabelError(f"no effect {unknown}; there are {', '.join(EFFECTS)}")
+    known = concealable()
+    chosen = [e for e in effects.split(",") if e] or list(known)
+    if unknown := sorted(set(chosen) - set(known)):
+        raise LabelError(f"no effect {unknown}; there are {', '.join(known)}")
     names = [s for s in structures.split(",") if s]
     if unknown := sorted(set(names) - set(SPECIMENS)):
         raise LabelError(f"no structure {unknown}; there are {', '.join(SPECIMENS)}")

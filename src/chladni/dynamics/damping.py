@@ -73,20 +73,3 @@ def modal_damping(system: System, modal: ModalModel) -> tuple[np.ndarray, np.nda
     With unit modal masses this is M X diag(2 ζ ω m) Xᵀ M (Abrahamsson and Kammer 2015, 26.14).
     """
     return system.M @ modal.shapes, 2 * modal.damping * 2 * np.pi * modal.frequency
-
-
-def with_modal_damping(system: System, modal: ModalModel) -> System:
-    """The system with V = M Φ diag(2 ζ ω) Φᵀ M, a full matrix: for small systems."""
-    U, d = modal_damping(system, modal)
-    return replace(system, V=sp.csr_array((U * d) @ U.T))
-
-
-def equalised_poles(poles: np.ndarray, zeta: float) -> np.ndarray:
-    """|p| (-ζ₀ ± i √(1 - ζ₀²)) for each pole p: undamped frequency kept, damping ratio ζ₀."""
-    turned = -zeta + 1j * np.sqrt(1 - zeta**2) * np.where(np.imag(poles) < 0, -1, 1)
-    return np.abs(poles) * turned
-
-
-def equalising_line(frequency: np.ndarray, zeta: float) -> np.ndarray:
-    """ω (ζ_e + i), the line s [rad/s]: undamped poles seen from here look damped by about ζ_e."""
-    return 2 * np.pi * np.asarray(frequency) * (zeta + 1j)

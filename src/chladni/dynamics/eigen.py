@@ -1,10 +1,12 @@
 """Undamped modes K φ = ω² M φ of large sparse systems, proved complete by a Sturm count."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
@@ -22,9 +24,13 @@ _SHARP = 1e-4  # error of a Ritz value good enough to tell a gap
 _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
 _LOOSE = 1e-6  # Ritz error of a mode handed out (frequencies are as good as its square)
-_FINITE = 1e-9  # θ/θ_max below which a massless motion is meant
-_FIRM = 1e-6  # of the median K_ii/M_ii: shift of small systems
-_ROUNDING = 1e-12
+_SHARP_SHARE = 1e-6  # of -1/σ: θ that one shift tells to ten digits
+_TOLD = 1e-13  # of it: θ below this are rounding
+_FIRM = 1e-6  # of the median K_ii/M_ii: first shift of small systems
+_ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ that rounding of K makes of a rigid motion
+_EXTREME = 1e-2  # of the median K_ii/M_ii: a motion so light that rounding exceeds it is massless
+_STIFFENED = 1e-13  # of K_ii, added where a motion has neither stiffness nor mass
+Modes = tuple[np.ndarray, np.ndarray]  # λ (k,), Φ (n, k)
 _JUST_ABOVE = 1 + 1e-6  # a band that ends at a mode includes it, whatever the rounding
 
 
@@ -46,7 +52,8 @@ def normal_modes(
 
     Parameters
     ----------
-    count : int, optional       how many; default all of a small system, else 20
+    count : int, optional       how many; default all of a small system (or one with little that
+                                has mass), else 20
     band : float, optional      or all up to this frequency [Hz] (both: the fewer)
     shift : float, optional     σ [rad²/s²], negative; default from the scale of the problem
     points : (n, 3), optional   place of each row's node [m]: a better elimination order
@@ -63,15 +70,17 @@ def normal_modes(
     n = len(system.dofs)
     limit = np.inf if band is None else (2 * np.pi * band) ** 2 * _JUST_ABOVE
     K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
+    massive = np.abs(M).sum(axis=1) > 0
     if n <= _DENSE or (count is not None and 3 * count > n):
         lam, phi = _dense(K, M, system.dofs, count, limit)
+    elif massive.sum() <= _DENSE:
+        lam, phi = _condensed(K, M, system.dofs, massive, count, limit)
     else:
         fronts = analyse(pattern(K, M), points, system.dofs[:, 0])
         order = fronts.order  # all is done in the order of elimination
         K_o, M_o = (A[order][:, order] for A in (K, M))
         problem = _Problem(K_o, M_o, system.dofs[order], backend, fronts.ordered())
-        due = problem.below(limit) if count is None and band is not None else None
-        lam, phi = _sparse(problem, count or 20 if due is None else due, limit, shift, proof, due)
+        lam, phi = _held(lambda p: _sparse(p, count, limit, shift, proof), problem)
         phi = phi[np.argsort(order)]
     keep = (lam <= limit) & (np.arange(len(lam)) < (len(lam) if count is None else count))
     lam, phi = lam[keep], np.asfortranarray(phi[:, keep])
@@ -105,16 +114,33 @@ class _Problem:
 
     def below(self, s: float) -> int:
         """How many eigenvalues are below s: the negative ones of K - s M (Sylvester)."""
-        for nudge in (0.0, 1e-7, -1e-7):
+        for firm, nudge in product((False, True), (0.0, 1e-7, -1e-7)):
+            K = _stiffened(self.K) if firm else self.K
             try:
-                return inertia(self.K - s * (1 + nudge) * self.M, fronts=self.fronts)[0]
+                return inertia(K - s * (1 + nudge) * self.M, fronts=self.fronts)[0]
             except AccuracyError:
                 continue
         raise AccuracyError(f"no Sturm count at {np.sqrt(abs(s)) / (2 * np.pi):.6g} Hz")
 
 
-def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
-    """Median K_ii/M_ii of the translations [rad²/s²]: one unit everywhere, blind to the scale.
+@dataclass(frozen=True)
+class _Scale:
+    """What λ are like [rad²/s²]: median K_ii/M_ii of the translations, and λ that is rounding."""
+
+    typical: float
+    rounding: float
+
+    @property
+    def first_shift(self) -> float:
+        """-σ for small systems."""
+        return max(_FIRM * self.typical, 10 * self.rounding)
+
+
+def _scale(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> _Scale:
+    """Both from K_ii/M_ii of what has mass: in rad²/s² for every dof, whatever the units.
+
+    Translations are one kind, so their median is blind to the unit of length. Rounding of K makes
+    λ ~ ε max K_ii/M_ii of a rigid motion, which a node of little inertia drives up.
 
     Raises
     ------
@@ -130,47 +156,118 @@ def _median_ratio(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> float:
     use = use if use.any() else both
     if not use.any():
         raise ModelError("no degree of freedom has both stiffness and mass: there are no modes")
-    return float(np.median(k[use] / m[use]))
+    typical = float(np.median(k[use] / m[use]))
+    rounding = _ROUNDING * float((k[both] / m[both]).max())
+    return _Scale(typical, min(rounding, _EXTREME * typical))
+
+
+def _stiffened(K: sp.csr_array) -> sp.csr_array:
+    """K + ε diag K: a motion without stiffness and mass is held, all others keep their digits.
+
+    Nastran's MECHFIX holds such massless mechanisms as well: a bar that turns about itself
+    between two points without inertia.
+    """
+    return sp.csr_array(K + _STIFFENED * sp.diags_array(K.diagonal()))
 
 
 def _dense(
     K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None, limit: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Modes by LAPACK: a few from M φ = θ (K - σM) φ, which is sharp below, all from K φ = λ M φ.
+) -> Modes:
+    """Modes by LAPACK, as many as asked for or up to the first beyond ``limit``.
 
-    A limit asks for the few below it: where a mass of 1e6 times the structure's drives its base,
-    the small motions there are right only so.
-
-    Massless rows follow the others, φ_s = -K_ss⁻¹ K_sm φ_m, and have no modes of their own.
+    Massless motions have no modes of their own.
     """
-    ratio = _median_ratio(K, M, dofs)
-    k, m, massless = K.toarray(), M.toarray(), M.diagonal() == 0
-    T = np.eye(len(dofs))[:, ~massless]
-    try:
-        T[massless] = -cho_solve(cho_factor(k[massless][:, massless]), k[massless][:, ~massless])
-        k, m = T.T @ k @ T, m[~massless][:, ~massless]
-        if count is None and np.isfinite(limit):
-            count = 1 + int((eigh(k, m, eigvals_only=True) <= limit).sum())
-        lam, phi = _few(k, m, -_FIRM * ratio, count) if count else eigh(k, m)
-    except LinAlgError as error:
-        raise ModelError("K - σM is not positive definite: a part hangs on nothing") from error
-    if lam[0] < -max(_GUESS * ratio, _ROUNDING * lam[-1]):
+    return _small(K, M, _scale(K, M, dofs), count, limit)
+
+
+def _small(
+    K: sp.csr_array, M: sp.csr_array, scale: _Scale, count: int | None, limit: float
+) -> Modes:
+    """The same with the scale known."""
+    count = K.shape[0] if count is None else count
+    for A in (K, _stiffened(K)):
+        try:
+            lam, phi = _by_shifts(A.toarray(), M.toarray(), -scale.first_shift, count, limit)
+            break
+        except LinAlgError as error:
+            fault = error
+    else:
+        raise ModelError("K - σM is not positive definite: a part hangs on nothing") from fault
+    if len(lam) and lam[0] < -max(_GUESS * scale.typical, scale.rounding):
         raise ModelError(f"a stiffness is negative: the lowest λ is {lam[0]:.2e} rad²/s²")
-    return lam, T @ phi
+    return lam, phi
 
 
-def _few(K: np.ndarray, M: np.ndarray, sigma: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Up to ``count`` lowest modes, θ = 1/(λ - σ); M may be singular, there λ = ∞ is θ = 0."""
-    n = len(K)
-    theta, X = eigh(M, K - sigma * M, subset_by_index=(max(n - count, 0), n - 1))
-    finite = np.flatnonzero(theta > _FINITE * theta[-1])[::-1]
-    return sigma + 1 / theta[finite], X[:, finite] / np.sqrt(theta[finite])
+def _condensed(
+    K: sp.csr_array,
+    M: sp.csr_array,
+    dofs: np.ndarray,
+    massive: np.ndarray,
+    count: int | None,
+    limit: float,
+) -> Modes:
+    """Modes of the few dofs with mass; the others follow them, φ_s = -K_ss⁻¹ K_sm φ_m."""
+    K_ss, K_sm = K[~massive][:, ~massive], K[~massive][:, massive]
+    try:
+        factor = factorise(K_ss, nodes=dofs[~massive, 0])
+    except ModelError:
+        factor = factorise(_stiffened(K_ss), nodes=dofs[~massive, 0])
+    follow = -factor.solve(K_sm.toarray())
+    k = K[massive][:, massive].toarray() + K_sm.T @ follow
+    k, m = sp.csr_array((k + k.T) / 2), M[massive][:, massive]
+    lam, phi_m = _small(k, m, _scale(K, M, dofs), count, limit)
+    phi = np.empty((len(dofs), len(lam)))
+    phi[massive], phi[~massive] = phi_m, follow @ phi_m
+    return lam, phi
+
+
+def _by_shifts(K: np.ndarray, M: np.ndarray, sigma: float, count: int, limit: float) -> Modes:
+    """Modes from M' φ = θ (K - σM) φ, θ = 1/(λ - σ); M' = M - M Φ Φᵀ M leaves out those found.
+
+    M may be singular: there λ = ∞ is θ = 0. A shift tells λ up to 10⁶ times its own size to ten
+    digits, so it is renewed until ``count`` are found, or one beyond ``limit``, or all finite ones.
+    """
+    lam, phi, n = np.zeros(0), np.zeros((len(K), 0)), len(K)
+    k, m = K.diagonal(), M.diagonal()
+    top = n * (k[m > 0] / m[m > 0]).max()
+    while len(lam) < min(count, n) and (not len(lam) or lam[-1] <= limit) and -sigma < top:
+        found, rest = M @ phi, min(count, n) - len(lam)
+        theta, X = eigh(M - found @ found.T, K - sigma * M, subset_by_index=(n - rest, n - 1))
+        theta, X = -sigma * theta[::-1], X[:, ::-1]  # 1 of a rigid motion
+        sharp = int(np.sum(theta > _SHARP_SHARE))
+        phi = _orthonormal(np.hstack([phi, X[:, :sharp] / np.sqrt(theta[:sharp])]), M)
+        lam = np.r_[lam, sigma - sigma / theta[:sharp]]
+        sigma *= 1e-3 / max([_TOLD, *theta[sharp : sharp + 1]])
+    return lam, phi
+
+
+def _orthonormal(phi: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """Φ L⁻ᵀ with L Lᵀ = Φᵀ M Φ: each mode is made orthogonal to those before it."""
+    if not phi.shape[1]:
+        return phi
+    L = cholesky(phi.T @ M @ phi, lower=True)
+    return np.asarray(solve_triangular(L, phi.T, lower=True).T)
+
+
+def _held(solved: Callable[[_Problem], Modes], problem: _Problem) -> Modes:
+    """Modes of the problem; where it is singular, of the one whose massless motions are held."""
+    try:
+        return solved(problem)
+    except (ModelError, LinAlgError) as fault:
+        try:
+            return solved(replace(problem, K=_stiffened(problem.K)))
+        except LinAlgError as error:
+            raise AccuracyError(f"Lanczos broke down: {error}") from error
+        except ModelError:
+            raise fault from None
 
 
 def _sparse(
-    problem: _Problem, k: int, limit: float, shift: float | None, proof: bool, due: int | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """The k lowest modes, those beyond ``limit`` not cared for; ``due`` is its Sturm count."""
+    problem: _Problem, count: int | None, limit: float, shift: float | None, proof: bool
+) -> Modes:
+    """The ``count`` lowest modes, or 20, those beyond ``limit`` not cared for."""
+    due = problem.below(limit) if count is None and np.isfinite(limit) else None
+    k = count or 20 if due is None else due
     if k == 0:
         return np.zeros(0), np.zeros((len(problem.dofs), 0))
     sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
@@ -192,7 +289,8 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
     """Lanczos from a shift that suits; a guessed one is renewed when it lies far from the modes."""
     sigma = shift
     if sigma is None:
-        sigma = -_GUESS * _median_ratio(problem.K, problem.M, problem.dofs)
+        scale = _scale(problem.K, problem.M, problem.dofs)
+        sigma = -max(_GUESS * scale.typical, 10 * scale.rounding)
     for _ in range(2):
         factor = problem.factor(sigma)
         ritz = block_lanczos(factor.solve, problem.M, k)
@@ -226,7 +324,7 @@ def _completed(
     phi: np.ndarray,
     s: float,
     due: int,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Modes:
     """All ``due`` modes below s: those missing are looked for beside the found ones.
 
     A block of eight sees eight of a multiple eigenvalue; the next round sees the next eight.

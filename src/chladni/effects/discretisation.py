@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..fem.assemble import Structure, structure
-from ..model.refine import refined
+from ..geometry.refine import refined
 from .effect import Effect, Parameter, PointTerm
 
 MOST = 40_000  # dofs of a structure that is still refined
@@ -39,6 +39,7 @@ class Jitter(Effect):
     name = "jitter"
     claim = "elements of another formulation give slightly other frequencies"
     kind = "nuisance"
+    writable = False
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     lam: np.ndarray = field(default_factory=lambda: np.zeros(0))

@@ -15,12 +15,15 @@ physical one.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..model.assembly import Assembly
+
+if TYPE_CHECKING:
+    from .surroundings import Surroundings
 
 FIELDS = ("t", "E", "rho", "Q11", "Q22", "Q12", "Q66")
 
@@ -109,13 +112,15 @@ class Effect:
     text : where it acts, in words
     parts, grids : names of parts and ids of grids it concerns
     point : (3,) or None  its place in the basic frame [m]
-    places : how many places were tried before this one (look-elsewhere)
+    trials_factor : how many places were tried, this one among them (look-elsewhere)
     replaces : names of ordinary parameters it makes superfluous
     """
 
     name: ClassVar[str] = "nothing"
     claim: ClassVar[str] = "the model is right as it is"
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
+    writable: ClassVar[bool] = True  # whether a deck could hold it
+    remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
 
     parameters: tuple[Parameter, ...] = ()
     text: str = ""
@@ -123,12 +128,12 @@ class Effect:
     grids: tuple[int, ...] = ()
     point: tuple[float, float, float] | None = None
     radius: float | None = None
-    places: int = 1
+    trials_factor: int = 1
     replaces: tuple[str, ...] = ()
     channels: tuple[str, ...] = field(default=())
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Sheet fields it multiplies."""
+        """ShellGroups fields it multiplies."""
         return ()
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
@@ -147,6 +152,27 @@ class Effect:
         """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
 
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array | None:
+        """Rows b (k, n) whose static response the reduced basis must hold, or None.
+
+        Its points, and A φ of its operators: to first order that is how they change the modes.
+
+        Parameters
+        ----------
+        shapes : (n, r)   modes φ up to the highest frequency of interest
+        """
+        points = [term.rows for term in self.terms(x)]
+        operators = [sp.csr_array((m.operator @ shapes).T) for m in self.matrices(x)]
+        return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
+
+    def recentred(self, x: np.ndarray, where: "Surroundings") -> tuple["Effect", np.ndarray] | None:
+        """The effect about the place it moved to, and its start there; None: it is near enough."""
+        return None
+
+    def with_reference_state(self, x: np.ndarray) -> Self:
+        """The same effect on a structure that has it already as x says (``remakes_structure``)."""
+        return self
+
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The structure with the effect written into it."""
         return assembly
@@ -163,7 +189,7 @@ class Effect:
             out.append(row)
         return out
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """Where it is once it has been fitted."""
         return self.where()
 

@@ -5,17 +5,22 @@ polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a 
 slope.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly
+from ..geometry.facets import tangents
+from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, Parameter, PointTerm
-from .points import with_masses, with_springs
+from .search_context import Candidate, SearchContext, best_places, distinct
+from .surroundings import Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
+FACING = 0.85  # cosine between normals that still lie in one face
+FAR = 0.75  # of a patch's size: beyond it the interpolation begins anew where the fit went
 STEP = 1e-4  # of the local mesh size, for the slope of the interpolation weights
 
 
@@ -62,7 +67,7 @@ class Patch:
 
 
 @dataclass(frozen=True, eq=False)
-class Somewhere(Effect):
+class MovableAttachment(Effect):
     """x = (ln strength, place along both axes of the patch in units of its size)."""
 
     patch: Patch | None = None
@@ -80,11 +85,23 @@ class Somewhere(Effect):
         moving = {1 + k: self.patch.slope(at, k) * self.patch.size for k in range(2)}
         return (PointTerm("M" if self.matrix == "M" else "K", rows, c, gradient, moving),)
 
-    def carried(self) -> sp.csr_array:
-        """Rows a basis must carry so that the place may move."""
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """The grids next to the start, so that the place may move."""
         assert self.patch is not None
         nearest = np.argsort((self.patch.flat**2).sum(axis=1))[:7]
         return sp.csr_array(sp.vstack([rows[nearest] for rows in self.patch.rows]))
+
+    @classmethod
+    def near(cls, where: Surroundings, k: int) -> Self:
+        """The effect near the k-th of ``where.grids``."""
+        raise NotImplementedError
+
+    def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
+        """About the grid it moved to, once that lies farther than ``FAR`` of the patch's size."""
+        if np.abs(x[1:]).max() < FAR:
+            return None
+        k = where.grids.position(self.nearest(x))
+        return self.near(where, k), np.array([x[0], 0.0, 0.0])
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
@@ -92,10 +109,10 @@ class Somewhere(Effect):
         return np.asarray(self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """The strength; the place stands in ``settled``."""
+        """The strength; the place stands in ``location``."""
         return super().reported(x, sd)[:1]
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """The place a fit moved it to."""
         assert self.patch is not None
         point, grid = [float(v) for v in self.at(x)], self.nearest(x)
@@ -110,57 +127,66 @@ class Somewhere(Effect):
         return int(self.patch.grids[np.argmin((d**2).sum(axis=1))])
 
 
-@dataclass(frozen=True, eq=False)
-class PointMass(Somewhere):
-    """A mass sits at a place the model does not know of."""
-
-    name = "point-mass"
-    claim = "something sits on the structure that the model does not have"
-    matrix = "M"
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The mass itself."""
-        m = self.parameters[0].value(x[0])
-        return m, np.array([m, 0.0, 0.0])
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at the nearest grid, offset to the place."""
-        m, grid = self.parameters[0].value(x[0]), self.nearest(x)
-        offset = self.at(x) - assembly.points[assembly.rows([grid])[0]]
-        return with_masses(assembly, (grid,), m, offset)
-
-
-@dataclass(frozen=True, eq=False)
-class ExtraSupport(Somewhere):
-    """A spring to ground at an unknown place."""
-
-    name = "extra-support"
-    claim = "the structure touches something stiff that the model does not have"
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground shared by the grids round the place."""
-        assert self.patch is not None
-        k, at = self.parameters[0].value(x[0]), self.patch.size * x[1:3]
-        share = self.shares(at)
-        for grid, part in share:
-            assembly = with_springs(assembly, (grid,), self.direction[None], k * part)
-        return assembly
-
-    def shares(self, at: np.ndarray) -> list[tuple[int, float]]:
-        """The nearest grids and their shares of the spring, linear in the distance."""
-        assert self.patch is not None
-        d = np.linalg.norm(self.patch.flat - at, axis=1)
-        near = np.argsort(d)[:3]
-        if d[near[0]] < 0.15 * self.patch.size:
-            return [(int(self.patch.grids[near[0]]), 1.0)]
-        A = np.vstack([self.patch.flat[near].T, np.ones(3)])
-        w = np.clip(np.linalg.lstsq(A, np.append(at, 1.0), rcond=None)[0], 0.0, None)
-        return [
-            (int(self.patch.grids[k]), float(v / w.sum())) for k, v in zip(near, w, strict=True)
-        ]
-
-
 def moved(strength: Parameter) -> tuple[Parameter, ...]:
     """Strength and place of a thing that a fit may move by about a mesh size at a time."""
     place = [Parameter(n, "m", 0.0, 1.5, kind="linear", step=0.7) for n in ("along", "across")]
     return (replace(strength), *place)
+
+
+def there(where: Surroundings, k: int) -> dict[str, Any]:
+    """Fields of an effect that stands near the k-th of ``where.grids``."""
+    grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k]
+    point = float(x), float(y), float(z)
+    tried = len(where.places)
+    return {"text": f"at grid {grid}", "grids": (grid,), "point": point, "trials_factor": tried}
+
+
+def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
+    """The grids round the k-th of all that lie in the same face of the sheet."""
+    spots = where.grids
+    d = spots.point - spots.point[k]
+    facing = np.abs(spots.normal @ spots.normal[k]) > FACING
+    distance = np.where(facing, np.linalg.norm(d, axis=1), np.inf)
+    near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+    near = near[np.isfinite(distance[near])]
+    n = spots.normal[k]
+    plane = np.stack(tangents(n))
+    size = float(np.sort(distance)[1:5].mean())
+    rows = tuple(
+        where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
+        for axis in directions
+    )
+    return Patch(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
+
+
+TRIED = 40  # places that are evaluated one by one where only natural frequencies are known
+
+
+def attachments(
+    context: SearchContext, near: Callable[[Surroundings, int], MovableAttachment], matrix: str,
+    strengths: np.ndarray,
+) -> list[Candidate]:  # fmt: skip
+    """The two best places about each baseline, by exact re-analysis at every place.
+
+    Parameters
+    ----------
+    near : makes the effect at a grid
+    strengths : [kg] of "M" or [N/m] of "K"
+    """
+    where = context.where
+    grids, places = where.grids, where.places
+    if context.scan is None:
+        some = farthest_point_sample(places.point, TRIED)
+        effects = [near(where, grids.position(places.grids[k])) for k in some]
+        return best_places(context, effects, places.point[some])
+    chosen: list[int] = []
+    out: list[Candidate] = []
+    for about, base in enumerate(context.bases):
+        score = context.scan.point_scores(about, matrix, strengths)
+        for k in distinct(score.min(axis=1), places.point, chosen, 2):
+            chosen.append(k)
+            effect = near(where, grids.position(places.grids[k]))
+            c = strengths[int(np.argmin(score[k]))]
+            start = np.array([np.log(c / effect.parameters[0].scale), 0.0, 0.0])
+            out.append(Candidate(effect, start, base))
+    return out

@@ -11,7 +11,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from .effect import ChannelChange, Effect, FieldChange, Parameter
-from .shell_groups import Sheet
+from .shell_groups import ShellGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05}  # prior sd of ln(value / deck's value)
 
@@ -47,20 +47,34 @@ class PartScale(Effect):
 
 
 def ordinary(
-    sheet: Sheet, quantity: str, positions: Sequence[int], sd: float | None = None
+    groups: ShellGroups, quantity: str, positions: Sequence[int], sd: float | None = None
 ) -> PartScale:
     """One ordinary parameter of these parts, with its prior."""
-    parts = sheet.structure.assembly.parts
+    parts = groups.structure.assembly.parts
     names = tuple(parts[k].name for k in positions)
     units = {"E": "Pa", "rho": "kg/m3", "t": "m"}
     nominal = value(parts[positions[0]], quantity)
     sd = SPREAD[quantity] if sd is None else sd
     parameter = Parameter(quantity, units[quantity], 0.0, sd, nominal, step=0.1)
-    inside = np.isin(sheet.part, positions).astype(float)
+    inside = np.isin(groups.part, positions).astype(float)
     return PartScale(
         (parameter,), f"{quantity} of {', '.join(names)}", names,
         quantity=quantity, positions=tuple(positions), inside=inside,
     )  # fmt: skip
+
+
+def defaults(groups: ShellGroups) -> list[PartScale]:
+    """E and rho of every material and t of every shell part: what a user may calibrate anyway."""
+    parts = groups.structure.assembly.parts
+    used = sorted(set(groups.part.tolist()))
+    by_material: dict[int, list[int]] = {}
+    for k in used:
+        section = parts[k].section
+        if isinstance(section, ShellSection):
+            material = section.membrane or section.bending
+            by_material.setdefault(id(material) if material is None else material.id, []).append(k)
+    out = [ordinary(groups, q, ks) for ks in by_material.values() for q in ("E", "rho")]
+    return out + [ordinary(groups, "t", [k]) for k in used]
 
 
 def value(part: Part, quantity: str) -> float:
@@ -114,6 +128,7 @@ class Scatter(Effect):
     name = "scatter"
     claim = "thickness and modulus vary smoothly within a part"
     kind = "nuisance"
+    writable = False
 
     quantity: str = "t"
     functions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n_groups, n), sd in
@@ -123,7 +138,9 @@ class Scatter(Effect):
         return (FieldChange(self.quantity, self.functions @ x, self.functions),)
 
 
-def scatter(sheet: Sheet, quantity: str, sd: float, length: float = 0.3, most: int = 12) -> Scatter:
+def scatter(
+    groups: ShellGroups, quantity: str, sd: float, length: float = 0.3, most: int = 12
+) -> Scatter:
     """Gaussian scatter of standard deviation sd within each part, mean removed.
 
     Correlation exp(-d²/2ℓ²) with ℓ a share ``length`` of the part's longest side; the ``most``
@@ -131,13 +148,13 @@ def scatter(sheet: Sheet, quantity: str, sd: float, length: float = 0.3, most: i
     Ghanem and Spanos (1991), Stochastic Finite Elements, ch. 2.
     """
     columns = []
-    parts = np.unique(sheet.part)
+    parts = np.unique(groups.part)
     each = max(3, round(most / np.sqrt(len(parts))))
     for p in parts:
-        inside = np.flatnonzero(sheet.part == p)
+        inside = np.flatnonzero(groups.part == p)
         if len(inside) > 2:
-            columns += _functions(sheet, inside, sd, length, each)
-    functions = np.array(columns).T if columns else np.zeros((len(sheet), 0))
+            columns += _functions(groups, inside, sd, length, each)
+    functions = np.array(columns).T if columns else np.zeros((len(groups), 0))
     unknown = tuple(
         Parameter(f"{quantity} scatter {j + 1}", "-", 0.0, 1.0, kind="linear", step=1.5)
         for j in range(functions.shape[1])
@@ -146,10 +163,10 @@ def scatter(sheet: Sheet, quantity: str, sd: float, length: float = 0.3, most: i
 
 
 def _functions(
-    sheet: Sheet, inside: np.ndarray, sd: float, length: float, most: int
+    groups: ShellGroups, inside: np.ndarray, sd: float, length: float, most: int
 ) -> list[np.ndarray]:
     """Eigenfunctions of the area-weighted covariance of one part, scaled to sd."""
-    X, area = sheet.centre[inside], sheet.area[inside]
+    X, area = groups.centre[inside], groups.area[inside]
     ell = length * np.ptp(X, axis=0).max()
     d2 = ((X[:, None] - X[None]) ** 2).sum(axis=-1)
     mean = np.eye(len(area)) - np.outer(np.ones(len(area)), area / area.sum())
@@ -159,7 +176,7 @@ def _functions(
     out = []
     for k in np.argsort(-w)[:most]:
         if w[k] > 1e-3:
-            column = np.zeros(len(sheet))
+            column = np.zeros(len(groups))
             column[inside] = sd * np.sqrt(w[k]) * V[:, k] / root
             out.append(column)
     return out

@@ -1,4 +1,4 @@
-"""The sheet's material: a grain, a rolling direction."""
+"""A sheet stiffer along one axis than across it: rolling, fibres, growth rings."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -6,9 +6,11 @@ from typing import Any, Self
 import numpy as np
 
 from ..model.assembly import Assembly
-from ..model.properties import Isotropic, Orthotropic, ShellSection
+from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
-from .shell_groups import Sheet
+from .family import Article, Family
+from .shell_groups import ShellGroups
+from .surroundings import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,17 +22,18 @@ class OrthotropicMaterial(Effect):
 
     name = "orthotropic-material"
     claim = "the sheet is stiffer along one direction than across it"
+    remakes_structure = True
 
     E: float = 0.0
     nu: float = 0.3
     positions: tuple[int, ...] = ()
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    begun: np.ndarray | None = None  # x that the structure's own material has already
+    reference: np.ndarray | None = None  # x that the structure's own material has already
 
-    def begun_at(self, x: np.ndarray) -> Self:
+    def with_reference_state(self, x: np.ndarray) -> Self:
         """The same effect on a structure that has the material of x."""
-        return replace(self, begun=x.copy())
+        return replace(self, reference=x.copy())
 
     def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
         """(E1, E2, G12 [Pa], nu12) with nu12 = nu_m sqrt(E1/E2), nu_m the geometric mean."""
@@ -55,7 +58,10 @@ class OrthotropicMaterial(Effect):
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Ln factors of the four components of the plane stiffness."""
-        logs, h = self._logs(x) - (0.0 if self.begun is None else self._logs(self.begun)), 1e-6
+        logs, h = (
+            self._logs(x) - (0.0 if self.reference is None else self._logs(self.reference)),
+            1e-6,
+        )
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
         )
@@ -99,9 +105,11 @@ def _replaced(
 GRID = (-0.8, -0.3, 0.0, 0.3, 0.8)  # ln E1/E, ln E2/E where searches begin
 
 
-def orthotropic(sheet: Sheet, positions: tuple[int, ...], axis: np.ndarray) -> OrthotropicMaterial:
+def orthotropic(
+    groups: ShellGroups, positions: tuple[int, ...], axis: np.ndarray
+) -> OrthotropicMaterial:
     """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame."""
-    parts = sheet.structure.assembly.parts
+    parts = groups.structure.assembly.parts
     section = parts[positions[0]].section
     material = section.membrane or section.bending if isinstance(section, ShellSection) else None
     if not isinstance(material, Isotropic):
@@ -123,6 +131,63 @@ def orthotropic(sheet: Sheet, positions: tuple[int, ...], axis: np.ndarray) -> O
         E=material.E,
         nu=material.nu,
         positions=positions,
-        inside=np.isin(sheet.part, positions).astype(float),
+        inside=np.isin(groups.part, positions).astype(float),
         axis=np.asarray(axis, float),
     )
+
+
+def material_axes(where: Surroundings) -> list[OrthotropicMaterial]:
+    """Orthotropy of every isotropic material, axis 1 along the longest extent of its parts."""
+    groups = where.groups
+    parts = groups.structure.assembly.parts
+    by_material: dict[object, list[int]] = {}
+    for k in sorted(set(groups.part.tolist())):
+        if (material := isotropic(parts[k])) is not None:
+            by_material.setdefault(material, []).append(k)
+    return [
+        orthotropic(groups, tuple(positions), _longest(groups, np.isin(groups.part, positions)))
+        for positions in by_material.values()
+    ]
+
+
+def isotropic(part: Part) -> Isotropic | None:
+    """The isotropic sheet material of a part, if that is what it has."""
+    if not isinstance(part.section, ShellSection):
+        return None
+    material = part.section.bending or part.section.membrane
+    return material if isinstance(material, Isotropic) else None
+
+
+def _longest(groups: ShellGroups, inside: np.ndarray) -> np.ndarray:
+    """First principal direction of some groups (3,), or the coordinate axis it all but is."""
+    centre, area = groups.centre[inside], groups.area[inside]
+    if len(centre) < 3:
+        return np.eye(3)[0]
+    X = centre - np.average(centre, axis=0, weights=area)
+    direction = np.linalg.svd(X, full_matrices=False)[2][0]
+    k = int(np.argmax(np.abs(direction)))
+    return np.eye(3)[k] if abs(direction[k]) > 0.98 else direction
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """E1/E2 off one by 6 to 35 %, G12 by up to 16 %, axis 1 along x, in all parts."""
+    old = isotropic(article.assembly.parts[0])
+    assert old is not None
+    ratio = float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.3))
+    E1, E2 = old.E * np.exp(ratio / 2), old.E * np.exp(-ratio / 2)
+    G = old.shear_modulus
+    G12 = G * float(np.exp(rng.uniform(-0.15, 0.15)))
+    new = Orthotropic(E1, E2, old.nu * np.sqrt(E1 / E2), G12, G, G, old.rho)
+    made = article.assembly
+    made = made.with_parts(tuple(p.with_section(membrane=new, bending=new) for p in made.parts))
+    axis = np.broadcast_to([1.0, 0, 0], made.shells.axis.shape)
+    moduli = {"E1": E1, "E2": E2, "G12": G12}
+    return replace(
+        article, assembly=replace(made, shells=replace(made.shells, axis=axis)),
+        truth={**moduli, "parameters": moduli},
+    )  # fmt: skip
+
+
+FAMILY = Family(
+    OrthotropicMaterial, conceal, placed=material_axes, cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3")
+)

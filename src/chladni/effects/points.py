@@ -45,31 +45,6 @@ class MassEffect(AtPoints):
         return with_masses(assembly, self.grids, m)
 
 
-@dataclass(frozen=True, eq=False)
-class SensorMass(MassEffect):
-    """Accelerometers (and their cables) weigh something; taken off before weighing."""
-
-    name = "sensor-mass"
-    claim = "the accelerometers' mass is missing from the model"
-
-    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Nothing: the article is weighed without its sensors."""
-        return 0.0, np.zeros(1)
-
-
-@dataclass(frozen=True, eq=False)
-class Suspension(AtPoints):
-    """Cords at the hangers hold the structure, so it is not free."""
-
-    name = "suspension"
-    claim = "the suspension's stiffness is missing from the model"
-
-    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground at each hanger."""
-        k = self.parameters[0].value(x[0])
-        return with_springs(assembly, self.grids, self.directions, k)
-
-
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)

@@ -1,11 +1,13 @@
 """What the test itself does to a channel."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from .effect import ChannelChange, Effect, Parameter
+from .family import Article, Family
+from .search_context import Candidate, SearchContext
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,53 @@ def sensor_fault(label: str, channel: int, n_outputs: int, sign: int, start: flo
     text = f"channel {label}" + (", sign reversed" if sign < 0 else "")
     unknown = Parameter("gain", "-", 0.0, 0.7, step=0.7, starts=(start,))
     return SensorFault(
-        (unknown,), text, channels=(label,), places=2 * n_outputs,
+        (unknown,), text, channels=(label,), trials_factor=2 * n_outputs,
         channel=channel, n_outputs=n_outputs, sign=sign,
     )  # fmt: skip
+
+
+LN10 = np.log(10.0)
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The two channels whose level or sign departs most from the calibrated model.
+
+    Each begins from that model and from the nominal one: a wrong channel bends the calibration.
+    """
+    if context.scan is None:
+        return []
+    deviation = context.scan.deviation
+    n = deviation.shape[1]
+    best = sorted((_departure(deviation[:, i].ravel(), i) for i in range(n)), reverse=True)[:2]
+    return [
+        Candidate(sensor_fault(context.labels[i], i, n, sign, start), np.array([start]), base)
+        for _, i, sign, start in best
+        for base in (context.null, context.bases[0])
+    ]
+
+
+def _departure(delta: np.ndarray, channel: int) -> tuple[float, int, int, float]:
+    """Mean square of δ = log10 H_model/H_test that one factor takes away; channel, sign, ln."""
+    flipped = np.mean(np.abs(delta.imag)) > np.pi / 2 / LN10
+    start = float(np.clip(-np.median(delta.real) * LN10, -2.5, 2.5))
+    left = delta + (start + (1j * np.pi if flipped else 0)) / LN10
+    gain = np.mean(np.abs(delta) ** 2) - np.mean(
+        np.abs(left.real + 1j * ((left.imag * LN10 + np.pi) % (2 * np.pi) - np.pi) / LN10) ** 2
+    )
+    return gain, channel, -1 if flipped else 1, start
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """One channel times a factor that halves, doubles or reverses it."""
+    at = int(rng.integers(len(article.outputs)))
+    gains = article.gains.copy()
+    gains[at] = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0, -1.3]))
+    factor = float(gains[at])
+    channel = f"{article.outputs[at]}:+Z"
+    truth = {"channel": channel, "value": factor, "parameters": {"gain": factor}}
+    return replace(article, gains=gains, truth=truth)
+
+
+FAMILY = Family(
+    SensorFault, conceal, candidates=candidates, no_cards="a fault of the test is not in the deck"
+)

@@ -19,7 +19,7 @@ from .shell_components import thickness_split
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class ShellGroups:
     """Element matrices of all shells and the groups they are gathered in.
 
     Attributes
@@ -75,7 +75,9 @@ class Sheet:
         return (out + out.transpose(0, 2, 1)) / 2 if right is None else out
 
 
-def groups(centre: np.ndarray, part: np.ndarray, area: np.ndarray, most: int = 64) -> np.ndarray:
+def group_of_shells(
+    centre: np.ndarray, part: np.ndarray, area: np.ndarray, most: int = 64
+) -> np.ndarray:
     """Group of each shell (m,): every part halved along its longest side until pieces are alike.
 
     The number of groups of a part follows its area; none mixes parts.
@@ -101,7 +103,7 @@ def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
     return [order[: len(order) // 2], order[len(order) // 2 :]]
 
 
-def sheet(structure: Structure, most: int = 64) -> Sheet:
+def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
     """The shells of a structure, gathered in at most about ``most`` groups.
 
     Transverse shear with residual bending flexibility grows with a power of t between one and
@@ -114,7 +116,7 @@ def sheet(structure: Structure, most: int = 64) -> Sheet:
     linear, cubic = thickness_split(assembly, geo, arrays)
     mass = shell.mass(geo, shells.thickness, arrays.rho, arrays.nsm, assembly.coupled_mass)
     centre = assembly.points[shells.nodes].mean(axis=1)
-    group = groups(centre, shells.part, geo.area, most)
+    group = group_of_shells(centre, shells.part, geo.area, most)
     n = group.max() + 1 if len(group) else 0
     area = np.bincount(group, geo.area, minlength=n)
     middle = np.stack(
@@ -123,7 +125,7 @@ def sheet(structure: Structure, most: int = 64) -> Sheet:
     weight = np.einsum("eij,i,j->e", mass, _along_x(), _along_x())
     part = np.zeros(n, dtype=int)
     part[group] = shells.part
-    return Sheet(
+    return ShellGroups(
         structure, linear, cubic, mass, shells.nodes, group, middle, area,
         np.bincount(group, weight, minlength=n), part,
     )  # fmt: skip

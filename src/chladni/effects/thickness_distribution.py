@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
-from .shell_groups import Sheet
+from .family import Article, Family
+from .search_context import Candidate, SearchContext, best_places, distinct
+from .shell_groups import ShellGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,7 @@ class ThicknessDistribution(Effect):
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # groups of the sheet
     centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the groups
-    surface: "Surface" = field(default_factory=lambda: Surface())
+    surface: "Quadric" = field(default_factory=lambda: Quadric())
     size: float = 1.0
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
@@ -58,13 +61,13 @@ class ThicknessDistribution(Effect):
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """The deepest thinning on the sheet and the radius R; the place stands in ``settled``."""
+        """The deepest thinning on the sheet and the radius R; the place stands in ``location``."""
         rows = super().reported(x, sd)
         there = float(self._bump(x, self._deepest(x)[1][None])[0])
         value, low, high = (there * thinning(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
         return [{**rows[0], "value": value, "low": low, "high": high}, rows[1]]
 
-    def settled(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> dict[str, Any]:
         """The place a fit moved it to: where the sheet is thinnest."""
         grid, deepest = self._deepest(x)
         point = [float(v) for v in deepest]
@@ -91,16 +94,18 @@ def thinning(x: float) -> float:
     return float(0.6 / (1 + np.exp(-x)))
 
 
-def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDistribution:
+def thickness_distribution(
+    groups: ShellGroups, group: int, trials_factor: int
+) -> ThicknessDistribution:
     """A thinning of the sheet that one group of shells belongs to, searched from that group on.
 
-    The unknown place is paid for by the spread of u and v; ``places`` counts the sheets tried.
+    The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
     """
-    part = int(sheet.part[group])
-    inside = sheet.connected == sheet.connected[group]
-    assembly = sheet.structure.assembly
-    grids = np.unique(sheet.nodes[inside[sheet.group]])
-    size = float(np.sqrt(sheet.area[sheet.part == part].sum()))
+    part = int(groups.part[group])
+    inside = groups.connected == groups.connected[group]
+    assembly = groups.structure.assembly
+    grids = np.unique(groups.nodes[inside[groups.group]])
+    size = float(np.sqrt(groups.area[groups.part == part].sum()))
     name = assembly.parts[part].name
     unknown = (
         Parameter("thinning", "-", -1.6, 1.2, kind="linear", step=0.8, starts=(-1.0,)),
@@ -109,15 +114,15 @@ def thickness_distribution(sheet: Sheet, group: int, places: int) -> ThicknessDi
         Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(0.0,)),
     )
     return ThicknessDistribution(
-        unknown, f"on {name}", (name,), places=places,
-        shells=inside[sheet.group], inside=inside.astype(float), centre=sheet.centre,
-        surface=surface(sheet, group, size), size=size, variance=sheet.area / 12,
+        unknown, f"on {name}", (name,), trials_factor=trials_factor,
+        shells=inside[groups.group], inside=inside.astype(float), centre=groups.centre,
+        surface=surface(groups, group, size), size=size, variance=groups.area / 12,
         points=assembly.points[grids], ids=assembly.ids[grids],
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Quadric:
     """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
 
     ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
@@ -143,11 +148,11 @@ def _quadric(u: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def surface(sheet: Sheet, group: int, size: float) -> Surface:
+def surface(groups: ShellGroups, group: int, size: float) -> Quadric:
     """The quadric through the corners of the part's shells, near ones counting most."""
-    assembly = sheet.structure.assembly
-    own = np.unique(sheet.nodes[sheet.part[sheet.group] == sheet.part[group]])
-    X, c = assembly.points[own], sheet.centre[group]
+    assembly = groups.structure.assembly
+    own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
+    X, c = assembly.points[own], groups.centre[group]
     w = np.exp(-((X - c) ** 2).sum(axis=1) / (2 * (0.25 * size) ** 2))
     middle = np.average(X, axis=0, weights=w)
     axes = np.linalg.svd((X - middle) * np.sqrt(w)[:, None], full_matrices=False)[2]
@@ -155,4 +160,59 @@ def surface(sheet: Sheet, group: int, size: float) -> Surface:
     A = _quadric(u) * np.sqrt(w)[:, None]
     ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
     bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
-    return Surface(c, axes[:2], axes[2], bend, 0.5 * size)
+    return Quadric(c, axes[:2], axes[2], bend, 0.5 * size)
+
+
+RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
+TRIED = 30  # groups that are evaluated one by one where only natural frequencies are known
+LEAST = 0.05  # of the scanned thinning: less of it, or a thickening, is no thinning
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """Local thinning: its slope at every group and radius, the two best places per baseline."""
+    groups = context.where.groups
+    sheets = len(set(groups.connected.tolist()))
+    if context.scan is None:
+        some = farthest_point_sample(groups.centre, TRIED)
+        tried = [thickness_distribution(groups, int(g), sheets) for g in some]
+        return best_places(context, tried, groups.centre[some])
+    tried = [thickness_distribution(groups, g, sheets) for g in range(len(groups))]
+    effects = [e for e in tried for _ in RADII]
+    starts = [np.array([-2.0, np.log(radius), 0.0, 0.0]) for _ in tried for radius in RADII]
+    bumps = np.stack([e.fields(x)[0].value for e, x in zip(effects, starts, strict=True)], axis=1)
+    centre = np.repeat(groups.centre, len(RADII), axis=0)
+    out: list[Candidate] = []
+    taken: list[int] = []
+    for about, base in enumerate(context.bases):
+        amount, score = context.scan.thickness_scores(about, bumps)
+        score = np.where(amount > LEAST, score, np.inf)
+        for k in distinct(score, centre, taken, 2):
+            if np.isfinite(score[k]):
+                taken.append(k)
+                out.append(Candidate(effects[k], _scaled(starts[k], amount[k]), base))
+    return out
+
+
+def _scaled(start: np.ndarray, amount: float) -> np.ndarray:
+    """A start whose depth is ``amount`` times that of the one scanned, from 2 to 40 %."""
+    alpha = np.clip(amount * thinning(start[0]), 0.02, 0.4)
+    return np.array([np.log(alpha / (0.6 - alpha)), *start[1:]])
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """8 to 25 % thinner round a grid of the first part, with R of 40 to 90 mm."""
+    made = article.assembly
+    first = made.shells.nodes[made.shells.part == 0]
+    centre = made.points[rng.choice(np.unique(first))]
+    alpha, R = float(rng.uniform(0.08, 0.25)), float(rng.uniform(0.04, 0.09))
+    q = np.exp(-((made.points - centre) ** 2).sum(axis=1) / (2 * R**2))
+    t = made.shells.thickness * (1 - alpha * q)[made.shells.nodes]
+    truth = {
+        "point_m": centre.tolist(), "value": alpha, "radius_m": R,
+        "parameters": {"thinning": alpha, "R": R},
+    }  # fmt: skip
+    thinned = replace(made, shells=replace(made.shells, thickness=t))
+    return replace(article, assembly=thinned, truth=truth)
+
+
+FAMILY = Family(ThicknessDistribution, conceal, candidates=candidates, cards=("CQUAD4", "CTRIA3"))

@@ -188,19 +188,3 @@ def quality(
         band=np.array(per_band),
         bands=ends,
     )
-
-
-def frac(model: FRF, test: FRF) -> np.ndarray:
-    """FRF assurance |Σ_f H_A* H_X|² / (Σ|H_A|² Σ|H_X|²) of every channel (n_out, n_in)."""
-    if model.values.shape != test.values.shape:
-        raise ShapeError(f"FRFs of {model.values.shape} and {test.values.shape} cannot be compared")
-    cross = np.abs((model.values.conj() * test.values).sum(0)) ** 2
-    return _ratio(cross, _power(model.values, 0) * _power(test.values, 0))
-
-
-def response_assurance(model: FRF, test: FRF) -> np.ndarray:
-    """Assurance of the response pattern at every line: MAC over outputs (n_f, n_in)."""
-    if model.values.shape != test.values.shape:
-        raise ShapeError(f"FRFs of {model.values.shape} and {test.values.shape} cannot be compared")
-    cross = np.abs((model.values.conj() * test.values).sum(1)) ** 2
-    return _ratio(cross, _power(model.values, 1) * _power(test.values, 1))

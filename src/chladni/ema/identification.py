@@ -10,7 +10,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
-from .pole_fitting import Data, Fit, Slope, polish
+from .pole_fitting import PoleData, PoleFit, PoleSystem, polish
 from .pole_selection import (
     ORDERS,
     Rule,
@@ -156,7 +156,7 @@ def identify(
     return _result(frf, keep, data, top, fit, slope, sweep, rule)
 
 
-def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[Data, float]:
+def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     """Scaled, weighted samples, and the scale of s."""
     variance = spread(frf, averages)
     s = 2j * np.pi * frf.frequency[keep]
@@ -168,16 +168,16 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[Data, float]:
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
-    return Data(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top
+    return PoleData(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top
 
 
 def _result(
     frf: FRF,
     keep: np.ndarray,
-    data: Data,
+    data: PoleData,
     top: float,
-    fit: Fit,
-    slope: Slope,
+    fit: PoleFit,
+    slope: PoleSystem,
     sweep: Sweep,
     rule: Rule,
 ) -> Identified:

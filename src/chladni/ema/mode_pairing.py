@@ -8,7 +8,7 @@ from ..errors import ShapeError
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class ModePairs:
     """Positions that belong together, in order of the test's frequency, and who stays alone.
 
     Attributes
@@ -36,7 +36,7 @@ def pair(
     width: float = 0.05,
     least_mac: float = 0.5,
     farthest: float = 0.5,
-) -> Pairs:
+) -> ModePairs:
     """One-to-one pairing of modes.
 
     With shapes: the assignment of largest Σ MAC - (Δ ln f / 4 width)² (Hungarian method, Kuhn
@@ -67,7 +67,7 @@ def pair(
     else:
         m, n = _assigned(gap, mac[np.ix_(by_model, by_test)], width, least_mac, farthest)
     m, n = by_model[m], by_test[n]
-    return Pairs(
+    return ModePairs(
         model=m,
         test=n,
         mac=np.full(len(m), np.nan) if mac is None else mac[m, n],

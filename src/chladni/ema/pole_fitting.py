@@ -18,7 +18,7 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class PoleData:
     """Responses ready to be fitted.
 
     Attributes
@@ -71,7 +71,7 @@ def linear(s: np.ndarray, p: np.ndarray, q: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PoleFit:
     """Best residues for given poles.
 
     Attributes
@@ -100,14 +100,14 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Slope:
+class PoleSystem:
     """Gauss-Newton system of the poles, residues eliminated: JᵀJ and Jᵀr over (Re p, Im p)."""
 
     H: np.ndarray
     g: np.ndarray
 
 
-def _orthonormal(data: Data, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _orthonormal(data: PoleData, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Q R of the columns under the common weight, columns scaled to one beforehand."""
     B = stacked(data.common[:, None] * A)
     scale = np.maximum(np.linalg.norm(B, axis=0), _TINY)
@@ -115,7 +115,7 @@ def _orthonormal(data: Data, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return Q, R * scale
 
 
-def solve(data: Data, p: np.ndarray, slope: bool = False) -> tuple[Fit, Slope | None]:
+def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, PoleSystem | None]:
     """Residues by weighted least squares, channel by channel, in one orthonormal basis.
 
     With Q R = g Φ for the common weight g, every channel's normal matrix Qᵀ v² Q (v = w / g) is
@@ -149,7 +149,7 @@ def solve(data: Data, p: np.ndarray, slope: bool = False) -> tuple[Fit, Slope | 
             H += np.einsum("kaln,lnb->kalb", M, T).reshape(2 * r, 2 * r)
             g += np.einsum("kma,km->ka", T, (R2.T @ rest).reshape(r, 2)).ravel()
     e = data.w * (data.y - A @ x)
-    return Fit(p, x, e, gain), Slope(H, g) if slope else None
+    return PoleFit(p, x, e, gain), PoleSystem(H, g) if slope else None
 
 
 def _turn(ab: np.ndarray) -> np.ndarray:
@@ -169,8 +169,8 @@ def _gains(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndar
 
 
 def polish(
-    data: Data, p: np.ndarray, largest: float = 0.1, iterations: int = 20, tol: float = 0.1
-) -> tuple[Fit, Slope]:
+    data: PoleData, p: np.ndarray, largest: float = 0.1, iterations: int = 20, tol: float = 0.1
+) -> tuple[PoleFit, PoleSystem]:
     """Levenberg-Marquardt on the poles until a step lets χ² fall by less than ``tol``.
 
     ``largest`` is the highest damping ratio a pole may take.
@@ -190,13 +190,13 @@ def polish(
     return fit, slope
 
 
-def _solved(data: Data, p: np.ndarray) -> tuple[Fit, Slope]:
+def _solved(data: PoleData, p: np.ndarray) -> tuple[PoleFit, PoleSystem]:
     fit, slope = solve(data, p, slope=True)
     assert slope is not None
     return fit, slope
 
 
-def _step(slope: Slope, damping: float) -> np.ndarray:
+def _step(slope: PoleSystem, damping: float) -> np.ndarray:
     """Marquardt's step of every pole, complex (r,)."""
     d = np.maximum(np.diag(slope.H), 1e-12 * np.diag(slope.H).max(initial=_TINY))
     dp = np.linalg.solve(slope.H + damping * np.diag(d), slope.g)
@@ -210,7 +210,7 @@ def bounded(p: np.ndarray, largest: float) -> np.ndarray:
     return np.asarray(size * (-zeta + 1j * np.sqrt(1 - zeta**2)))
 
 
-def relocated(data: Data, p: np.ndarray) -> np.ndarray:
+def relocated(data: PoleData, p: np.ndarray) -> np.ndarray:
     """One relaxed vector-fitting step: the zeros of σ(s), (σ H)(s) and σ with the poles p.
 
     Gustavsen (2006), IEEE Trans. Power Delivery 21(3), eqs. 5-11.

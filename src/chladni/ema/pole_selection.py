@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from .pole_fitting import Data, Fit, Slope, bounded, polish, relocated, solve, stacked
+from .pole_fitting import PoleData, PoleFit, PoleSystem, bounded, polish, relocated, solve, stacked
 
 ORDERS = (6, 10, 15, 22, 31, 42, 56)
 _VF_STEPS = 6
@@ -53,13 +53,13 @@ class Rule:
         parameters = 2 * self.channels + 2
         return self.noise * (self.factor * parameters + 4 * np.log(self.lines))
 
-    def after(self, data: Data, fit: Fit) -> Self:
+    def after(self, data: PoleData, fit: PoleFit) -> Self:
         """The rule with the misfit of this fit as noise: what is systematic buys no poles."""
         freedom = max(data.samples - fit.x.size - 2 * len(fit.p), 1)
         return replace(self, noise=max(self.noise, fit.chi2 / freedom))
 
 
-def compressed(data: Data, most: int = 8) -> Data:
+def compressed(data: PoleData, most: int = 8) -> PoleData:
     """At most ``most`` real combinations of the channels, lines weighted alike for all.
 
     Channels are scaled to one and every line to the rms over channels, so that small responses
@@ -72,10 +72,10 @@ def compressed(data: Data, most: int = 8) -> Data:
     _, _, V = np.linalg.svd(stacked(g[:, None] * y), full_matrices=False)
     k = min(most, len(V))
     g = np.where(used.any(axis=1), g, 0.0)
-    return Data(data.s, y @ V[:k].T, np.repeat(g[:, None], k, axis=1), data.q)
+    return PoleData(data.s, y @ V[:k].T, np.repeat(g[:, None], k, axis=1), data.q)
 
 
-def swept(data: Data, orders: tuple[int, ...] = ORDERS, largest: float = 0.1) -> Sweep:
+def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1) -> Sweep:
     """Vector fitting at growing order, until χ² no longer falls by what the poles cost."""
     small = compressed(data)
     f = np.abs(data.s)
@@ -126,7 +126,7 @@ def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def start(data: Data, sweep: Sweep, rule: Rule) -> np.ndarray:
+def start(data: PoleData, sweep: Sweep, rule: Rule) -> np.ndarray:
     """Poles to begin with: what pays in the richest order, and clusters the rest agree on."""
     p, richest = sweep.poles, sweep.orders.max()
     low, high = 0.9 * float(np.abs(data.s).min()), 1.1 * float(np.abs(data.s).max())
@@ -140,7 +140,9 @@ def start(data: Data, sweep: Sweep, rule: Rule) -> np.ndarray:
     return chosen
 
 
-def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 40) -> tuple[Fit, Slope]:
+def settled(
+    data: PoleData, p: np.ndarray, rule: Rule, rounds: int = 40
+) -> tuple[PoleFit, PoleSystem]:
     """Polish a little, take out what does not pay, again, until both are at rest.
 
     A pole does not pay if χ² rises by less than its price without it. It is no mode if it has
@@ -162,7 +164,7 @@ def settled(data: Data, p: np.ndarray, rule: Rule, rounds: int = 40) -> tuple[Fi
     return fit, slope
 
 
-def _poor(data: Data, fit: Fit, slope: Slope, rule: Rule) -> np.ndarray:
+def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.ndarray:
     """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
     low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())
     size, half = np.abs(fit.p), np.abs(fit.p.real)
@@ -179,7 +181,7 @@ def _poor(data: Data, fit: Fit, slope: Slope, rule: Rule) -> np.ndarray:
     return np.array(out, dtype=int)
 
 
-def uncertainty(p: np.ndarray, slope: Slope, noise: float) -> tuple[np.ndarray, np.ndarray]:
+def uncertainty(p: np.ndarray, slope: PoleSystem, noise: float) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,)."""
     C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, noise)
     k = 2 * np.arange(len(p))
@@ -190,7 +192,9 @@ def uncertainty(p: np.ndarray, slope: Slope, noise: float) -> tuple[np.ndarray, 
     return np.sqrt(np.maximum(of_size, 0)) / size, np.sqrt(np.maximum(of_zeta, 0)) / size**3
 
 
-def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tuple[Fit, Slope]:
+def extended(
+    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int
+) -> tuple[PoleFit, PoleSystem]:
     """Poles added where the residual stands out, as long as each pays for itself."""
     f = np.abs(data.s)
     closed = np.zeros(len(f), bool)
@@ -211,7 +215,9 @@ def extended(data: Data, fit: Fit, slope: Slope, rule: Rule, tries: int) -> tupl
     return fit, slope
 
 
-def _with_pole(data: Data, fit: Fit, at: float, rule: Rule) -> tuple[Fit, Slope] | None:
+def _with_pole(
+    data: PoleData, fit: PoleFit, at: float, rule: Rule
+) -> tuple[PoleFit, PoleSystem] | None:
     """The fit with one pole more near this frequency; None where a look says it is not worth it."""
     usual = float(np.median(-fit.p.real / np.abs(fit.p))) if len(fit.p) else 0.01
     looks = []
@@ -224,7 +230,9 @@ def _with_pole(data: Data, fit: Fit, at: float, rule: Rule) -> tuple[Fit, Slope]
     return polish(data, best.p, rule.largest, 8, rule.noise)
 
 
-def untwinned(data: Data, fit: Fit, slope: Slope, rule: Rule) -> tuple[Fit, Slope]:
+def untwinned(
+    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule
+) -> tuple[PoleFit, PoleSystem]:
     """Twins made one: two poles in one bandwidth with the same shape are one mode, seen twice.
 
     A slightly nonlinear or leaky resonance is fitted better by two poles than by one. The second
@@ -246,7 +254,7 @@ def untwinned(data: Data, fit: Fit, slope: Slope, rule: Rule) -> tuple[Fit, Slop
     return fit, slope
 
 
-def _twins(fit: Fit) -> list[int]:
+def _twins(fit: PoleFit) -> list[int]:
     """Weaker partners of pairs within a bandwidth whose residues are alike, weakest first."""
     half, R = np.abs(fit.p.real), fit.residues
     close = np.abs(fit.p[:, None] - fit.p) < 1.5 * np.maximum(half[:, None], half)
@@ -257,6 +265,6 @@ def _twins(fit: Fit) -> list[int]:
     return [int(k) for k in np.argsort(fit.gain) if pairs[k]]
 
 
-def _local(fit: Fit) -> np.ndarray:
+def _local(fit: PoleFit) -> np.ndarray:
     """χ² around each line (n_f,): moving mean of five lines, all channels."""
     return np.convolve((np.abs(fit.e) ** 2).mean(axis=1), np.ones(5) / 5, mode="same")

@@ -14,7 +14,7 @@ Role = Literal["output", "input"]
 
 
 @dataclass(frozen=True, eq=False)
-class Poles:
+class PoleTable:
     """Identified frequencies without an FRF: what a table of a report holds.
 
     Attributes
@@ -44,12 +44,12 @@ class Poles:
         """The states in the order of the table."""
         return tuple(dict.fromkeys(self.state))
 
-    def of(self, state: str) -> "Poles":
+    def of(self, state: str) -> "PoleTable":
         """The lines of one state."""
         if state not in self.state:
             raise LabelError(f"no state {state!r}; there are {', '.join(self.states)}")
         here = np.array([s == state for s in self.state])
-        return Poles(
+        return PoleTable(
             self.frequency[here],
             self.frequency_sd[here],
             self.damping[here],
@@ -104,7 +104,7 @@ class Recording:
     ----------
     name : str                   file (and article, level) it comes from
     frf : FRF or None
-    poles : Poles or None        where no FRF exists
+    poles : PoleTable or None        where no FRF exists
     shapes : Shapes or None      mode shapes the file holds
     nodes : {node: (3,)}         places [m]
     axes : {node: (3, 3)}        rows: unit vectors of the node's own measuring axes, where turned
@@ -117,7 +117,7 @@ class Recording:
 
     name: str
     frf: FRF | None = None
-    poles: Poles | None = None
+    poles: PoleTable | None = None
     shapes: Shapes | None = None
     nodes: Mapping[int, np.ndarray] = field(default_factory=dict)
     axes: Mapping[int, np.ndarray] = field(default_factory=dict)

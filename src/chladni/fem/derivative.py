@@ -87,7 +87,7 @@ def _shell_modulus(
     dS = s.shear_by_bending(geo, np.broadcast_to(dQb, (len(geo), 3, 3)))
     dS = dS + s.shear_by_modulus(0.0 if section.rigid_shear else _shear_slope(shear, name))
     return shell.stiffness(
-        geo, t, Qm=dQm, Qb=dQb, Qc=dQc, S=dS, drill=s.drill_by_membrane(geo, t, dQm),
+        geo, t, Qm=dQm, Qb=dQb, Qc=dQc, S=dS, drill=s.drill_by_membrane(dQm),
         reference=s.Qm,
     )  # fmt: skip
 

@@ -17,14 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import triangle
+from .shell_drilling import corner_twist, damped
 from .shell_geometry import ShellGeometry as ShellGeometry
 from .shell_geometry import geometry as geometry
+from .shell_geometry import to_element
 from .shell_membrane import N as QUAD_N
-from .shell_membrane import jacobians, middle_slope
+from .shell_membrane import jacobians
 from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
-VARYING_SPIN = 0.1  # squared: share of the drilling stiffness for what varies of ω - rz
 CHUNK = 256  # elements a pass: what fits the cache
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
 MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
@@ -37,7 +38,7 @@ class Strains:
 
     Attributes
     ----------
-    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] (see _damped) in the element frame
+    B : (m, g, 9, 24)     ε [-], κ [1/m], γ [-], ω - rz [-] (see damped) in the element frame
     weight : (m, g)       dA [m²]
     N : (g, 4)            shape functions, for values given at corners
     """
@@ -72,8 +73,8 @@ def strains(geo: ShellGeometry, reference: np.ndarray | None = None) -> Strains:
     B[:, :, SHEAR, :, 2:5] = gamma.reshape(len(geo), -1, 2, 4, 3)
     B[:, :, DRILL, :, :2] = omega.reshape(len(geo), -1, 1, 4, 2)
     B[:, :, 8, :, 5] = -N
-    B[:, :, DRILL] = _damped(B[:, :, DRILL], weight)
-    B = B.reshape(len(geo), -1, 24) @ _to_element(geo)
+    B[:, :, DRILL] = damped(B[:, :, DRILL], weight)
+    B = B.reshape(len(geo), -1, 24) @ to_element(geo)
     return Strains(B.reshape(len(geo), len(N), 9, 24), weight, N)
 
 
@@ -104,7 +105,9 @@ def stiffness(
     S : (m, 2, 2) or (m, 2, 2, 2)
         Transverse shear stiffness in the element frame; where two are given, that of the mean of
         γ over the element and that of what varies within it [N/m].
-    drill : (m,)            s, stiffness against rz other than the membrane's spin [N/m]
+    drill : (m,) or (m, 2)
+        s, stiffness against rz other than the membrane's spin; where two are given, that of the
+        field and that of the corners (Nastran's K6ROT), see :mod:`.shell_drilling` [N/m]
     reference : (m, 3, 3) or (3, 3)
         Membrane stiffness for which the bubbles of the quadrilateral are condensed; Qm where not
         given (an isotropic sheet with nu = 0.3 where Qm is None).
@@ -117,9 +120,10 @@ def stiffness(
     def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
         t_g = t[rows] @ N.T
         weights = (t_g, t_g**3 / 12, -(t_g**2))
-        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(S), drill))
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(S), _field(drill)))
 
-    return _integrated(geo, Qm if reference is None else reference, section, _excess(S))
+    reference = Qm if reference is None else reference
+    return _integrated(geo, reference, section, _excess(S), _corners(drill))
 
 
 def thickness_derivative(
@@ -142,16 +146,17 @@ def thickness_derivative(
     ----------
     change : (m, 4)         δt at the corners [m]; np.eye(4)[k] gives ∂K/∂t_k
     dS : as S               change of S for this δt, SectionArrays.shear_by_thickness [N/m]
-    ddrill : (m,)           change of s, SectionArrays.drill_by_thickness [N/m]
+    ddrill : as drill       change of s, SectionArrays.drill_by_thickness [N/m]
     """
     change = np.broadcast_to(change, t.shape)
 
     def section(rows: Rows, part: ShellGeometry, N: np.ndarray) -> np.ndarray:
         t_g, d_g = t[rows] @ N.T, change[rows] @ N.T
         weights = (d_g, t_g**2 * d_g / 4, -2 * t_g * d_g)
-        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(dS), ddrill))
+        return _section(part, weights, *_of(rows, Qm, Qb, Qc, _varying(dS), _field(ddrill)))
 
-    return _integrated(geo, Qm if reference is None else reference, section, _excess(dS))
+    reference = Qm if reference is None else reference
+    return _integrated(geo, reference, section, _excess(dS), _corners(ddrill))
 
 
 def mass(
@@ -250,8 +255,12 @@ def _integrated(
     reference: np.ndarray | None,
     section: Callable[[Rows, ShellGeometry, np.ndarray], np.ndarray],
     excess: np.ndarray | None,
+    corners: np.ndarray | None,
 ) -> np.ndarray:
-    """∫ Bᵀ C B dA + A γ̄ᵀ dS γ̄, C (m, g, 9, 9) from section(rows, geometry, N), dS the excess."""
+    """∫ Bᵀ C B dA + A γ̄ᵀ dS γ̄ + s |J| Σ bᵀ b, C (m, g, 9, 9) from section(rows, geometry, N).
+
+    DS is the excess of shear stiffness, s that of the corners against twist.
+    """
     K = np.zeros((len(geo), 24, 24))
     for rows in _chunks(geo):
         part = geo[rows]
@@ -264,19 +273,10 @@ def _integrated(
             mean = (share[:, :, None, None] * e.B[:, :, SHEAR]).sum(axis=1)
             stress = excess[rows] * part.area[:, None, None] @ mean
             K[rows] += mean.swapaxes(1, 2) @ stress
+        if corners is not None:
+            b = corner_twist(part)
+            K[rows] += b.swapaxes(1, 2) @ (corners[rows, None, None] * b)
     return K
-
-
-def _damped(B: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The mean over the element and a tenth of what varies.
-
-    Drilling stiffness is there to carry twist from element to element (MacNeal-Harder's twisted
-    beam, Raasch's hook), which the mean does; held at every point it locks coarse doubly curved
-    shells (hemisphere, 8 x 8: 3 % low; this way 1 % high as MacNeal's element).
-    """
-    share = weight / weight.sum(axis=1, keepdims=True)
-    mean = (share[:, :, None, None, None] * B).sum(axis=1, keepdims=True)
-    return np.asarray(mean + VARYING_SPIN * (B - mean))
 
 
 def _varying(S: np.ndarray | None) -> np.ndarray | None:
@@ -287,6 +287,16 @@ def _varying(S: np.ndarray | None) -> np.ndarray | None:
 def _excess(S: np.ndarray | None) -> np.ndarray | None:
     """What the mean of γ has beyond that, usually negative (m, 2, 2)."""
     return None if S is None or S.ndim == 3 else S[:, 0] - S[:, 1]
+
+
+def _field(drill: np.ndarray | None) -> np.ndarray | None:
+    """Drilling stiffness of the field ω - rz."""
+    return drill if drill is None or drill.ndim == 1 else drill[:, 0]
+
+
+def _corners(drill: np.ndarray | None) -> np.ndarray | None:
+    """Drilling stiffness of the corners (m,); None where they have none."""
+    return None if drill is None or drill.ndim == 1 or not drill[:, 1].any() else drill[:, 1]
 
 
 def _section(
@@ -319,24 +329,6 @@ def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
     """Those rows of what is given for each element; one (3, 3) stands for all."""
     for a in arrays:
         yield a if a is None or a.shape == (3, 3) else a[rows]
-
-
-def _to_element(geo: ShellGeometry) -> np.ndarray:
-    """Motion of the flattened mid-surface in the element frame from the nodes': (m, 24, 24).
-
-    u' = R u + (d R r - z w) x n with d the offset, z the warp and w = (w,y -w,x) the turn of the
-    element, from the corners' deflections; a b for b x n = (b_y, -b_x, 0).
-    """
-    T = np.zeros((len(geo), 4, 6, 4, 6))
-    x, y, n = (geo.frames[:, k] for k in range(3))
-    for k in range(4):
-        T[:, k, :3, k, :3] = T[:, k, 3:, k, 3:] = geo.frames
-        T[:, k, 0, k, 3:] = geo.offset[:, None] * y
-        T[:, k, 1, k, 3:] = -geo.offset[:, None] * x
-    if geo.warp.any():
-        slope = middle_slope(geo.corners)
-        T[:, :, :2, :, :3] += np.einsum("mk,mij,ml->mkijl", geo.warp, slope, n)
-    return T.reshape(len(geo), 24, 24)
 
 
 def _mass(

@@ -18,6 +18,7 @@ def derivatives(xi: float, eta: float) -> np.ndarray:
 
 
 _SLOPES = np.stack([derivatives(*point) for point in GAUSS])  # (4 points, 2, 4)
+_CORNER_SLOPES = np.stack([derivatives(*point) for point in CORNERS])  # (4 corners, 2, 4)
 
 
 def jacobians(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -38,10 +39,15 @@ def gradients(inverse: np.ndarray) -> np.ndarray:
     return np.asarray(inverse @ _SLOPES)
 
 
-def middle_slope(corners: np.ndarray) -> np.ndarray:
-    """∂N/∂x and ∂N/∂y in the middle (m, 2, 4)."""
-    _, inverse = invert(derivatives(0, 0) @ corners)
-    return np.asarray(inverse @ derivatives(0, 0))
+def corner_slopes(corners: np.ndarray) -> np.ndarray:
+    """∂N_l/∂x and ∂N_l/∂y at each of the four corners (m, 4 corners, 2, 4) [1/m]."""
+    _, inverse = invert(_CORNER_SLOPES @ corners[:, None])
+    return np.asarray(inverse @ _CORNER_SLOPES)
+
+
+def corner_jacobians(corners: np.ndarray) -> np.ndarray:
+    """Jacobian of the unit square at each corner (m, 4), the area of a parallelogram [m²]."""
+    return np.asarray(4 * invert(_CORNER_SLOPES @ corners[:, None])[0])
 
 
 def symmetric(grad: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
 from .shell import ShellGeometry, geometry, turned
 
 DRILLING = 0.1  # of G t: MacNeal-Harder's twisted beam to 0.1 %; 1e-3 is 30 % too soft
+PENALTY = 1e-6  # of G t: a unit of K6ROT at the corners, exact (see .shell_drilling)
 VARYING = 0.04  # share of the residual flexibility that the varying part of shear sees
 STIFF = 1e-3  # shear flexibility, as a fraction of 1/(5/6 G_12 t), where the deck asks for none
 
@@ -33,7 +34,7 @@ class SectionArrays:
     Qm, Qb, Qc : (m, 3, 3)      material frame, Qb times 12 I/t³, Qc in MID4's sign [Pa]
     S : (m, 2, 2, 2)            transverse shear with residual bending, of the mean of γ and of
                                 what varies within the element, element frame [N/m]
-    drill : (m,)                [N/m]
+    drill : (m, 2)              drilling, of the field and of the corners [N/m]
     rho, nsm : (m,)             [kg/m³], [kg/m²]
     loss : (m,)                 loss factor of the section [-]
     shear_flexibility : (m, 1, 2, 2)  (k_s G t)⁻¹ alone, element frame [m/N]
@@ -84,14 +85,14 @@ class SectionArrays:
     def drill_by_thickness(
         self, geo: ShellGeometry, t: np.ndarray, change: np.ndarray
     ) -> np.ndarray:
-        """Ds = s δt/t (m,) [N/m]."""
+        """Ds = s δt/t (m, 2) [N/m]."""
         ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
-        return np.asarray(self.drill * ratio)
+        return np.asarray(self.drill * ratio[:, None])
 
-    def drill_by_membrane(self, geo: ShellGeometry, t: np.ndarray, dQm: np.ndarray) -> np.ndarray:
-        """Ds = alpha dQ_66 t (m,) [N/m]."""
-        dG = np.broadcast_to(dQm, (len(self), 3, 3))[:, 2, 2]
-        return np.asarray(DRILLING * dG * mean_thickness(geo, t))
+    def drill_by_membrane(self, dQm: np.ndarray) -> np.ndarray:
+        """Ds = s dQ_66/Q_66 (m, 2) [N/m]."""
+        G, dG = self.Qm[:, 2, 2], np.broadcast_to(dQm, (len(self), 3, 3))[:, 2, 2]
+        return np.asarray(self.drill * np.divide(dG, G, np.zeros_like(G), where=G > 0)[:, None])
 
 
 def section_arrays(
@@ -129,13 +130,18 @@ def section_arrays(
         Qb=Qb,
         Qc=Qc,
         S=_inverse(flexibility + _diagonal(residual), Qb),
-        drill=DRILLING * Qm[:, 2, 2] * t,
+        drill=np.outer(Qm[:, 2, 2] * t, _drilling(assembly.k6rot)),
         rho=rho,
         nsm=nsm,
         loss=loss,
         shear_flexibility=flexibility,
         residual_flexibility=residual,
     )
+
+
+def _drilling(k6rot: float | None) -> tuple[float, float]:
+    """Share of G t in the field's and in the corners' drilling stiffness."""
+    return (DRILLING, 0.0) if k6rot is None else (0.0, PENALTY * k6rot)
 
 
 def modulus_derivative(material: Material, name: str) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
-from .solid_shapes import FAMILIES, Family
+from .solid_shapes import FAMILIES, SolidFamily
 
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # of strain components
 
@@ -156,12 +156,12 @@ def stiffness_derivative(
     return out
 
 
-def _integrated(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+def _integrated(family: SolidFamily, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
     """The same with the internal strains condensed out."""
     return _condensed(_whole(family, X, C, modes), 3 * X.shape[1])
 
 
-def _whole(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
+def _whole(family: SolidFamily, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
     """Σ w |det J| Bᵀ C B over displacements and the first ``modes`` internal strains."""
     J0 = family.gradients(family.centre) @ X
     turn = _to_basic(np.linalg.inv(J0)) * np.linalg.det(J0)[:, None, None]
@@ -178,7 +178,9 @@ def _whole(family: Family, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarr
     return np.asarray(K)
 
 
-def _compatible(family: Family, X: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _compatible(
+    family: SolidFamily, X: np.ndarray, xi: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """B (m, 6, 3k) and det J (m,) at a point."""
     J = family.gradients(xi) @ X
     G = np.linalg.solve(J, np.broadcast_to(family.gradients(xi), (len(X), 3, X.shape[1])))

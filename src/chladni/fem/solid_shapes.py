@@ -25,7 +25,7 @@ _CUBE = np.array(
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class SolidFamily:
     """Shape functions of one kind of solid: values N(ξ) (k,), gradients dN/dξ (3, k)."""
 
     values: Callable[[np.ndarray], np.ndarray]
@@ -106,7 +106,7 @@ _TETRA4 = (5 + 3 * np.sqrt(5)) / 20 * np.eye(4)[:, 1:] + (5 - np.sqrt(5)) / 20 *
     1 - np.eye(4)[:, 1:]
 )
 FAMILIES = {
-    8: Family(
+    8: SolidFamily(
         _hexa_values,
         _hexa_gradients,
         _G * _CUBE,
@@ -116,7 +116,7 @@ FAMILIES = {
         np.ones(8),
         _hexa_enhanced,
     ),
-    6: Family(
+    6: SolidFamily(
         _wedge_values,
         _wedge_gradients,
         _PRISM,
@@ -126,7 +126,7 @@ FAMILIES = {
         np.full(6, 1 / 6),
         _wedge_enhanced,
     ),
-    4: Family(
+    4: SolidFamily(
         _tetra_values,
         _tetra_gradients,
         np.full((1, 3), 0.25),

@@ -16,7 +16,7 @@ INERTIA = np.kron(np.eye(2, dtype=bool), np.ones((3, 3), dtype=bool)) & (
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class DofPairs:
     """The b pairs of points that share an element, row by row, and where elements meet them.
 
     Attributes
@@ -35,7 +35,7 @@ class Pairs:
     before: np.ndarray
 
 
-def pairs(nodes: np.ndarray, n: int) -> Pairs:
+def pairs(nodes: np.ndarray, n: int) -> DofPairs:
     """Pairs of points among n that share an element; nodes (m, k) int."""
     nodes = np.asarray(nodes, dtype=np.int64)
     key = nodes[:, :, None] * n + nodes[:, None, :]
@@ -44,7 +44,7 @@ def pairs(nodes: np.ndarray, n: int) -> Pairs:
     width = np.bincount(row, minlength=n)
     before = np.cumsum(width) - width
     slot = slot.reshape(key.shape) - before[nodes][:, :, None]
-    return Pairs(nodes, column, width, slot, before)
+    return DofPairs(nodes, column, width, slot, before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,13 @@ class Pattern:
 
     Attributes
     ----------
-    pairs : Pairs
+    pairs : DofPairs
     mask : (6, 6) bool
     along, above : (6,) int     entries of a block's row, and before it
     start : (n,) int            entries before a point's
     """
 
-    pairs: Pairs
+    pairs: DofPairs
     mask: np.ndarray
     along: np.ndarray
     above: np.ndarray
@@ -100,7 +100,7 @@ class Pattern:
         np.add.at(data, at.ravel(), values.ravel())
 
 
-def pattern(shared: Pairs, mask: np.ndarray) -> Pattern:
+def pattern(shared: DofPairs, mask: np.ndarray) -> Pattern:
     """Pattern of these pairs with blocks filled where the mask (6, 6) says."""
     along = mask.sum(axis=1)
     start = shared.before * int(along.sum())

@@ -4,6 +4,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .facets import cell_normals
+
 
 def corner_quality(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
     """Least sine of a corner angle, min_k sin(θ_k), negative where a quad folds over (n,).
@@ -18,8 +20,7 @@ def corner_quality(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
     if points.shape[1] == 2:
         cross = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
     else:
-        normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        normal = cell_normals(points, quads)
         cross = np.einsum("nki,ni->nk", np.cross(ahead, behind), normal)
     size = np.linalg.norm(ahead, axis=-1) * np.linalg.norm(behind, axis=-1)
     sine = cross / np.maximum(size, 1e-30)
@@ -29,8 +30,14 @@ def corner_quality(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 def edges_of(cells: np.ndarray) -> np.ndarray:
     """All sides (k, 2) of the cells, smaller row first, repeated; collapsed ones left out."""
+    return np.sort(directed_edges(cells)[0], axis=1)
+
+
+def directed_edges(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sides (k, 2) as the cells run round them and whose they are (k,); collapsed ones left out."""
     sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    return np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1)
+    real = sides[:, 0] != sides[:, 1]
+    return sides[real], np.repeat(np.arange(len(cells)), cells.shape[1])[real]
 
 
 def components(quads: np.ndarray, count: int) -> np.ndarray:

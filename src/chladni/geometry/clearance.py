@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, RigidBody
 from .curvature import part_curvature
-from .nearest import Surface
+from .nearest import ShellSurface
 from .thickness_mapping import shell_area
 
 
@@ -113,7 +113,7 @@ def gaps(
 def _gaps(
     assembly: Assembly, sheets: _Sheets, names: tuple[str, str], within: float, away: float
 ) -> Gaps:
-    a, b = (Surface.of(assembly, name) for name in names)
+    a, b = (ShellSurface.of(assembly, name) for name in names)
     rows = np.unique(a.nodes)
     rows = rows[_in_box(assembly.points[rows], assembly.points[np.unique(b.nodes)], within)]
     rows = rows if len(rows) else a.nodes[0, :1]
@@ -195,12 +195,6 @@ def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
     for g in gaps:
         np.minimum.at(least, g.rows[g.free], g.clearance[g.free])
     return np.where(np.isfinite(least), least, np.nan)
-
-
-def clearances(assembly: Assembly, within: float = 0.010) -> tuple[PairClearance, ...]:
-    """All pairs of parts that come within a distance of each other, nearest first."""
-    found = [summary(assembly, g) for g in all_gaps(assembly, within=within)]
-    return tuple(sorted(found, key=lambda pair: pair.least_free))
 
 
 def summary(assembly: Assembly, g: Gaps) -> PairClearance:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.assembly import Assembly
-from .nearest import tangents
+from .facets import point_normals, tangents, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +39,7 @@ def curvature(points: np.ndarray, nodes: np.ndarray) -> Curvature:
     T = triangles(nodes)
     x = points[T]
     cross = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    n = len(points)
-    normal = np.zeros((n, 3))
-    for k in range(3):
-        np.add.at(normal, T[:, k], cross)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    n, normal = len(points), point_normals(points, nodes)
     tensor = _tensors(x, normal[T], cross)
     at_nodes = np.zeros((n, 3, 3))
     weight = np.zeros(n)
@@ -57,8 +53,7 @@ def curvature(points: np.ndarray, nodes: np.ndarray) -> Curvature:
 
 def _tensors(x: np.ndarray, normal: np.ndarray, cross: np.ndarray) -> np.ndarray:
     """S with δn = S δx along the three sides in least squares, as (m, 3, 3) tensors."""
-    unit = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
-    basis = np.stack(tangents(unit), axis=1)  # (m, 2, 3)
+    basis = np.stack(tangents(unit(cross)), axis=1)  # (m, 2, 3)
     side = np.einsum("mai,mki->mka", basis, np.roll(x, -1, axis=1) - x)
     turn = np.einsum("mai,mki->mka", basis, np.roll(normal, -1, axis=1) - normal)
     a, b = side[..., 0], side[..., 1]

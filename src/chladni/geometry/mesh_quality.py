@@ -7,7 +7,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..model.assembly import Assembly, Average, RigidBody
-from .cells import components, corner_quality, edges_of
+from .cells import components, corner_quality, directed_edges, edges_of
+from .facets import cell_normals
 
 LEAST_SINE, MOST_ASPECT, MOST_WARP = 0.3, 20.0, 0.15
 
@@ -36,8 +37,7 @@ def element_quality(assembly: Assembly) -> ElementQuality:
     x = points[nodes]
     sides = np.linalg.norm(np.roll(x, -1, axis=1) - x, axis=2)
     sides[nodes[:, 2] == nodes[:, 3], 2] = np.nan
-    normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal = cell_normals(points, nodes)
     off = np.abs(np.einsum("nki,ni->nk", x - x.mean(axis=1, keepdims=True), normal)).max(axis=1)
     off[nodes[:, 2] == nodes[:, 3]] = 0.0
     a, b = x[:, 1] + x[:, 2] - x[:, 0] - x[:, 3], x[:, 2] + x[:, 3] - x[:, 0] - x[:, 1]
@@ -106,14 +106,9 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
     return np.asarray(sides[count == 1])
 
 
-def _directed(nodes: np.ndarray) -> np.ndarray:
-    sides = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)
-    return sides[sides[:, 0] != sides[:, 1]]
-
-
 def edge_faults(nodes: np.ndarray) -> tuple[int, int]:
     """Edges whose two cells run the same way (normals disagree), edges of more than two cells."""
-    sides = _directed(nodes)
+    sides = directed_edges(nodes)[0]
     key, at, count = np.unique(
         np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
     )

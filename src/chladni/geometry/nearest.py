@@ -1,7 +1,8 @@
-"""Where a joint meets a sheet: nearest shells of a part, feet on them, nodes that carry it.
+"""The nearest point of a set of shells: its shell, its triangle, the weights of its grids.
 
-A warped quadrilateral is taken as two triangles on either diagonal; both triangles of each of the
-nearest quads are tried, because the quad whose centre is nearest need not hold the nearest point.
+A quadrilateral is taken as the two triangles at its diagonal 1-3. The shells are tried in the order
+of the distance to points spread over them; every point of a shell is within ``cover`` of one of its
+own, so that the search ends when no shell left over can be nearer than the best one found.
 """
 
 from collections.abc import Sequence
@@ -13,25 +14,27 @@ from scipy.spatial import cKDTree
 
 from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
+from .facets import tangents, unit
 
-NEAR = 12  # quads around a place whose triangles are tried
+NEAR = 12  # quads around a place whose triangles are tried first
+BLOCK = 200_000  # quads tried at a time, so that far places need little memory
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
 
-Sheet = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
+ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
 
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Nearest places on a surface.
+    """Nearest points of a surface to k places.
 
     Attributes
     ----------
-    shell : (k,)          rows of ``Surface.nodes``
+    shell : (k,) int      rows of ``ShellSurface.nodes``
     place : (k, 3)        [m]
-    nodes : (k, 3)        rows of points of the triangle
+    nodes : (k, 3) int    rows of points of the triangle
     weight : (k, 3)       barycentric weights of these nodes
     distance : (k,)       [m]
-    normal : (k, 3)       of the triangle
+    normal : (k, 3)       unit normal of the triangle, by the order of the shell's grids
     """
 
     shell: np.ndarray
@@ -43,8 +46,8 @@ class Feet:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """Shells a joint may be tied to.
+class ShellSurface:
+    """Shells whose nearest points are asked for.
 
     Attributes
     ----------
@@ -53,6 +56,7 @@ class Surface:
     nodes : (m, 4)      rows of points
     rows : (m,)         rows of ``assembly.shells``
     tree, owner :       places along the shells' longer middle lines, and whose they are
+    cover : float       farthest that a point of a shell is from a place of its own [m]
     """
 
     name: str
@@ -61,15 +65,20 @@ class Surface:
     rows: np.ndarray
     tree: cKDTree = field(repr=False)
     owner: np.ndarray = field(repr=False)
+    cover: float = field(repr=False)
 
     @classmethod
     def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
         """A surface of its own, not of an assembly."""
-        tree, owner = _spread(points[nodes])
-        return cls(name, points, nodes, np.arange(len(nodes)), tree, owner)
+        return cls(name, points, nodes, np.arange(len(nodes)), *_spread(points[nodes]))
 
     @classmethod
-    def of(cls, assembly: Assembly, sheet: Sheet) -> Self:
+    def whole(cls, assembly: Assembly) -> Self:
+        """All shells of an assembly."""
+        return cls.over("the structure", assembly.points, assembly.shells.nodes)
+
+    @classmethod
+    def of(cls, assembly: Assembly, sheet: ShellChoice) -> Self:
         """The shells of a part, or the shells with these rows."""
         if isinstance(sheet, str | int):
             part = assembly.part(sheet)
@@ -81,8 +90,7 @@ class Surface:
         if not len(rows):
             raise LabelError(f"{name or 'the selection'} has no shells to join to")
         nodes = assembly.shells.nodes[rows]
-        tree, owner = _spread(assembly.points[nodes])
-        return cls(name, assembly.points, nodes, rows, tree, owner)
+        return cls(name, assembly.points, nodes, rows, *_spread(assembly.points[nodes]))
 
     def feet(
         self,
@@ -91,25 +99,52 @@ class Surface:
         cosine: float = 0.7,
         near: int = NEAR,
     ) -> Feet:
-        """The nearest point of the surface to each place (k, 3).
+        """The nearest point of the surface to each place (k, 3) [m].
 
         With a `normal` (k, 3) at each place, triangles turned away from it (|cos| below `cosine`)
-        do not count; where none is left the distance is infinite.
+        do not count, and only the `near` nearest shells are tried; where none of these is left the
+        distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
-        k, count = len(places), min(near, len(self.owner))
-        tried = self.owner[self.tree.query(places, count)[1].reshape(k, count)]
+        feet, bound = self._tried(places, min(near, len(self.owner)), normal, cosine)
+        if normal is None:
+            self._improve(feet, places, bound, 4 * near)
+        return feet
+
+    def _improve(self, feet: Feet, places: np.ndarray, bound: np.ndarray, count: int) -> None:
+        """Try more shells where one not yet tried may be nearer, until none may."""
+        while len(open_ := np.flatnonzero(feet.distance > bound)):
+            count = min(count, len(self.owner))
+            for k in range(0, len(open_), max(1, BLOCK // count)):
+                block = open_[k : k + max(1, BLOCK // count)]
+                found, bound[block] = self._tried(places[block], count)
+                for name, value in vars(found).items():
+                    getattr(feet, name)[block] = value
+            count *= 4
+
+    def _tried(
+        self,
+        places: np.ndarray,
+        count: int,
+        normal: np.ndarray | None = None,
+        cosine: float = 0.0,
+    ) -> tuple[Feet, np.ndarray]:
+        """Nearest points on the `count` nearest shells, and what all others are beyond (k,) [m]."""
+        k = len(places)
+        reach, at = (v.reshape(k, count) for v in self.tree.query(places, count))
+        tried = self.owner[at]
         triangles = self.nodes[tried][..., _HALVES].reshape(k, 2 * count, 3)
         x = self.points[triangles]
         weight = barycentric_foot(places[:, None], x)
         foot = np.einsum("kta,ktai->kti", weight, x)
         distance = np.linalg.norm(foot - places[:, None], axis=-1)
-        facing = _unit(np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]))
+        facing = unit(np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]))
+        distance = np.where(facing.any(axis=-1), distance, np.inf)  # half of a triangle is a line
         if normal is not None:
             away = np.abs(np.einsum("kti,ki->kt", facing, normal)) < cosine
             distance = np.where(away, np.inf, distance)
         row, best = np.arange(k), distance.round(12).argmin(axis=1)
-        return Feet(
+        feet = Feet(
             tried[row, best // 2],
             foot[row, best],
             triangles[row, best],
@@ -117,6 +152,8 @@ class Surface:
             distance[row, best],
             facing[row, best],
         )
+        every = count == len(self.owner)
+        return feet, np.full(k, np.inf) if every else reach[:, -1] - self.cover
 
     def within(self, feet: Feet, places: np.ndarray, reach: float) -> None:
         """Refuse places farther than `reach` from the surface.
@@ -160,10 +197,12 @@ class Surface:
         return nodes[keep], weight[keep]
 
 
-def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray]:
+def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, float]:
     """Places along the longer middle line of each cell (m, 4, 3), closer than the usual size.
 
-    A long cell's centre may be far from a point that the cell itself is near.
+    A long cell's centre may be far from a point that the cell itself is near. With them goes whose
+    they are, and the farthest that any point of a cell is from a place of its own: a part of a
+    cell cut across its line lies in the hull of its corners, of which one is the farthest.
     """
     side = (x + np.roll(x, -1, axis=1)) / 2
     ends = [(side[:, 0], side[:, 2]), (side[:, 1], side[:, 3])]
@@ -174,12 +213,29 @@ def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray]:
     count = np.maximum(1, np.ceil(length.max(axis=0) / (1.5 * usual))).astype(int)
     owner = np.repeat(np.arange(len(x)), count)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((step + 0.5) / count[owner])[:, None]
-    return cKDTree(a[owner] + t * (b - a)[owner]), owner
+    h = (1 / count[owner])[:, None]
+    t = (step[:, None] + 0.5) * h
+    places = a[owner] + t * (b - a)[owner]
+    turned = np.where((longer == 0)[..., None], x, np.roll(x, -1, axis=1))
+    return cKDTree(places), owner, _reach(turned, places, owner, t, h)
 
 
-def _unit(v: np.ndarray) -> np.ndarray:
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30))
+def _reach(
+    x: np.ndarray, places: np.ndarray, owner: np.ndarray, t: np.ndarray, h: np.ndarray
+) -> float:
+    """Farthest corner of the slices t ± h/2 into which the cells x (m, 4, 3) are cut [m].
+
+    Sides 0-3 and 1-2, which the middle line does not cross, are cut in proportion. The triangles of
+    a cell lie up to |x0 - x1 + x2 - x3| / 4 off the surface that these cuts follow.
+    """
+    X = x[owner]
+    far = np.zeros(len(owner))
+    for s in (t - h / 2, t + h / 2):
+        for u, v in ((0, 3), (1, 2)):
+            corner = X[:, u] + s * (X[:, v] - X[:, u])
+            far = np.maximum(far, np.linalg.norm(corner - places, axis=1))
+    bow = np.linalg.norm(X[:, 0] - X[:, 1] + X[:, 2] - X[:, 3], axis=1) / 4
+    return float((far + np.where(h[:, 0] < 1, bow, 0.0)).max(initial=0.0))
 
 
 _HALVES = np.array([(0, 1, 2), (0, 2, 3)])
@@ -199,14 +255,6 @@ def _disc() -> np.ndarray:
 
 
 _DISC = _disc()
-
-
-def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors (..., 3) with u x v = n."""
-    e = np.eye(3)[np.abs(normal).argmin(axis=-1)]
-    u = e - (e * normal).sum(axis=-1, keepdims=True) * normal
-    u = u / np.linalg.norm(u, axis=-1, keepdims=True)
-    return u, np.cross(normal, u)
 
 
 def barycentric_foot(p: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -253,7 +301,9 @@ def nearest_parts(assembly: Assembly, places: np.ndarray, reach: float) -> list[
         Where fewer than two parts are within reach, naming the place.
     """
     present = np.unique(assembly.shells.part)
-    surfaces = [Surface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present]
+    surfaces = [
+        ShellSurface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present
+    ]
     far = np.stack([surface.feet(places).distance for surface in surfaces], axis=1)
     order = np.argsort(far, axis=1, kind="stable")[:, :2]
     if order.shape[1] < 2 or np.any(np.take_along_axis(far, order, 1)[:, 1] > reach):

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import AccuracyError, ModelError
 from ..model.assembly import Assembly
-from ..model.formed_mesh import FormedMesh
-from .nearest import Surface
+from .formed_mesh import FormedMesh
+from .nearest import ShellSurface
 from .thickness_mapping import samples, shell_area
 
 TRIM = 0.8  # share of the points that counts: the rest may have no partner
@@ -73,7 +73,7 @@ def align(
         If nothing fits: the residual stays above 5 % of the mesh's extent.
     """
     rows = _rows(assembly, parts)
-    target = Surface.of(assembly, rows)
+    target = ShellSurface.of(assembly, rows)
     x = assembly.points[assembly.shells.nodes[rows]].mean(axis=1)
     goal = _axes(x, shell_area(assembly)[rows])
     if not len(formed.cells):
@@ -159,7 +159,7 @@ def _best(found: dict[str, tuple[np.ndarray, np.ndarray, float]], *, mirrored: b
 
 
 def _icp(
-    target: Surface,
+    target: ShellSurface,
     source: np.ndarray,
     normal: np.ndarray,
     R: np.ndarray,

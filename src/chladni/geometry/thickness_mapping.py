@@ -13,10 +13,11 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.assembly import Assembly
-from ..model.formed_mesh import FormedMesh
 from ..model.properties import ShellSection
 from .cells import components
-from .nearest import Surface
+from .facets import cell_areas, cell_normals
+from .formed_mesh import FormedMesh
+from .nearest import ShellSurface
 
 FACING = np.cos(np.deg2rad(45))
 _NEAR, _FAR = 0.5 + np.array([1, -1]) / np.sqrt(12)
@@ -67,9 +68,8 @@ class Mapped:
 
 
 def shell_area(assembly: Assembly) -> np.ndarray:
-    """A = |d1 x d2| / 2 of every shell (n,) [m²]."""
-    x = assembly.points[assembly.shells.nodes]
-    return np.asarray(np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1) / 2)
+    """Area of every shell (n,) [m²]."""
+    return cell_areas(assembly.points, assembly.shells.nodes)
 
 
 def shell_mass(assembly: Assembly) -> np.ndarray:
@@ -95,8 +95,7 @@ def samples(points: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Gauss points (n, 4, 3) of the cells, one beside each corner, and cell normals (n, 3)."""
     x = points[nodes]
     at = np.stack([np.einsum("c,nci->ni", np.roll(_GAUSS, k), x) for k in range(4)], axis=1)
-    normal = np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
-    return at, normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    return at, cell_normals(points, nodes)
 
 
 def map_thickness(
@@ -182,7 +181,9 @@ def _by_place(
 ) -> dict[int, tuple[str, FormedMesh]]:
     """Connected sheets of the formed mesh, each given to the part whose shells lie on it."""
     piece = components(formed.cells, len(formed.points))[formed.cells[:, 0]]
-    surfaces = {p: Surface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present}
+    surfaces = {
+        p: ShellSurface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present
+    }
     owner: dict[int, list[int]] = {}
     for k in np.unique(piece):
         cells = formed.cells[piece == k]
@@ -214,7 +215,7 @@ def values_at(
     """Thickness and distance (n,) of the nearest facing place; NaN and inf where there is none."""
     if not len(formed.cells):
         return _from_points(formed, places, reach)
-    surface = Surface.over("the formed mesh", formed.points, formed.cells)
+    surface = ShellSurface.over("the formed mesh", formed.points, formed.cells)
     out, far = np.full(len(places), np.nan), np.full(len(places), np.inf)
     for k in range(0, len(places), 20000):
         block = slice(k, k + 20000)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from ..model.formed_mesh import FormedMesh
+from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named

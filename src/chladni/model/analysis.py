@@ -56,7 +56,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Tabulated:
     """A tabulated function, piecewise linear, its end slopes continued (Nastran's TABLED1)."""
 
     x: np.ndarray
@@ -92,7 +92,7 @@ class Excitation:
         displacement frame of the point
     amplitude : (k,)              A [N, N m or m, m/s, m/s² and their rotations]
     delay, phase : (k,)           τ [s], θ [rad]
-    first, second : Table or None real and imaginary part of g, or its modulus and phase [deg]
+    first, second : Tabulated or None real and imaginary part of g, or its modulus and phase [deg]
     polar : bool                  g = first exp(i second), as RLOAD2 has it
     """
 
@@ -102,8 +102,8 @@ class Excitation:
     amplitude: np.ndarray
     delay: np.ndarray
     phase: np.ndarray
-    first: Table | None = None
-    second: Table | None = None
+    first: Tabulated | None = None
+    second: Tabulated | None = None
     polar: bool = False
 
     def at(self, frequency: np.ndarray) -> np.ndarray:

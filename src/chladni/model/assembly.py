@@ -202,6 +202,7 @@ class Assembly:
     supports : (k, 2) int     (row of points, component 1-6) held at zero
     coupled_mass : bool       consistent mass (True) or lumped (False), where the element has both
     structural_damping : float  loss factor of the whole (PARAM,G)
+    k6rot : float or None     Nastran's drilling stiffness (PARAM,K6ROT); None: 0.1 G t of a field
     label : dict              material ids, coordinate systems: whatever names a file needs back
     """
 
@@ -223,6 +224,7 @@ class Assembly:
     coupled_mass: bool = True
     structural_damping: float = 0.0
     auto_spc: bool = True
+    k6rot: float | None = None
 
     def rows(self, ids: np.ndarray | list[int] | tuple[int, ...]) -> np.ndarray:
         """Rows of the points with these ids.

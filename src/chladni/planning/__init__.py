@@ -64,8 +64,8 @@ from .measurement_lines import transient_left as transient_left
 from .parameter_information import Linearised as Linearised
 from .plan_summary import sensors_csv as sensors_csv
 from .plan_summary import summary as summary
-from .sensor_candidates import Places as Places
-from .sensor_candidates import find_places as find_places
+from .sensor_candidates import SensorCandidates as SensorCandidates
+from .sensor_candidates import find_sensor_candidates as find_sensor_candidates
 from .whole_plan import Plan as Plan
 from .whole_plan import Wishes as Wishes
 from .whole_plan import plan as plan

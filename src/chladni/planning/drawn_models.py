@@ -12,7 +12,7 @@ from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import rigid_modes
 from ..dynamics.reduction import orthonormal
 from ..effects.ordinary import PartScale, ordinary
-from ..effects.shell_groups import sheet
+from ..effects.shell_groups import shell_groups
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..progress import Progress, silent
@@ -55,16 +55,16 @@ def ensemble(built: Structure, top: float, spread: float, progress: Progress = s
     progress("models with drawn thickness", 0.0)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
     modal = normal_modes(built.system, band=REACH * top, points=where)
-    cloth = sheet(built, 1)
-    parts = np.unique(cloth.part).tolist()
-    effects = tuple(ordinary(cloth, "t", [p], spread) for p in parts)
+    groups = shell_groups(built, 1)
+    parts = np.unique(groups.part).tolist()
+    effects = tuple(ordinary(groups, "t", [p], spread) for p in parts)
     blocks = [modal.shapes]
     rng = np.random.default_rng(0)
     for k in range(FULL):
         progress(f"drawn model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
         blocks.append(_solved(built, effects, random(rng, len(parts), spread), 1.1 * top))
     basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
-    return Ensemble(reduce(cloth, basis), effects, int(rigid_modes(modal).sum()))
+    return Ensemble(reduce(groups, basis), effects, int(rigid_modes(modal).sum()))
 
 
 def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:

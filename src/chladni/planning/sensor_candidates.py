@@ -7,7 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import ModelError
-from ..fem.locate import locate
+from ..geometry.facets import point_normals, tangents, unit, vector_areas
+from ..geometry.nearest import ShellSurface
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..view.surface import Surface, surface
 
@@ -17,7 +19,7 @@ RELATIVE = 400.0  # where the unit of length is unknown a foot is this part of t
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class SensorCandidates:
     """Where a sensor can sit, in an order in which any first few cover the structure.
 
     A place is a grid or, where no corner of a shell will do, its centre: a coarse mesh has no grid
@@ -67,7 +69,7 @@ def centre_ids(assembly: Assembly) -> np.ndarray:
     return np.asarray(assembly.shells.ids + 10 ** len(str(longest)))
 
 
-def find_places(
+def find_sensor_candidates(
     assembly: Assembly,
     count: int = 300,
     *,
@@ -75,7 +77,7 @@ def find_places(
     room: float | None = None,
     flat: float = 10.0,
     unit: str = "m",
-) -> Places:
+) -> SensorCandidates:
     """At most ``count`` places spread over the sheets, each farthest from those before it.
 
     Parameters
@@ -110,7 +112,7 @@ def find_places(
     if not clear.any():
         raise ModelError("no grid of the surface is flat and off the edges: refine the mesh")
     at = np.flatnonzero(clear)
-    at = at[spread(every.points[at], min(3 * count, len(at)))]
+    at = at[farthest_point_sample(every.points[at], min(3 * count, len(at)))]
     side, straight = _reachable(seen, every.points[at], normals[at], foot, room, count)
     good = np.flatnonzero(side)[:count]
     refused["not reachable"] = int((side[: good[-1]] == 0).sum()) if len(good) else len(at)
@@ -121,7 +123,7 @@ def find_places(
 
 @dataclass(frozen=True, eq=False)
 class _Every:
-    """All grids of the sheets, then the centres of all shells; as in :class:`Places`."""
+    """All grids of the sheets, then the centres of all shells; as in :class:`SensorCandidates`."""
 
     ids: np.ndarray
     is_grid: np.ndarray
@@ -136,9 +138,9 @@ class _Every:
         side: np.ndarray,
         straight: np.ndarray,
         refused: Mapping[str, int],
-    ) -> Places:
+    ) -> SensorCandidates:
         """Some of them, with what was found out about them."""
-        return Places(
+        return SensorCandidates(
             self.ids[at],
             self.is_grid[at],
             self.nodes[at],
@@ -181,21 +183,16 @@ def _bend(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal of each place and the mean sin² of the surface's angle to it within a foot.
 
-    The tensor Σ A n nᵀ of the faces is blind to their orientation; its first vector is the normal,
-    with the sense that most of the faces around the place have.
+    That mean is 1 - nᵀ (Σ A n nᵀ) n / Σ A, blind to which way round the faces are numbered.
     """
-    a = Surface(seen.points, sheet).areas()
-    size = np.linalg.norm(a, axis=1)
-    tensor = np.einsum("mi,mj,m->mij", a, a, 1 / np.maximum(size, 1e-300))
-    own, sense = np.zeros((len(seen.points), 3, 3)), np.zeros((len(seen.points), 3))
+    a = vector_areas(seen.points, sheet)
+    tensor = np.einsum("mi,mj->mij", a, unit(a))
+    own = np.zeros((len(seen.points), 3, 3))
     for k in range(4):
         np.add.at(own, sheet[:, k], tensor)
-        np.add.at(sense, sheet[:, k], a)
     grids, centres = every.nodes[every.is_grid, 0], int((~every.is_grid).sum())
     wide = np.concatenate([own[grids], tensor[:centres]])
-    sense = np.concatenate([sense[grids], a[:centres]])
-    normals = np.linalg.eigh(wide)[1][:, :, 2]
-    normals *= np.where(np.einsum("ni,ni->n", normals, sense) < 0, -1.0, 1.0)[:, None]
+    normals = np.concatenate([point_normals(seen.points, sheet)[grids], unit(a[:centres])])
     middle = cKDTree(seen.points[sheet].mean(axis=1))
     pairs = cKDTree(every.points).sparse_distance_matrix(middle, foot, output_type="ndarray")
     np.add.at(wide, pairs["i"], tensor[pairs["j"]])
@@ -213,24 +210,6 @@ def _off_edges(seen: Surface, points: np.ndarray, foot: float) -> np.ndarray:
     return np.asarray(cKDTree(dense).query(points)[0] >= foot)
 
 
-def spread(points: np.ndarray, count: int) -> np.ndarray:
-    """Order of ``count`` points in which each is the farthest from those before it (Gonzalez 1985).
-
-    It begins at the point farthest from the middle; of points equally far the first is taken.
-    """
-    far = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    order = [_farthest(far)]
-    far = np.linalg.norm(points - points[order[0]], axis=1)
-    while len(order) < count:
-        order.append(_farthest(far))
-        far = np.minimum(far, np.linalg.norm(points - points[order[-1]], axis=1))
-    return np.array(order)
-
-
-def _farthest(far: np.ndarray) -> int:
-    return int(np.argmax(far >= (1 - 1e-9) * far.max()))
-
-
 def _reachable(
     seen: Surface, points: np.ndarray, normals: np.ndarray, foot: float, room: float, enough: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -241,9 +220,14 @@ def _reachable(
     """
     triangles = np.concatenate([seen.faces[:, [0, 1, 2]], seen.faces[:, [0, 2, 3]]])
     corners = seen.points[triangles[triangles[:, 1] != triangles[:, 2]]]
-    sheet, out, straight = Sheet.of(corners), np.zeros(len(points)), np.zeros(len(points), bool)
+    blocking, out, straight = (
+        Obstacles.of(corners),
+        np.zeros(len(points)),
+        np.zeros(len(points), bool),
+    )
+    all_faces = ShellSurface.over("the structure", seen.points, seen.faces)
     lift = [
-        locate(seen.points, seen.faces, points + side * room / 2 * normals).distance >= 0.4 * room
+        all_faces.feet(points + side * room / 2 * normals).distance >= 0.4 * room
         for side in (1, -1)
     ]
     for k in range(len(points)):
@@ -252,23 +236,21 @@ def _reachable(
         for side, free in zip((1, -1), lift, strict=True):
             n = side * normals[k]
             start, sights = points[k] + 0.25 * foot * n, _sights(n)
-            if free[k] and sheet.clear(start, sights):
-                out[k], straight[k] = side, sheet.clear(start, sights[:1])
+            if free[k] and blocking.clear(start, sights):
+                out[k], straight[k] = side, blocking.clear(start, sights[:1])
                 break
     return out, straight
 
 
 def _sights(n: np.ndarray) -> np.ndarray:
     """Five lines of sight: along the normal and tilted to four sides (5, 3)."""
-    t = np.cross(n, np.eye(3)[np.abs(n).argmin()])
-    t /= np.linalg.norm(t)
-    b = np.cross(n, t)
+    t, b = tangents(n)
     tilted = [np.cos(TILT) * n + np.sin(TILT) * s for s in (t, -t, b, -b)]
     return np.array([n, *tilted])
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class Obstacles:
     """Triangles that may stand in a line of sight.
 
     Attributes
@@ -283,7 +265,7 @@ class Sheet:
     reach: np.ndarray
 
     @classmethod
-    def of(cls, corners: np.ndarray) -> "Sheet":
+    def of(cls, corners: np.ndarray) -> "Obstacles":
         """From the corners (m, 3, 3)."""
         e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         longest = np.maximum(np.linalg.norm(e1, axis=1), np.linalg.norm(e2, axis=1))

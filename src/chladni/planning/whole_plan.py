@@ -23,7 +23,7 @@ from .layouts.information import candidates, value
 from .layouts.layout_quality import Move, loaded_frequency, overlap, visibility, with_visible_modes
 from .layouts.layout_rules import Rules, too_near
 from .rattle import Openings, Rattle, first_rattle, openings
-from .sensor_candidates import Places, find_places
+from .sensor_candidates import SensorCandidates, find_sensor_candidates
 
 SPARE = 6  # modes computed beyond those wanted, so that the sweep sees what lies above
 BLIND = 0.25  # of the floor: what no place sees better than this is not aimed at
@@ -74,7 +74,7 @@ class Mount:
 
     Attributes
     ----------
-    ids : (m,) int          grids, or numbers of centres as in :class:`Places`
+    ids : (m,) int          grids, or numbers of centres as in :class:`SensorCandidates`
     place : (m,) int        position among the places
     points, directions : (m, 3)
     labels : tuple of str   412:+Z along an axis, else 412:n
@@ -97,7 +97,7 @@ class Plan:
 
     Attributes
     ----------
-    places : Places
+    places : SensorCandidates
     modal : ModalModel            target modes, damping as wished
     first : int                   number of the first of them in the deck (rigid modes before it)
     mounts : Mount                every candidate: normals first, then directions on blocks
@@ -122,7 +122,7 @@ class Plan:
     """
 
     wishes: Wishes
-    places: Places
+    places: SensorCandidates
     modal: ModalModel
     first: int
     mounts: Mount
@@ -163,7 +163,7 @@ def plan(
     """
     wishes = wishes or Wishes()
     progress("places a sensor can sit at", 0.05)
-    places = find_places(assembly, wishes.candidates, unit=unit)
+    places = find_sensor_candidates(assembly, wishes.candidates, unit=unit)
     progress("modes", 0.2)
     built = built or structure(assembly)
     modal, above, first = target_modes(built, wishes)
@@ -253,13 +253,13 @@ def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
     return np.asarray(u.reshape(len(built.assembly.points), 6, -1)[:, :3])
 
 
-def seen_at(places: Places, mounts: Mount, moving: np.ndarray) -> np.ndarray:
+def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
     """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
     at = places.moving(moving, mounts.place)
     return np.asarray(np.einsum("mir,mi->mr", at, mounts.directions))
 
 
-def mounts_at(places: Places) -> Mount:
+def mounts_at(places: SensorCandidates) -> Mount:
     """Normals of all places, then the two axes of the basic frame most along each sheet."""
     place, directions = [np.arange(len(places))], [places.normals]
     across = np.argsort(np.abs(places.normals), axis=1)[:, :2]
@@ -341,7 +341,7 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 
 
 def hang_points(
-    moving: np.ndarray, places: Places, count: int = 4, first: int = 5
+    moving: np.ndarray, places: SensorCandidates, count: int = 4, first: int = 5
 ) -> tuple[np.ndarray, np.ndarray]:
     """Grids that move least in the first modes, well apart: near nodes, where cords add least.
 

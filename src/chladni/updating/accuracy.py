@@ -80,7 +80,7 @@ def _improved(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, state: State, missing: np.ndarray
 ) -> np.ndarray:
     """λ of Rayleigh-Ritz on the basis and what it lacks, in increasing order."""
-    M = model.sheet.structure.system.M
+    M = model.groups.structure.system.M
     both = orthonormal(M, [model.basis, missing], kept=model.basis.shape[1])
     Z = both[:, model.basis.shape[1] :]
     if not Z.shape[1]:
@@ -99,9 +99,9 @@ def products(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """K(x) q and M(x) q (n, k) on the full operators, never assembled."""
-    system, sheet = model.sheet.structure.system, model.sheet
+    system, groups = model.groups.structure.system, model.groups
     K, M = system.K.real @ q, system.M @ q
-    logs = {k: v[sheet.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
+    logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces().items():
         own = logs["E"] + (logs[name] if name else 0.0)
@@ -109,7 +109,7 @@ def products(
             np.expm1(own + power * logs["t"]) * A for A, power in zip(pair, (1, 3), strict=True)
         )
     K = K + _spread(model, np.asarray(change), q)
-    M = M + _spread(model, np.expm1(logs["rho"] + logs["t"]) * sheet.mass, q)
+    M = M + _spread(model, np.expm1(logs["rho"] + logs["t"]) * groups.mass, q)
     for effect, at in slices(effects):
         for term in effect.terms(x[at]):
             added = term.rows.T @ (term.coefficient[:, None] * (term.rows @ q))
@@ -122,7 +122,7 @@ def products(
 
 def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Σ_e Tᵀ A_e T q of the shells' matrices (m, 24, 24)."""
-    T, nodes = model.sheet.structure.T, model.sheet.nodes
+    T, nodes = model.groups.structure.T, model.groups.nodes
     dofs = (6 * nodes[:, :, None] + np.arange(6)).reshape(len(nodes), -1)
     force = matrices @ (T @ q)[dofs]
     gather = sp.csr_array(

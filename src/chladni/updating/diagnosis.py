@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.movable_attachment import Somewhere
 from ..errors import ModelError
-from .candidates import candidates, point_effect
-from .hypothesis_fit import NEVER_WRITTEN, ROUGH, Search, Trial, fitted
+from .candidates import candidates
+from .hypothesis_fit import ROUGH, Search, Trial, fitted
 from .likelihood import Data, Poles, Responses
 from .map_fit import Status
 
@@ -80,9 +79,9 @@ def diagnose(
     progress("scan of the catalogue", 0.2)
     tried = candidates(search, null)
     trials = []
-    for k, (effect, start, base) in enumerate(tried):
-        progress(f"trying {effect.name} {effect.text}", 0.3 + 0.4 * k / len(tried))
-        trials += _tried(search, null, effect, start, base)
+    for k, c in enumerate(tried):
+        progress(f"trying {c.effect.name} {c.effect.text}", 0.3 + 0.4 * k / len(tried))
+        trials += _tried(search, null, c.effect, c.start, c.base)
     trials = _by_family(trials)
     progress("closing in on the place", 0.7)
     trials = _by_family([_finished(search, t, k < RUNNING) for k, t in enumerate(trials)])
@@ -135,7 +134,7 @@ def _base_trial(search: Search, effects: Sequence[Effect], starts: list[np.ndarr
 
 def _plain(search: Search, null: Trial) -> Trial:
     """Ordinary parameters without scatter or jitter, from the same starts and from the null."""
-    kept = [e.name not in NEVER_WRITTEN for e in search.base]
+    kept = [e.writable for e in search.base]
     chosen = [e for e, k in zip(search.base, kept, strict=True) if k]
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(search.base, kept, strict=True)]
@@ -192,19 +191,14 @@ def _finished(search: Search, trial: Trial, running: bool) -> Trial:
 
 
 def _closer(search: Search, lead: Trial) -> list[Trial]:
-    """The leader begun anew from the grid it moved to, while it moves."""
+    """The leader begun anew about the place it moved to, while it moves."""
     out: list[Trial] = []
-    grids = search.bench.grids
     for _ in range(3):
-        effect, x = lead.effect, lead.fit.of(lead.effect)
-        if not isinstance(effect, Somewhere) or np.abs(x[1:]).max() < 0.75:
+        again = lead.effect.recentred(lead.fit.of(lead.effect), search.where)
+        if again is None:
             break
-        new = point_effect(
-            search, "M" if effect.matrix == "M" else "K", grids, grids.position(effect.nearest(x))
-        )
-        start = np.array([x[0], 0.0, 0.0])
         try:
-            trial = search.trial(new, start, _taken(search, lead, ("ordinary",)))
+            trial = search.trial(*again, _taken(search, lead, ("ordinary",)))
         except ModelError:
             break
         out.append(trial)

@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects import catalogue
 from ..effects.effect import Effect
-from ..effects.movable_attachment import Somewhere
+from ..effects.surroundings import Setup, Surroundings
 from .likelihood import Data, Poles, Responses
 from .map_fit import Fit, Weighing, fit
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import Workbench
 
-NEVER_WRITTEN = ("scatter", "jitter")  # nuisances no deck can hold; gain and mesh error stay
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
@@ -51,8 +49,14 @@ class Search:
     weighing: Weighing | None
     base: tuple[Effect, ...]
     nuisance: tuple[Effect, ...]
-    setup: catalogue.Setup
+    setup: Setup
     labels: tuple[str, ...] = ()
+
+    @property
+    def where(self) -> Surroundings:
+        """The structure and its test as effects may know them."""
+        bench = self.bench
+        return Surroundings(bench.groups, bench.grids, bench.candidates, self.setup)
 
     def mean(self) -> np.ndarray:
         """Prior mean of the base parameters."""
@@ -62,14 +66,7 @@ class Search:
         self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
     ) -> Trial:
         """Fit one effect together with the base, from these starts."""
-        model = self.bench.model
-        if isinstance(effect, Somewhere):
-            model = self.bench.with_attachments(effect.carried())
-        else:
-            for term in effect.terms(start):
-                model = self.bench.with_attachments(term.rows)
-        if any(change.field.startswith("Q") for change in effect.fields(start)):
-            model = model.with_components()
+        model = self.bench.model_for(effect, start)
         data = self.data.over(model)
         kept = self.without(effect)
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
@@ -158,7 +155,7 @@ def as_written(trial: Trial, weighing: Weighing | None) -> Trial:
         replace(p, mean=float(v), sd=HELD) for p, v in zip(trial.effect.parameters, x, strict=True)
     )
     held = replace(trial.effect, parameters=unknown)
-    kept = [e for e in trial.fit.effects if e.name not in NEVER_WRITTEN]
+    kept = [e for e in trial.fit.effects if e.writable]
     start = np.concatenate([trial.fit.of(e) for e in kept])
     effects = [held if e is trial.effect else e for e in kept]
     return Trial(held, fit(trial.model, effects, trial.data, weighing, start), trial.model)

@@ -125,7 +125,7 @@ def fit(
             break
     A = J.T @ J
     S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
-    S += sum(2 * np.log(effect.places) for effect in effects)
+    S += sum(2 * np.log(effect.trials_factor) for effect in effects)
     own = r[: len(r) - len(x) - (weighing is not None)]
     return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
 

@@ -152,7 +152,7 @@ def effect_entry(trial: Trial) -> dict[str, Any]:
         "name": effect.name,
         "claim": effect.claim,
         "log_evidence": -trial.S / 2,
-        "where": effect.settled(x),
+        "where": effect.location(x),
         "parameters": effect.reported(x, trial.fit.sd(effect)),
     }
 
@@ -170,7 +170,7 @@ def alternatives(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "name": trial.effect.name,
                 "log_evidence": -trial.S / 2,
                 "why_not": why_not(trial, best, found is not None, diagnosis.gain(trial)),
-                "where": trial.effect.settled(trial.fit.of(trial.effect)),
+                "where": trial.effect.location(trial.fit.of(trial.effect)),
             }
         )
     if found is not None:

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..effects import catalogue
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
-from ..effects.ordinary import PartScale, gain, ordinary, scatter
+from ..effects.ordinary import PartScale, defaults, gain, ordinary, scatter
+from ..effects.surroundings import Setup
 from ..ema.identification import equalised, identify
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
@@ -179,7 +179,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
 def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
-        scatter(bench.sheet, "t", SCATTER_T), scatter(bench.sheet, "E", SCATTER_E)
+        scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(built, top)) is not None:
         out.append(mesh)
@@ -197,7 +197,7 @@ def searched(
     base = [*_ordinary(question, bench), *nuisance]
     weight = mass_properties(question.assembly)[0]
     sensors = tuple(int(g) for g in question.outputs.grids if g > 0)
-    setup = catalogue.Setup(sensors, question.hangers, weight, top)
+    setup = Setup(sensors, question.hangers, weight, top)
     return Search(
         bench, data, question.weighing, tuple(base), tuple(nuisance), setup, question.outputs.labels
     )
@@ -206,11 +206,11 @@ def searched(
 def _ordinary(question: Question, bench: Workbench) -> list[PartScale]:
     """The parameters the user frees, or E and rho of every material and t of every part."""
     chosen = [
-        ordinary(bench.sheet, name, [question.assembly.part(p) for p in parts])
+        ordinary(bench.groups, name, [question.assembly.part(p) for p in parts])
         for name, parts in question.parameters
         if name in ("E", "rho", "t")
     ]
-    return chosen or catalogue.defaults(bench.sheet)
+    return chosen or defaults(bench.groups)
 
 
 def _mass_note(question: Question) -> list[str]:

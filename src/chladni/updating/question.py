@@ -3,54 +3,14 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
-from ..fem.assemble import Structure
-from ..fem.locate import rows_of
+from ..fem.measured_dofs import MeasuredDofs
 from ..model.assembly import Assembly
 from .hypothesis_fit import Search
 from .likelihood import Poles, Responses
 from .map_fit import Weighing
-
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Measured or driven dofs on the structure: grids, or free points on the nearest shell.
-
-    Attributes
-    ----------
-    labels : (k,) text
-    grids : (k,) int        id, 0 where the place is no grid
-    points : (k, 3)         [m]
-    directions : (k, 3)     unit vectors, basic frame
-    sd : (k,)               uncertainty of the place [m]
-    """
-
-    labels: tuple[str, ...]
-    grids: np.ndarray
-    points: np.ndarray
-    directions: np.ndarray
-    sd: np.ndarray
-
-    def rows(self, built: Structure) -> sp.csr_array:
-        """Rows over the free dofs of the structure (k, n)."""
-        return rows_of(built, self.grids, self.points, self.directions)
-
-    def around(self, built: Structure) -> sp.csr_array:
-        """Rows at each place and four more, two standard deviations away in the sheet."""
-        rows = [self.rows(built)]
-        uncertain = np.flatnonzero(self.sd > 0)
-        for k in uncertain:
-            n = self.directions[k]
-            e1 = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
-            e1 /= np.linalg.norm(e1)
-            e2 = np.cross(n, e1)
-            step = 1.4 * self.sd[k]
-            near = self.points[k] + step * np.array([e1, -e1, e2, -e2])
-            rows.append(rows_of(built, np.zeros(4, int), near, np.tile(n, (4, 1))))
-        return sp.csr_array(sp.vstack(rows))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +21,8 @@ class Question:
     """
 
     assembly: Assembly
-    outputs: Places
-    inputs: Places
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
     frf: FRF | None = None
     frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
     frequency_sd: np.ndarray | None = None  # [Hz]

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect, count
 from ..effects.shell_components import COMPONENTS, component_matrices
-from ..effects.shell_groups import Sheet
+from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
 from ..fem.energy import mass_properties
 
@@ -27,7 +27,7 @@ class Reduced:
 
     Attributes
     ----------
-    sheet : what the groups are
+    groups : of the structure's shells
     basis : (n, r)            M-orthonormal
     linear, cubic : {component: (g, r, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
     mass : (g, r, r)
@@ -35,7 +35,7 @@ class Reduced:
     weight0 : float           mass beside the shells [kg]
     """
 
-    sheet: Sheet
+    groups: ShellGroups
     basis: np.ndarray
     linear: dict[str, np.ndarray]
     cubic: dict[str, np.ndarray]
@@ -61,15 +61,15 @@ class Reduced:
 
     def extended(self, vectors: np.ndarray) -> Self:
         """The same model over a basis that also holds these vectors (n, k)."""
-        system = self.sheet.structure.system
+        system = self.groups.structure.system
         basis = orthonormal(system.M, [self.basis, vectors], kept=self.basis.shape[1])
         new = basis[:, self.basis.shape[1] :]
         if not new.shape[1]:
             return self
 
         def grown(old: np.ndarray, matrices: np.ndarray) -> np.ndarray:
-            side = self.sheet.project(matrices, self.basis, new)
-            return _bordered(old, side, self.sheet.project(matrices, new))
+            side = self.groups.project(matrices, self.basis, new)
+            return _bordered(old, side, self.groups.project(matrices, new))
 
         def rest(old: np.ndarray, A: sp.csr_array, shells: np.ndarray) -> np.ndarray:
             r = len(old)
@@ -82,7 +82,7 @@ class Reduced:
         pieces = self.pieces()
         linear = {k: grown(self.linear[k], A) for k, (A, _) in pieces.items()}
         cubic = {k: grown(self.cubic[k], B) for k, (_, B) in pieces.items()}
-        mass = grown(self.mass, self.sheet.mass)
+        mass = grown(self.mass, self.groups.mass)
         stiff = sum(linear.values()) + sum(cubic.values())
         return replace(
             self, basis=basis, linear=linear, cubic=cubic, mass=mass,
@@ -93,14 +93,19 @@ class Reduced:
     def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Element matrices that grow with t and with t³, by the names of ``linear``."""
         if "" in self.linear:
-            return {"": (self.sheet.linear, self.sheet.cubic)}
-        return component_matrices(self.sheet.structure.assembly)
+            return {"": (self.groups.linear, self.groups.cubic)}
+        return component_matrices(self.groups.structure.assembly)
+
+    def split_for(self, effect: Effect, x: np.ndarray) -> Self:
+        """The same model, split into components where the effect changes one of them."""
+        split = any(change.field in COMPONENTS for change in effect.fields(x))
+        return self.with_components() if split and "" in self.linear else self
 
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
-        pieces = component_matrices(self.sheet.structure.assembly)
-        linear = {k: self.sheet.project(A, self.basis) for k, (A, _) in pieces.items()}
-        cubic = {k: self.sheet.project(B, self.basis) for k, (_, B) in pieces.items()}
+        pieces = component_matrices(self.groups.structure.assembly)
+        linear = {k: self.groups.project(A, self.basis) for k, (A, _) in pieces.items()}
+        cubic = {k: self.groups.project(B, self.basis) for k, (_, B) in pieces.items()}
         return replace(self, linear=linear, cubic=cubic)
 
 
@@ -111,16 +116,16 @@ def _bordered(old: np.ndarray, side: np.ndarray, corner: np.ndarray) -> np.ndarr
     return np.asarray(np.concatenate([top, low], axis=-2))
 
 
-def reduce(sheet: Sheet, basis: np.ndarray) -> Reduced:
+def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
     """Project a structure on a basis."""
-    system = sheet.structure.system
-    linear, cubic = sheet.project(sheet.linear, basis), sheet.project(sheet.cubic, basis)
-    mass = sheet.project(sheet.mass, basis)
+    system = groups.structure.system
+    linear, cubic = groups.project(groups.linear, basis), groups.project(groups.cubic, basis)
+    mass = groups.project(groups.mass, basis)
     K = basis.T @ (system.K.real @ basis)
     M = basis.T @ (system.M @ basis)
-    rest = mass_properties(sheet.structure.assembly)[0] - float(sheet.weight.sum())
+    rest = mass_properties(groups.structure.assembly)[0] - float(groups.weight.sum())
     return Reduced(
-        sheet, basis, {"": linear}, {"": cubic}, mass,
+        groups, basis, {"": linear}, {"": cubic}, mass,
         _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),
         _symmetric(M - mass.sum(axis=0)), max(rest, 0.0),
     )  # fmt: skip
@@ -220,7 +225,7 @@ def log_fields(
     ModelError
         If a component of the plane stiffness is to change in a model that is not split by them.
     """
-    n, n_p = len(model.sheet), count(effects)
+    n, n_p = len(model.groups), count(effects)
     logs = {name: np.zeros(n) for name in ("t", "E", "rho", *COMPONENTS)}
     slopes = {name: np.zeros((n, n_p)) for name in logs}
     for effect, at in slices(effects):
@@ -272,7 +277,7 @@ def _weighted(weights: np.ndarray, flat: np.ndarray) -> np.ndarray:
 def _weight(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
 ) -> tuple[float, np.ndarray]:
-    w = model.sheet.weight * np.exp(logs["rho"] + logs["t"])
+    w = model.groups.weight * np.exp(logs["rho"] + logs["t"])
     return float(model.weight0 + w.sum()), np.asarray(w @ (slopes["rho"] + slopes["t"]))
 
 

@@ -1,4 +1,4 @@
-"""A structure made ready for trying hypotheses: sheet, basis, factor, places."""
+"""A structure made ready for trying hypotheses: groups of shells, basis, factor, places."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,11 @@ import scipy.sparse as sp
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
-from ..effects.catalogue import Places, places, spread
-from ..effects.shell_groups import Sheet, sheet
+from ..effects.effect import Effect
+from ..effects.shell_groups import ShellGroups, shell_groups
+from ..effects.surroundings import ShellGrids, shell_grids
 from ..fem.assemble import Structure, structure
+from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
@@ -24,21 +26,23 @@ class Workbench:
     Attributes
     ----------
     frequency : (r,) Hz      of the nominal model's modes, rigid ones included
-    candidates : Places      a spread of all of ``grids``
+    top : highest frequency of interest [Hz]
+    candidates : ShellGrids  a sample of all of ``grids``
     flexibility : (k,)       static response at each candidate beyond the basis [m/N]
     hertz : shift of the static responses
     """
 
     structure: Structure
-    sheet: Sheet
+    groups: ShellGroups
     model: Reduced
     frequency: np.ndarray
     factor: Factor
     hertz: float
-    grids: Places
-    candidates: Places
+    grids: ShellGrids
+    candidates: ShellGrids
+    top: float
 
-    def flexibility(self, where: Places) -> np.ndarray:
+    def flexibility(self, where: ShellGrids) -> np.ndarray:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
         exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
         b = self.model.rows(where.rows)
@@ -50,6 +54,13 @@ class Workbench:
     def with_attachments(self, rows: sp.csr_array) -> Reduced:
         """The reduced model over a basis that can carry these rows."""
         return self.model.extended(attachments(self.factor, rows))
+
+    def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
+        """The reduced model over a basis that can carry an effect near x, split as it needs."""
+        low = np.flatnonzero(self.frequency <= self.top)
+        rows = effect.basis_rows(x, self.model.basis[:, low])
+        model = self.model if rows is None else self.with_attachments(rows)
+        return model.split_for(effect, x)
 
 
 def workbench(
@@ -76,9 +87,17 @@ def workbench(
     if extra is not None:
         blocks.append(extra)
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
-    cloth = sheet(built, groups)
-    grids = places(cloth)
-    chosen = grids.only(spread(grids.point, most))
+    shells = shell_groups(built, groups)
+    grids = shell_grids(shells)
+    chosen = grids.only(farthest_point_sample(grids.point, most))
     return Workbench(
-        built, cloth, reduce(cloth, basis), modes.frequency, factor, hertz, grids, chosen
+        built,
+        shells,
+        reduce(shells, basis),
+        modes.frequency,
+        factor,
+        hertz,
+        grids,
+        chosen,
+        top,
     )

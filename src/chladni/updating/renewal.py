@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
 import scipy.sparse as sp
 
-from ..effects.orthotropic_material import OrthotropicMaterial
 from ..fem.assemble import structure
 from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import Search, Trial, fitted
@@ -17,12 +17,12 @@ from .reduced_problem import workbench
 def renewed(question: Question, prepared: Prepared, trial: Trial) -> tuple[Trial, str]:
     """The trial on ground that bears it, and a sentence on how far the reduced model is off.
 
-    Mesh error, jitter and the basis belong to the structure they were made for. Where the material
-    is another one they are made anew; elsewhere the basis is widened by what it lacks, if it lacks
-    more than ``LIMIT``. The same parameters are then fitted from where they were.
+    Mesh error, jitter and the basis belong to the structure they were made for. Where the effect
+    makes it another one they are made anew. Elsewhere the basis is widened by what it lacks, if it
+    lacks more than ``LIMIT``. The same parameters are then fitted from where they were.
     """
     search = prepared.search
-    if isinstance(trial.effect, OrthotropicMaterial):
+    if trial.effect.remakes_structure:
         search, trial = _on_new_structure(question, search, trial)
     found = _accuracy(search, trial)
     if found.serves():
@@ -47,9 +47,8 @@ def _said(found: Accuracy) -> str:
 
 
 def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Search, Trial]:
-    """A strong change of material fitted again on a structure that has it already."""
+    """A strong change fitted again on a structure that has it already."""
     effect = trial.effect
-    assert isinstance(effect, OrthotropicMaterial)
     x = trial.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
     built, data, top = structure(changed.assembly), old.data, old.setup.top
@@ -58,8 +57,8 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
         changed.assembly, top, sp.csr_array(sp.vstack(rows)) if rows else None, built=built,
         groups=64 if rows else 48,
     )  # fmt: skip
-    extra = [e for e in old.nuisance if e.name == "gain"]
+    of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
     fresh = searched(
-        changed, bench, data.over(bench.model), [*nuisances(bench, built, top), *extra], top
+        changed, bench, data.over(bench.model), [*nuisances(bench, built, top), *of_test], top
     )
-    return fresh, fresh.trial(effect.begun_at(x), x, fresh.mean())
+    return fresh, fresh.trial(effect.with_reference_state(x), x, fresh.mean())

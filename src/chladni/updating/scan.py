@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.catalogue import Places
 from ..effects.effect import Effect, FieldChange, Parameter
+from ..effects.surroundings import ShellGrids
 from .likelihood import LN10, POWER, Data, Responses
 from .map_fit import Weighing, unknowns
 from .reduced_model import Reduced, State, evaluate
@@ -62,7 +62,7 @@ def baseline(
 
 
 def point_scores(
-    base: Baseline, model: Reduced, data: Responses, places: Places, matrix: str,
+    base: Baseline, model: Reduced, data: Responses, places: ShellGrids, matrix: str,
     strengths: np.ndarray, residual_flexibility: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Score of one mass or spring of each strength at each place (n_places, n_strengths).
@@ -113,7 +113,7 @@ class _Probe(Effect):
 
 def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
     """∂r/∂ln t of every group, the row of the scales included (n, n_groups)."""
-    n = len(model.sheet)
+    n = len(model.groups)
     probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
     _, J = data.residual(state, True)

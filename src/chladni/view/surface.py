@@ -9,13 +9,10 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import readonly
 from ..errors import ModelError, ShapeError
+from ..geometry.cells import directed_edges
+from ..geometry.facets import cell_normals, vector_areas
+from ..geometry.solid_faces import skin
 from ..model.assembly import Assembly, Average
-
-_SIDES = {  # faces of a solid by its number of nodes; a triangle repeats its last node
-    8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    6: ((0, 2, 1, 1), (3, 4, 5, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    4: ((0, 2, 1, 1), (0, 1, 3, 3), (1, 2, 3, 3), (2, 0, 3, 3)),
-}
 
 
 def _no_rows(columns: int) -> np.ndarray:
@@ -83,25 +80,20 @@ class Surface:
         return np.unique(held) if len(held) else np.arange(len(self.points))
 
     def areas(self) -> np.ndarray:
-        """Vector areas a = ½ d₁ × d₂ of the faces (m, 3) [m²], d the diagonals."""
-        a, b, c, d = (self.points[self.faces[:, k]] for k in range(4))
-        return np.asarray(0.5 * np.cross(c - a, d - b))
+        """Vector areas of the faces (m, 3) [m²]."""
+        return vector_areas(self.points, self.faces)
 
     def normals(self) -> np.ndarray:
         """Unit normals of the faces (m, 3)."""
-        a = self.areas()
-        return a / np.maximum(np.linalg.norm(a, axis=1, keepdims=True), 1e-300)
+        return cell_normals(self.points, self.faces)
 
     def outline(self, crease: float = 35.0, least: float = 0.0) -> np.ndarray:
         """Edges (k, 2) that show the form: free, between parts, or folded by ``crease`` degrees.
 
         Connected edges that reach less than ``least`` of the structure's size are left out.
         """
-        edges = np.sort(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], -1), axis=-1)
-        owner = np.repeat(np.arange(len(self.faces)), 4)
-        edges = edges.reshape(-1, 2)
-        real = edges[:, 0] != edges[:, 1]
-        edges, owner = edges[real], owner[real]
+        edges, owner = directed_edges(self.faces)
+        edges = np.sort(edges, axis=1)
         order = np.lexsort((edges[:, 1], edges[:, 0]))
         edges, owner = edges[order], owner[order]
         first = np.r_[True, np.any(edges[1:] != edges[:-1], axis=1)] if len(edges) else np.array([])
@@ -128,16 +120,6 @@ class Surface:
             >= least * self.size
         ]
         return np.asarray(edges[np.isin(line, long)])
-
-
-def skin(nodes: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Outer faces (m, 4), their part (m,) and their solid (m,) of solids with 8, 6 or 4 nodes."""
-    sides = np.array(_SIDES[nodes.shape[1]])
-    faces = nodes[:, sides].reshape(-1, 4)
-    owner = np.repeat(np.arange(len(nodes)), len(sides))
-    _, at, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    at = np.sort(at[count == 1])
-    return faces[at], np.asarray(part)[owner[at]], owner[at]
 
 
 def _carried(assembly: Assembly) -> np.ndarray:

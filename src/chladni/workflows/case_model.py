@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from ..case import Case, Places
+from ..case import Case
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility
 from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure
-from ..fem.locate import rows_of
+from ..fem.measured_dofs import MeasuredDofs
 from ..fem.solve import inertia_load
 from .loaded_model import Model
 
@@ -21,24 +21,10 @@ if TYPE_CHECKING:
 DAMPING = 0.01  # where neither case nor test says
 
 
-def rows(places: Places, built: Structure) -> sp.csr_array:
-    """Motion at the places along their directions over the free dofs (k, n_free).
-
-    A place that is no grid is on the nearest shell; the base has no row of its own (zeros).
-    """
-    found = sp.lil_array((len(places.labels), built.T.shape[1]))
-    real = np.flatnonzero(~places.base)
-    if len(real):
-        found[real] = rows_of(
-            built, places.grids[real], places.points[real], places.directions[real]
-        )
-    return sp.csr_array(found)
-
-
 def model_frf(case: Case, model: Model, modal: ModalModel, test: FRF) -> FRF:
     """The model's responses on the lines, labels and quantity of a recording."""
     s, f = model.structure, test.frequency
-    pick = rows(case.outputs, s).T.toarray()
+    pick = case.outputs.rows(s).T.toarray()
     load, carried = _drives(case, s)
     rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -56,23 +42,23 @@ def _drives(case: Case, s: Structure) -> tuple[np.ndarray, np.ndarray]:
     if base.any() and not base.all():
         raise FileError(f"{case.path}: forces and a moving base cannot be inputs together")
     if not base.any():
-        return rows(case.inputs, s).T.toarray(), np.zeros(1)
+        return case.inputs.rows(s).T.toarray(), np.zeros(1)
     axes = case.inputs.directions.T  # (3, n_in)
     load = s.T.T @ inertia_load(s.assembly, -axes)
     return np.asarray(load), case.outputs.directions @ axes
 
 
-def markers(places: Places) -> list["Marker"]:
+def markers(dofs: MeasuredDofs) -> list["Marker"]:
     """Sensors and shakers for a picture; the base has no place."""
     from ..view.scene import Marker
 
     return [
         Marker((x[0], x[1], x[2]), (n[0], n[1], n[2]), text)
         for x, n, text, base in zip(
-            places.points.tolist(),
-            places.directions.tolist(),
-            places.labels,
-            places.base,
+            dofs.points.tolist(),
+            dofs.directions.tolist(),
+            dofs.labels,
+            dofs.base,
             strict=True,
         )
         if not base

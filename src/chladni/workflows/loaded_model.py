@@ -12,8 +12,9 @@ import scipy.sparse as sp
 
 from ..dofs import parse
 from ..dynamics.modes import ModalModel
-from ..errors import FileError, LabelError
+from ..errors import FileError
 from ..fem.assemble import Structure, structure
+from ..geometry.grid_normals import normals_at
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
 from ..units import Units
@@ -125,20 +126,6 @@ def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ())
         raise FileError(f"no file {source}{beside(source)}")
     system = None if units is None else unit_system(units)
     return DeckModels(source, read_deck(source, allow), system)
-
-
-def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
-    """Unit normal of the shells around each grid, weighted by area: (k, 3)."""
-    seen, at = surface(assembly), assembly.rows(ids)
-    normal = np.zeros_like(seen.points)
-    for corner in range(4):
-        np.add.at(normal, seen.faces[:, corner], seen.areas())
-    length = np.linalg.norm(normal[at], axis=1, keepdims=True)
-    if np.any(bare := length[:, 0] == 0):
-        raise LabelError(
-            f"grid {ids[bare][0]} is on no shell, so it has no normal; give +X, +Y, +Z"
-        )
-    return np.asarray(normal[at] / length)
 
 
 def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:

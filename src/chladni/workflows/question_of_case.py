@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..case import Case, Places
+from ..case import Case
 from ..errors import FileError
 from ..updating.map_fit import Weighing
-from ..updating.question import Places as Sites
 from ..updating.question import Question
 
 
@@ -33,8 +32,8 @@ def question(case: Case) -> Question:
         weighing = Weighing(case.setup.mass, case.setup.mass_sd)
     asked = Question(
         case.assembly,
-        _sites(case.outputs),
-        _sites(case.inputs),
+        case.outputs,
+        case.inputs,
         weighing=weighing,
         hangers=case.setup.hangers,
         band=case.band or (0.0, np.inf),
@@ -51,7 +50,3 @@ def question(case: Case) -> Question:
         return replace(asked, frf=frfs[0])
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
-
-
-def _sites(places: Places) -> Sites:
-    return Sites(places.labels, places.grids, places.points, places.directions, places.sd)

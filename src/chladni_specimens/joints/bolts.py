@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
-from chladni.geometry.nearest import Sheet, Surface, tangents
+from chladni.geometry.facets import tangents
+from chladni.geometry.nearest import ShellChoice, ShellSurface
 from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
 from chladni.model.properties import BeamSection, Isotropic
 
@@ -39,7 +40,7 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
     return sides[count == 1]
 
 
-def rim(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
+def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
     """Rows of the points round a hole: its rim, else free edges within `radius`, else a shell's.
 
     A hole is a closed free edge no wider than four radii whose middle is within two radii. Where a
@@ -81,7 +82,7 @@ def _spider(id_: int, centre: int, rows: np.ndarray) -> RigidBody:
 def screw(
     assembly: Assembly,
     place: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     diameter: float = 0.006,
     mass: float = 0.012,
@@ -94,7 +95,7 @@ def screw(
     The bar weighs little over the millimetre between two sheets; head and nut make up the rest.
     """
     place = np.asarray(place, dtype=float)
-    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     feet = [s.feet(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
@@ -170,14 +171,14 @@ def accelerometers(assembly: Assembly, ids: Sequence[int], mass: float = 0.005) 
 def tied_hole(
     assembly: Assembly,
     place: np.ndarray,
-    sheets: Sequence[Sheet],
+    sheets: Sequence[ShellChoice],
     *,
     radius: float = 0.006,
     reach: float = REACH,
 ) -> Joined:
     """The rims of an empty hole in all its sheets on one RBE2, which reality does not have."""
     place = np.asarray(place, dtype=float)
-    surfaces = [Surface.of(assembly, s) for s in sheets]
+    surfaces = [ShellSurface.of(assembly, s) for s in sheets]
     feet = [s.feet(place[None]) for s in surfaces]
     for surface, foot in zip(surfaces, feet, strict=True):
         surface.within(foot, place[None], reach)
@@ -198,7 +199,7 @@ def grip(
     places: np.ndarray,
     directions: np.ndarray,
     stiffness: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     reach: float = REACH,
 ) -> Joined:
@@ -211,7 +212,7 @@ def grip(
     places, directions : (k, 3)   [m], unit vectors
     stiffness : (k,)              [N/m]
     """
-    surfaces = tuple(Surface.of(assembly, s) for s in sheets)
+    surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
     ends, far = [], np.zeros(len(places))
     for surface in surfaces:
         feet = surface.feet(places)
@@ -249,7 +250,7 @@ def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndar
 def hem(
     assembly: Assembly,
     edge: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     inset: float = 0.0075,
     width: float = 0.010,
@@ -269,7 +270,7 @@ def hem(
     grip_stiffness : stiffness against sliding along the edge per length [N/m²]; 0: the soft
         string alone, as the thesis models it
     """
-    inner = Surface.of(assembly, sheets[0])
+    inner = ShellSurface.of(assembly, sheets[0])
     edge = followed(np.asarray(edge, dtype=float), pitch)
     line = _inboard(inner, edge, inset)
     assembly, joints = adhesive_bead(
@@ -290,7 +291,7 @@ def hem(
     return assembly, joints + grips
 
 
-def _inboard(surface: Surface, edge: np.ndarray, inset: float) -> np.ndarray:
+def _inboard(surface: ShellSurface, edge: np.ndarray, inset: float) -> np.ndarray:
     """The edge moved into the sheet along its surface, on the side where the sheet is."""
     tangent, _ = along_line(edge, 1.0)
     side = np.cross(surface.feet(edge).normal, tangent)

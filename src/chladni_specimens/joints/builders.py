@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.errors import ModelError
-from chladni.geometry.nearest import Feet, Sheet, Surface, nearest_parts, tangents
+from chladni.geometry.facets import tangents
+from chladni.geometry.nearest import Feet, ShellChoice, ShellSurface, nearest_parts
 from chladni.model.assembly import Assembly, Average, Solids
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
 
@@ -117,7 +118,7 @@ def tied(
     return replace(grown, rigid=(*grown.rigid, *means)), rows
 
 
-def cell_carriers(surface: Surface, feet: Feet) -> list[tuple[np.ndarray, np.ndarray]]:
+def cell_carriers(surface: ShellSurface, feet: Feet) -> list[tuple[np.ndarray, np.ndarray]]:
     """The nodes of the nearest shell, all of weight one (thesis Fig. 1)."""
     return [(nodes, np.ones(len(nodes))) for nodes in surface.cells(feet)]
 
@@ -125,7 +126,7 @@ def cell_carriers(surface: Surface, feet: Feet) -> list[tuple[np.ndarray, np.nda
 def hexahedra(
     assembly: Assembly,
     corners: np.ndarray,
-    sheets: tuple[Surface, Surface],
+    sheets: tuple[ShellSurface, ShellSurface],
     *,
     material: Isotropic,
     name: str,
@@ -173,7 +174,7 @@ def _in_order(first: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def _carriers(
     places: np.ndarray,
     side: np.ndarray,
-    sheets: tuple[Surface, Surface],
+    sheets: tuple[ShellSurface, ShellSurface],
     reach: float,
     patch: float,
     corners: np.ndarray,
@@ -206,7 +207,7 @@ def _right_handed(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _facing(
-    assembly: Assembly, places: np.ndarray, a: Surface, b: Surface
+    assembly: Assembly, places: np.ndarray, a: ShellSurface, b: ShellSurface
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Feet on a, unit axes from a to b and the distances (k,) of the sheets there.
 
@@ -241,7 +242,7 @@ def _centred(
 def spot_welds(
     assembly: Assembly,
     places: np.ndarray,
-    sheets: tuple[Sheet, Sheet] | None = None,
+    sheets: tuple[ShellChoice, ShellChoice] | None = None,
     *,
     side: float = 0.005,
     height: float | None = None,
@@ -264,7 +265,7 @@ def spot_welds(
     for pair in dict.fromkeys(map(_key, pairs)):
         mine = np.array([_key(p) == pair for p in pairs])
         these = next(p for p in pairs if _key(p) == pair)
-        a, b = (Surface.of(assembly, s) for s in these)
+        a, b = (ShellSurface.of(assembly, s) for s in these)
         for surface in (a, b):
             surface.within(surface.feet(places[mine]), places[mine], reach)
         corners = _nuggets(*_centred(*_facing(assembly, places[mine], a, b), height), side)
@@ -282,7 +283,7 @@ def spot_welds(
     return assembly, tuple(report)
 
 
-def _key(pair: tuple[Sheet, Sheet]) -> tuple:
+def _key(pair: tuple[ShellChoice, ShellChoice]) -> tuple:
     return tuple(s if isinstance(s, str | int) else tuple(np.asarray(s).tolist()) for s in pair)
 
 
@@ -297,7 +298,7 @@ def _nuggets(start: np.ndarray, axis: np.ndarray, height: np.ndarray, side: floa
 def adhesive_bead(
     assembly: Assembly,
     line: np.ndarray,
-    sheets: tuple[Sheet, Sheet],
+    sheets: tuple[ShellChoice, ShellChoice],
     *,
     width: float = 0.010,
     height: float | None = None,
@@ -312,7 +313,7 @@ def adhesive_bead(
     line is followed at `pitch`, or point by point without it; a line that ends where it starts is
     a closed bead.
     """
-    a, b = (Surface.of(assembly, s) for s in sheets)
+    a, b = (ShellSurface.of(assembly, s) for s in sheets)
     line = followed(np.asarray(line, dtype=float), pitch)
     for surface in (a, b):
         surface.within(surface.feet(line), line, reach)

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from chladni.model.formed_mesh import FormedMesh
+from chladni.geometry.formed_mesh import FormedMesh
 
 from .graded import graded, loops
-from .pressed_sheets import MAIN, Depth, Sheet
+from .pressed_sheets import MAIN, Depth, PressedSheet
 from .quads_from_triangles import paired
 
 Places = Callable[[np.ndarray], np.ndarray]  # planform and depth (n, 3) -> places (n, 3) [m]
@@ -142,7 +142,7 @@ class FormedSheet:
 
 
 def formed_sheet(
-    places: Places, depth: Depth, sheet: Sheet, part: str, made: Forming, finest: float
+    places: Places, depth: Depth, sheet: PressedSheet, part: str, made: Forming, finest: float
 ) -> FormedSheet:
     """A pressing, its hem unfolded, on a graded mesh within the borders of a meshed sheet."""
     border = loops(sheet.quads[sheet.zone == MAIN], sheet.plan[:, :2])

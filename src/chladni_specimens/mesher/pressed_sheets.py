@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from chladni.errors import ModelError
 from chladni.geometry.cells import components
+from chladni.geometry.facets import cell_areas
 
 from .flat_regions import strip
 from .quads_from_triangles import split_folded
@@ -22,7 +23,7 @@ MAIN, BASE, FOLD = 0, 1, 2  # zones: the sheet itself, base of the hem's U, its 
 
 
 @dataclass(frozen=True, eq=False)
-class Sheet:
+class PressedSheet:
     """One pressing.
 
     Attributes
@@ -42,11 +43,8 @@ class Sheet:
 
     @property
     def area(self) -> np.ndarray:
-        """A = |d1 x d2| / 2 of every cell (m,) [m²]."""
-        x = self.points[self.quads]
-        return np.asarray(
-            np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1) / 2
-        )
+        """Area of every cell (m,) [m²]."""
+        return cell_areas(self.points, self.quads)
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Patches:
 
     def sheet(
         self, name: str, surface: Callable[[np.ndarray], np.ndarray], tolerance: float = 2e-5
-    ) -> Sheet:
+    ) -> PressedSheet:
         """The pressing with coincident nodes joined and collapsed quads turned to triangles.
 
         Raises
@@ -93,7 +91,7 @@ class Patches:
             )
         points = surface(plan)
         quads, source = split_folded(points, quads)
-        return Sheet(name, plan, points, quads, np.concatenate(self.zones)[source])
+        return PressedSheet(name, plan, points, quads, np.concatenate(self.zones)[source])
 
 
 def fold(out: Patches, edge: np.ndarray, back: np.ndarray, gap: float, *, closed: bool) -> None:
@@ -122,9 +120,11 @@ def _collapsed(quads: np.ndarray) -> np.ndarray:
     return out
 
 
-def mirrored(sheet: Sheet, name: str, surface: Callable[[np.ndarray], np.ndarray]) -> Sheet:
+def mirrored(
+    sheet: PressedSheet, name: str, surface: Callable[[np.ndarray], np.ndarray]
+) -> PressedSheet:
     """The sheet of the other side, y -> -y, with its cells turned so that normals stay outward."""
     plan = sheet.plan * (-1, 1, 1)
     triangle = sheet.quads[:, 2] == sheet.quads[:, 3]
     turned = np.where(triangle[:, None], sheet.quads[:, [1, 0, 2, 2]], sheet.quads[:, ::-1])
-    return Sheet(name, plan, surface(plan), turned, sheet.zone)
+    return PressedSheet(name, plan, surface(plan), turned, sheet.zone)

@@ -12,7 +12,7 @@ import numpy as np
 from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
 
-from .pressed_sheets import MAIN, Depth, Sheet
+from .pressed_sheets import MAIN, Depth, PressedSheet
 
 _ROOM = 1.8  # radii that a hole's middle keeps from the sides of the cell it lies in
 _TIGHT = 1.45  # the same where nothing else can take it; the square's corners lie at 1.25
@@ -32,8 +32,8 @@ class _Choice:
 
 
 def bored(
-    sheet: Sheet, place: np.ndarray, radius: float, depth: Depth, surface: Depth
-) -> tuple[Sheet, np.ndarray]:
+    sheet: PressedSheet, place: np.ndarray, radius: float, depth: Depth, surface: Depth
+) -> tuple[PressedSheet, np.ndarray]:
     """The sheet with a hole at the feasible place nearest to (y, s), and that place (2,).
 
     The middle of the hole is off by at most half a diagonal of a cell smaller than four radii, by
@@ -64,11 +64,13 @@ def bored(
     return (_without(made, best.row) if best.node else made), best.centre
 
 
-def _only(sheet: Sheet, row: int) -> np.ndarray:
+def _only(sheet: PressedSheet, row: int) -> np.ndarray:
     return np.arange(len(sheet.quads)) == row
 
 
-def _cells(sheet: Sheet, place: np.ndarray, radius: float, room: float = _ROOM) -> list[_Choice]:
+def _cells(
+    sheet: PressedSheet, place: np.ndarray, radius: float, room: float = _ROOM
+) -> list[_Choice]:
     """Cells near the place that can take the hole in their midst."""
     x = sheet.plan[sheet.quads][..., :2]
     whole = (sheet.zone == MAIN) & (sheet.quads[:, 2] != sheet.quads[:, 3])
@@ -86,7 +88,9 @@ def _cells(sheet: Sheet, place: np.ndarray, radius: float, room: float = _ROOM) 
     return found
 
 
-def _nodes(sheet: Sheet, place: np.ndarray, radius: float, spoke: float = _SPOKE) -> list[_Choice]:
+def _nodes(
+    sheet: PressedSheet, place: np.ndarray, radius: float, spoke: float = _SPOKE
+) -> list[_Choice]:
     """Inner nodes near the place whose neighbours are far enough away."""
     plan = sheet.plan[:, :2]
     sides, count = np.unique(edges_of(sheet.quads), axis=0, return_counts=True)
@@ -100,7 +104,7 @@ def _nodes(sheet: Sheet, place: np.ndarray, radius: float, spoke: float = _SPOKE
     return found
 
 
-def _hollowed(sheet: Sheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _hollowed(sheet: PressedSheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Four cells round a square hole of the circle's area, and its corners (4, 2)."""
     corners = sheet.quads[at.row]
     x = sheet.plan[corners, :2]
@@ -111,7 +115,7 @@ def _hollowed(sheet: Sheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.
     return np.column_stack([corners, corners[after], ring[after], ring]), new
 
 
-def _opened(sheet: Sheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _opened(sheet: PressedSheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Cells round a polygonal hole at a node, two for each quad there, and its corners (k, 2)."""
     plan, first = sheet.plan[:, :2], len(sheet.plan)
     new: dict[int, int] = {}
@@ -131,7 +135,7 @@ def _opened(sheet: Sheet, at: _Choice, radius: float) -> tuple[np.ndarray, np.nd
     return np.array(cells), places
 
 
-def _without(sheet: Sheet, row: int) -> Sheet:
+def _without(sheet: PressedSheet, row: int) -> PressedSheet:
     """The sheet without a node that no cell needs."""
     keep = np.arange(len(sheet.plan)) != row
     quads = sheet.quads - (sheet.quads > row)

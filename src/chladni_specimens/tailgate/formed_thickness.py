@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from chladni.model.formed_mesh import FormedMesh
+from chladni.geometry.formed_mesh import FormedMesh
 
 from ..mesher.forming import Forming, formed_mesh, formed_sheet, pressed
 from .design import TailgateDesign

@@ -20,7 +20,7 @@ from ..mesher.plane_curves import (
     rounded,
     stadium,
 )
-from ..mesher.pressed_sheets import Patches, Sheet, fold, mirrored
+from ..mesher.pressed_sheets import Patches, PressedSheet, fold, mirrored
 from ..mesher.round_holes import bored
 from .skin import Skin
 
@@ -119,7 +119,7 @@ def _around(rows: list[np.ndarray], outer: np.ndarray, inner: np.ndarray, frame:
     return np.vstack([outer, start, back, end])
 
 
-def inner_panel(skin: Skin, edge: Borders) -> Sheet:
+def inner_panel(skin: Skin, edge: Borders) -> PressedSheet:
     """Inner panel: hem and window flanges with their walls, frame strips, field with openings."""
     d, h = skin.design, skin.design.size
     flat = d.flange[0] - d.hem_clearance
@@ -158,7 +158,7 @@ def _folded(out: Patches, skin: Skin, arc: np.ndarray) -> None:
     fold(out, arc, skin.outline.offset(arc, d.hem_width), d.gap, closed=False)
 
 
-def outer_upper_panel(skin: Skin, edge: Borders) -> Sheet:
+def outer_upper_panel(skin: Skin, edge: Borders) -> PressedSheet:
     """Outer upper panel: frame in strips, the waist with the tongue of the seam filled."""
     d, h = skin.design, skin.design.size
     arc, start = _upper_arc(skin, edge)
@@ -206,7 +206,7 @@ def _tongue(skin: Skin, row: np.ndarray) -> np.ndarray:
     return np.vstack(line)
 
 
-def outer_lower_panel(skin: Skin, edge: Borders) -> Sheet:
+def outer_lower_panel(skin: Skin, edge: Borders) -> PressedSheet:
     """Outer lower panel with hem, licence plate recess and crease."""
     d, h = skin.design, skin.design.size
     _, under = cut(skin.outline.points, d.split)
@@ -239,7 +239,7 @@ def upper_edges(skin: Skin) -> tuple[np.ndarray, np.ndarray]:
     return skin.outline.nearest(middle), skin.window.nearest(middle)
 
 
-def upper_left(skin: Skin) -> Sheet:
+def upper_left(skin: Skin) -> PressedSheet:
     """Upper left reinforcement: a strip between hem wall and window wall round the corner."""
     d, h = skin.design, skin.design.size
     a, b = upper_edges(skin)
@@ -252,7 +252,7 @@ def upper_left(skin: Skin) -> Sheet:
     return out.sheet(UPPER + LEFT, skin.at)
 
 
-def lower_left(skin: Skin) -> Sheet:
+def lower_left(skin: Skin) -> PressedSheet:
     """Lower left reinforcement, a plate behind the hinge column."""
     y0, y1, s0, s1 = skin.design.lower
     corners = [(y0, s0, 0.015), (y1 - 0.014, s0, 0.015), (y1, s1, 0.015), (y0, s1, 0.015)]
@@ -262,7 +262,7 @@ def lower_left(skin: Skin) -> Sheet:
     return out.sheet(LOWER + LEFT, skin.at)
 
 
-def latch(skin: Skin) -> Sheet:
+def latch(skin: Skin) -> PressedSheet:
     """Latch reinforcement."""
     half, s0, s1 = skin.design.latch
     out, size = Patches(), skin.design.size
@@ -270,7 +270,7 @@ def latch(skin: Skin) -> Sheet:
     return out.sheet(LATCH, skin.at)
 
 
-def bracket(skin: Skin) -> Sheet:
+def bracket(skin: Skin) -> PressedSheet:
     """Wiper motor bracket: a grid that follows its folds."""
     half, s0, s1 = skin.design.bracket
     y = ticks([-half, -0.085, -0.067, 0.067, 0.085, half], skin.design.size)
@@ -280,7 +280,7 @@ def bracket(skin: Skin) -> Sheet:
     return out.sheet(BRACKET, skin.at)
 
 
-def pressings(skin: Skin, holes: bool = True) -> dict[str, Sheet]:
+def pressings(skin: Skin, holes: bool = True) -> dict[str, PressedSheet]:
     """All sheets by name, with or without bolt holes; a pair's end in left (+y) and right."""
     edge = borders(skin)
     fine = skin.at_size(skin.design.inner_size * skin.design.size)
@@ -302,13 +302,15 @@ def pressings(skin: Skin, holes: bool = True) -> dict[str, Sheet]:
     return {sheet.name: sheet for sheet in sheets}
 
 
-def _held(skin: Skin) -> dict[str, Sheet]:
+def _held(skin: Skin) -> dict[str, PressedSheet]:
     """What is welded to the inner panel, the left ones of pairs."""
     sheets = (upper_left(skin), lower_left(skin), latch(skin), bracket(skin))
     return {sheet.name: sheet for sheet in sheets}
 
 
-def _bored(skin: Skin, inner: Sheet, held: dict[str, Sheet]) -> tuple[Sheet, dict[str, Sheet]]:
+def _bored(
+    skin: Skin, inner: PressedSheet, held: dict[str, PressedSheet]
+) -> tuple[PressedSheet, dict[str, PressedSheet]]:
     """Bolt holes through the reinforcements, and through the inner panel where those then are."""
     d, held = skin.design, dict(held)
     depth = dict(zip(held, (skin.upper, skin.lower, skin.latch, skin.bracket), strict=True))

@@ -14,28 +14,28 @@ from chladni.model.properties import Part, ShellSection
 from ..joints.bolts import accelerometers
 from ..joints.builders import Joined, Joint
 from ..mesher.forming import corner_thickness
-from ..mesher.pressed_sheets import Sheet
+from ..mesher.pressed_sheets import PressedSheet
 from .design import STEEL, TailgateDesign
 from .formed_thickness import forming, nominal
 from .pressings import pressings, without_side
 from .skin import Skin
-from .tailgate_joints import Frame, hem_strings, middle_string, screwed, tied_holes, welded
+from .tailgate_joints import TailgateFrame, hem_strings, middle_string, screwed, tied_holes, welded
 
 
 @dataclass(frozen=True, eq=False)
-class Specimen:
+class FormedSpecimen:
     """A generated structure with what it was made from.
 
     Attributes
     ----------
     assembly : Assembly
-    sheets : dict of Sheet    by name
+    sheets : dict of PressedSheet    by name
     rows : dict of (n,) int   rows of ``assembly.shells`` of each sheet
     joints : tuple of Joint   what the builders connected
     """
 
     assembly: Assembly
-    sheets: dict[str, Sheet]
+    sheets: dict[str, PressedSheet]
     rows: dict[str, np.ndarray]
     joints: tuple[Joint, ...]
 
@@ -45,14 +45,14 @@ def tailgate(design: TailgateDesign | None = None) -> Assembly:
     return tailgate_specimen(design).assembly
 
 
-def tailgate_specimen(design: TailgateDesign | None = None) -> Specimen:
+def tailgate_specimen(design: TailgateDesign | None = None) -> FormedSpecimen:
     """The assembly with its sheets and a report of its joints."""
     d = design or TailgateDesign()
     skin = Skin.of(d)
     sheets = pressings(skin)
     assembly, rows = of_sheets(sheets, parts(d))
-    frame = Frame(skin, with_formed(assembly, sheets, rows, skin), sheets, rows)
-    steps: list[Callable[[Frame], Joined]] = [hem_strings, middle_string, welded]
+    frame = TailgateFrame(skin, with_formed(assembly, sheets, rows, skin), sheets, rows)
+    steps: list[Callable[[TailgateFrame], Joined]] = [hem_strings, middle_string, welded]
     steps += [screwed] if d.screws else []
     steps += [tied_holes] if d.tied_holes else []
     report: list[Joint] = []
@@ -63,7 +63,7 @@ def tailgate_specimen(design: TailgateDesign | None = None) -> Specimen:
     assembly = frame.assembly
     if d.accelerometers:
         assembly = accelerometers(assembly, sensor_grids(assembly, d.accelerometers))
-    return Specimen(assembly, sheets, rows, tuple(report))
+    return FormedSpecimen(assembly, sheets, rows, tuple(report))
 
 
 def parts(d: TailgateDesign) -> tuple[Part, ...]:
@@ -75,7 +75,7 @@ def parts(d: TailgateDesign) -> tuple[Part, ...]:
 
 
 def of_sheets(
-    sheets: dict[str, Sheet], parts: tuple[Part, ...]
+    sheets: dict[str, PressedSheet], parts: tuple[Part, ...]
 ) -> tuple[Assembly, dict[str, np.ndarray]]:
     """An assembly of unconnected sheets at their gauge, and each sheet's rows of shells."""
     names = [p.name for p in parts]
@@ -107,7 +107,7 @@ def _gauge(part: Part) -> float:
 
 
 def with_formed(
-    assembly: Assembly, sheets: dict[str, Sheet], rows: dict[str, np.ndarray], skin: Skin
+    assembly: Assembly, sheets: dict[str, PressedSheet], rows: dict[str, np.ndarray], skin: Skin
 ) -> Assembly:
     """The assembly with the thickness forming leaves, if the design wants it."""
     if not skin.design.formed:

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.errors import ModelError
-from chladni.geometry.nearest import Surface
+from chladni.geometry.nearest import ShellSurface
 from chladni.model.assembly import Assembly
 
 from ..joints.bolts import along_line, grip, screw, tied_hole
 from ..joints.builders import Joined, Joint, hexahedra, spot_welds
-from ..mesher.plane_curves import arc_length, resampled
-from ..mesher.pressed_sheets import BASE, FOLD, MAIN, Sheet
+from ..mesher.plane_curves import resampled
+from ..mesher.pressed_sheets import BASE, FOLD, MAIN, PressedSheet
 from .design import SCREW, SEALANT, WELD
 from .formed_thickness import depth_field
 from .pressings import (
@@ -35,25 +35,25 @@ OFF_STEP = 0.97  # pitch of the strings in mesh sizes: never in step with the sh
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class TailgateFrame:
     """The assembly under construction with what the joints need to find their sheets.
 
     Attributes
     ----------
     skin : Skin
     assembly : Assembly
-    sheets : dict of Sheet
+    sheets : dict of PressedSheet
     rows : dict of (n,) int   rows of ``assembly.shells`` of each sheet
     """
 
     skin: Skin
     assembly: Assembly
-    sheets: dict[str, Sheet]
+    sheets: dict[str, PressedSheet]
     rows: dict[str, np.ndarray]
 
-    def surface(self, name: str, zone: int = MAIN) -> Surface:
+    def surface(self, name: str, zone: int = MAIN) -> ShellSurface:
         """The shells of one zone of a sheet."""
-        found = Surface.of(self.assembly, self.rows[name][self.sheets[name].zone == zone])
+        found = ShellSurface.of(self.assembly, self.rows[name][self.sheets[name].zone == zone])
         return replace(found, name=name)
 
 
@@ -119,7 +119,7 @@ def middle(skin: Skin, plan: np.ndarray, pair: Pair) -> np.ndarray:
     return skin.at(np.column_stack([plan, (a + b) / 2]))
 
 
-def welded(frame: Frame) -> Joined:
+def welded(frame: TailgateFrame) -> Joined:
     """All spot welds but the missing ones; they are numbered from 1 in the order of the pairs."""
     d, assembly = frame.skin.design, frame.assembly
     report: list[Joint] = []
@@ -145,7 +145,7 @@ def welded(frame: Frame) -> Joined:
     return assembly, tuple(report)
 
 
-def _main(frame: Frame, name: str) -> np.ndarray:
+def _main(frame: TailgateFrame, name: str) -> np.ndarray:
     return frame.rows[name][frame.sheets[name].zone == MAIN]
 
 
@@ -170,7 +170,7 @@ def _string(
     return np.stack(corners, axis=1)
 
 
-def hem_strings(frame: Frame) -> Joined:
+def hem_strings(frame: TailgateFrame) -> Joined:
     """Soft adhesive between inner and outer sheets all round, and what the real hem has besides."""
     d, skin, assembly = frame.skin.design, frame.skin, frame.assembly
     width, height = d.string
@@ -198,7 +198,7 @@ def hem_strings(frame: Frame) -> Joined:
 SOFT = replace(SEALANT, nu=0.4, id=2)
 
 
-def _all_round(frame: Frame, name: str, arc: np.ndarray) -> Joined:
+def _all_round(frame: TailgateFrame, name: str, arc: np.ndarray) -> Joined:
     """Sealant behind the inner sheet and round its edge, and the grip along the hem."""
     d, skin, assembly = frame.skin.design, frame.skin, frame.assembly
     start, e = d.hem_clearance + 0.3e-3, (d.gap - d.string[1]) / 2
@@ -235,7 +235,7 @@ def _belt(n: int) -> tuple[np.ndarray, ...]:
     return i, i + 1, i + 1 + n, i + n
 
 
-def _gripped(frame: Frame, name: str, arc: np.ndarray) -> Joined:
+def _gripped(frame: TailgateFrame, name: str, arc: np.ndarray) -> Joined:
     """Springs against sliding along the hem between the inner edge and the base of the U."""
     d, skin = frame.skin.design, frame.skin
     middles = skin.outline.offset(arc, d.hem_clearance / 2)
@@ -260,7 +260,7 @@ def stretch(arc: np.ndarray, which: str, waist: float) -> np.ndarray:
     }[which]
 
 
-def middle_string(frame: Frame) -> Joined:
+def middle_string(frame: TailgateFrame) -> Joined:
     """Adhesive 8 mm wide across the middle, between the tongue and the lower skin."""
     d, skin = frame.skin.design, frame.skin
     half = seam_half(skin, _hem_row(skin))
@@ -280,7 +280,7 @@ def middle_string(frame: Frame) -> Joined:
 SCREWS = ((0.518, 0.700), (0.500, 0.840))  # on the left; mirrored on the right
 
 
-def screwed(frame: Frame) -> Joined:
+def screwed(frame: TailgateFrame) -> Joined:
     """The four screws between inner sheet and upper reinforcements."""
     assembly = frame.assembly
     report: list[Joint] = []
@@ -304,7 +304,7 @@ def holes(skin: Skin) -> list[tuple[np.ndarray, Pair]]:
     return out
 
 
-def tied_holes(frame: Frame) -> Joined:
+def tied_holes(frame: TailgateFrame) -> Joined:
     """RBE2 over the rims of the empty bolt holes, as a model left by its screws has them."""
     assembly = frame.assembly
     report: list[Joint] = []
@@ -313,8 +313,3 @@ def tied_holes(frame: Frame) -> Joined:
         assembly, joints = tied_hole(assembly, place, rows)
         report += joints
     return assembly, tuple(report)
-
-
-def string_length(skin: Skin) -> float:
-    """Length of the hem [m]."""
-    return float(arc_length(np.vstack([skin.outline.points, skin.outline.points[:1]]))[-1])

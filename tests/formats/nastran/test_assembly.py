@@ -5,6 +5,7 @@ import pytest
 
 from chladni.errors import ChladniError, ModelError
 from chladni.io.nastran import assembly, components
+from chladni.io.nastran.read.analysis_requests import analysis
 from chladni.model.properties import Anisotropic, Isotropic, Orthotropic
 from chladni.units import UNITS
 
@@ -162,6 +163,27 @@ def test_parameters_above_bulk_data(bulk):
     made = assembly(bulk(PLATE, before="SOL 103\nCEND\nPARAM,WTMASS,.5\nPARAM,COUPMASS,1\n"))
     assert made.coupled_mass
     assert made.parts[0].section.membrane.rho == pytest.approx(7.85e-9 / 2)
+
+
+def test_k6rot(bulk):
+    """Carried where it is given; CQUADR have a drilling stiffness of their own in Nastran."""
+    assert assembly(bulk(PLATE)).k6rot is None
+    assert assembly(bulk(PLATE + "PARAM,K6ROT,AUTO\n")).k6rot is None
+    assert assembly(bulk(PLATE + "PARAM,K6ROT,100.\n")).k6rot == 100
+    told = bulk(PLATE.replace("CQUAD4", "CQUADR") + "PARAM,K6ROT,100.\n")
+    assert assembly(told).k6rot is None
+    assert "K6ROT" in analysis(told).notes[0]
+
+
+def test_material_axis_falls_back_to_y(bulk):
+    """MCID 6 has x along the element's normal; 5 has not."""
+    systems = "CORD2R,5,,0.,0.,0.,0.,0.,1.,1.,1.,0.\nCORD2R,6,,0.,0.,0.,0.,1.,0.,0.,0.,1.\n"
+    for cid, due in ((5, (1, 1, 0)), (6, (1, 0, 0))):
+        deck = bulk(PLATE.replace("1,2,3,4\n", f"1,2,3,4,{cid}\n") + systems)
+        np.testing.assert_allclose(assembly(deck).shells.axis[0], due / np.linalg.norm(due))
+        notes = analysis(deck).notes
+        assert len(notes) == (cid == 6)
+        assert cid == 5 or "CQUAD4 7 and 0 others lie across x" in notes[0]
 
 
 def test_unsymmetric_laminate_couples_as_its_offset_says(bulk):

@@ -9,7 +9,7 @@ import pytest
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.ordinary import ordinary
-from chladni.effects.shell_groups import sheet
+from chladni.effects.shell_groups import shell_groups
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
@@ -54,9 +54,9 @@ def repaired(deck, before, after):
 
 
 def calibrated(before, quantities, positions):
-    cloth = sheet(structure(before), 8)
+    groups = shell_groups(structure(before), 8)
     for quantity, x in quantities.items():
-        before = ordinary(cloth, quantity, positions).apply(before, np.array([x]))
+        before = ordinary(groups, quantity, positions).apply(before, np.array([x]))
     return before
 
 

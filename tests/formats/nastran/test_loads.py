@@ -6,7 +6,7 @@ import pytest
 from chladni.errors import FileError
 from chladni.io.nastran import analysis, assembly, read_deck
 from chladni.io.nastran.read.pressure import on_face
-from chladni.model.analysis import Table
+from chladni.model.analysis import Tabulated
 from chladni.units import UNITS
 
 from .conftest import ANCHORS, PLATE
@@ -136,11 +136,11 @@ def test_prescribed_motion(bulk):
 
 
 def test_tables_continue_their_end_slopes():
-    table = Table(np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.0, 5.0]))
+    table = Tabulated(np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.0, 5.0]))
     np.testing.assert_allclose(table([0.0, 1.5, 3.0, 5.0]), [-1, 0.5, 3, 7])
-    power = Table(np.array([1.0, 10.0, 100.0]), np.array([2.0, 2e-2, 2e-4]), True, True)
+    power = Tabulated(np.array([1.0, 10.0, 100.0]), np.array([2.0, 2e-2, 2e-4]), True, True)
     np.testing.assert_allclose(power([3.0, 30.0, 1000.0]), 2 * np.array([3.0, 30.0, 1000.0]) ** -2)
-    jump = Table(np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 0.0, 1.0, 1.0]))
+    jump = Tabulated(np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 0.0, 1.0, 1.0]))
     np.testing.assert_allclose(jump([0.5, 1.5]), [0, 1])
 
 
@@ -263,6 +263,14 @@ def test_what_is_left_out_is_said(bulk):
     notes = analysis(bulk(PLATE + "TEMPD,1,20.\nPLOAD1,2,7,FY,FR,0.,1.,1.,1.\n")).notes
     assert len(notes) == 2
     assert all("left out" in n and "deck.bdf:" in n for n in notes)
+
+
+def test_parameters_without_effect_are_said(bulk):
+    """Those heeded and those of output alone are not."""
+    text = PLATE + "PARAM,POST,-1\nPARAM,G,.02\nPARAM,SNORM,20.\nPARAM,K6ROT,1.\n"
+    notes = analysis(bulk(text, "SOL 111\nCEND\nPARAM,LFREQ,1.\n")).notes
+    assert len(notes) == 1
+    assert "PARAM LFREQ, SNORM: not acted upon" in notes[0]
 
 
 @pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks are not at hand")

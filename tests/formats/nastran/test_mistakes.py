@@ -37,6 +37,7 @@ MISTAKES = {
     "flat system": (("3,4\n", "3,4,8\nCORD2R,8,,0.,0.,0.,0.,0.,1.,0.,0.,2.\n"), "lie on one line"),
     "wtmass text": (("MAT1", "PARAM,WTMASS,HALF\nMAT1"), "WTMASS is 'HALF', not a number"),
     "wtmass": (("MAT1", "PARAM,WTMASS,0.\nMAT1"), "WTMASS is 0"),
+    "k6rot": (("MAT1", "PARAM,K6ROT,-1.\nMAT1"), "K6ROT is -1"),
     "component": (("MAT1", "CELAS2,8,1.,1,7\nMAT1"), "not one of 1 to 6"),
     "spring to nothing": (("MAT1", "CELAS2,8,1.\nMAT1"), "joins nothing"),
     "PELAS": (("MAT1", "CELAS1,8,3,1,1\nMAT1"), "there is no PELAS 3; there are none"),

@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 
 from ...dynamics.frf import FRF, Quantity
-from ...ema.setup import Poles, Recording
+from ...ema.setup import PoleTable, Recording
 from ...errors import ChladniError, FileError
 
 _FRF = ("frequency_hz", "output", "input", "real", "imag")
@@ -23,7 +23,7 @@ _NPZ_OPTIONAL = ("coherence", "variance", "quantity", "level", "article")
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvTable:
     """A CSV file: columns of text, and the line of the file each row stands in."""
 
     path: Path
@@ -64,7 +64,7 @@ class Table:
         )
 
 
-def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> Table:
+def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTable:
     """A CSV file with these columns, in any order.
 
     Raises
@@ -93,7 +93,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> Table
     columns = {name: [row[k].strip() for _, row in rows[1:]] for k, name in enumerate(header)}
     if len(rows) == 1:
         raise FileError(f"{path.name} has a header but no rows")
-    return Table(path, columns, [line for line, _ in rows[1:]])
+    return CsvTable(path, columns, [line for line, _ in rows[1:]])
 
 
 def _beside(path: Path) -> list[str]:
@@ -170,7 +170,7 @@ def _first_line(path: Path) -> set[str]:
 
 
 def _recording(
-    table: Table,
+    table: CsvTable,
     numbers: dict[str, np.ndarray],
     rows: np.ndarray,
     key: tuple[str, float],
@@ -206,7 +206,7 @@ def _coded(texts: list[str]) -> tuple[tuple[str, ...], np.ndarray]:
 
 
 def _complete(
-    table: Table,
+    table: CsvTable,
     rows: np.ndarray,
     count: np.ndarray,
     frequency: np.ndarray,
@@ -290,7 +290,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     return Recording(path.name, frf, level=level, article=str(arrays.get("article", "")))
 
 
-def read_poles(path: str | Path) -> Poles:
+def read_poles(path: str | Path) -> PoleTable:
     """Poles from CSV: mode, frequency_hz, optional frequency_sd_hz, damping, state."""
     table = read_table(Path(path), _POLES, _POLES_OPTIONAL)
     n = len(table.line)
@@ -305,4 +305,4 @@ def read_poles(path: str | Path) -> Poles:
     damping = table.numbers("damping") if "damping" in table else unknown
     state = table.columns.get("state", [""] * n)
     mode = table.numbers("mode")
-    return Poles(frequency, sd, damping, mode.astype(int), tuple(state))
+    return PoleTable(frequency, sd, damping, mode.astype(int), tuple(state))

@@ -8,7 +8,7 @@ import numpy as np
 from ...dofs import COMPONENTS
 from ...ema.setup import Role, Sensor
 from ...errors import FileError
-from .read_tables import Table, read_table
+from .read_tables import CsvTable, read_table
 
 _OPTIONAL = (
     *("grid", "x", "y", "z", "direction", "nx", "ny", "nz"),
@@ -35,7 +35,7 @@ def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
     return sensors
 
 
-def _sensor(table: Table, k: int) -> Sensor:
+def _sensor(table: CsvTable, k: int) -> Sensor:
     where = f"{table.path.name}, line {table.line[k]}"
     cell = {name: column[k] for name, column in table.columns.items()}
     number = lambda name, empty: table.number(name, k, empty) if name in table else empty  # noqa: E731

@@ -9,7 +9,7 @@ from typing import IO, Any
 import numpy as np
 
 from ...dynamics.frf import FRF
-from ...ema.setup import Poles
+from ...ema.setup import PoleTable
 
 
 def write_npz(path: str | Path, frf: FRF) -> None:
@@ -44,7 +44,7 @@ def write_csv(path: str | Path, frf: FRF) -> None:
     _replace(path, "w", rows)
 
 
-def write_poles(path: str | Path, poles: Poles) -> None:
+def write_poles(path: str | Path, poles: PoleTable) -> None:
     """Poles as CSV; what is unknown stays an empty cell."""
 
     def rows(file: IO) -> None:

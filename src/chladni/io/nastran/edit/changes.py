@@ -64,7 +64,7 @@ Change = SetField | SetColumns | Add | Delete | Replace
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class SortedChanges:
     """Changes sorted by card: {(kind, row): {position: value}}; whole cards; additions."""
 
     fields: dict[tuple[str, int], dict[int, Value]]
@@ -72,7 +72,7 @@ class Plan:
     added: list[Add]
 
 
-def plan(deck: Deck, changes: Sequence[Change]) -> Plan:
+def plan(deck: Deck, changes: Sequence[Change]) -> SortedChanges:
     """Find the cards the changes name.
 
     Raises
@@ -80,7 +80,7 @@ def plan(deck: Deck, changes: Sequence[Change]) -> Plan:
     LabelError
         If a card or a field does not exist, or an id belongs to several cards.
     """
-    out = Plan({}, {}, [])
+    out = SortedChanges({}, {}, [])
     rows: dict[str, dict[int, int]] = {}
     for change in changes:
         if isinstance(change, Add):
@@ -98,7 +98,7 @@ def plan(deck: Deck, changes: Sequence[Change]) -> Plan:
     return out
 
 
-def _columns(deck: Deck, change: SetColumns, known: dict[int, int], out: Plan) -> None:
+def _columns(deck: Deck, change: SetColumns, known: dict[int, int], out: SortedChanges) -> None:
     """The changes of many cards."""
     at = [_position(change.kind, f) for f in change.fields]
     values = np.asarray(change.values, float).reshape(len(change.ids), len(at)).tolist()

@@ -55,6 +55,8 @@ def _head(assembly: Assembly, units: Units, count: int) -> Iterator[str]:
     yield from card("PARAM", ["AUTOSPC", "YES" if assembly.auto_spc else "NO"])
     if assembly.structural_damping:
         yield from card("PARAM", ["G", assembly.structural_damping], _EXACT)
+    if assembly.k6rot is not None:
+        yield from card("PARAM", ["K6ROT", assembly.k6rot], _EXACT)
 
 
 def _points(assembly: Assembly, units: Units, systems: Systems) -> Iterator[str]:

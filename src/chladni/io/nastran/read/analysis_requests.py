@@ -7,6 +7,7 @@ from ....units import Units
 from ..text.deck import Deck
 from . import excitation, response_frequencies
 from .context import context, parameter
+from .shell_elements import second_axes
 from .static_loads import loads, motions
 
 _LEFT_OUT = {
@@ -20,6 +21,13 @@ _LEFT_OUT = {
     "PELAST": "stiffness that follows the frequency",
     "PDAMPT": "damping that follows the frequency",
 }  # fmt: skip
+_HEEDED = frozenset("WTMASS COUPMASS G AUTOSPC RESVEC K6ROT".split())
+_OUTPUT = frozenset(  # what is printed, plotted or written
+    """POST POSTEXT PATVER OUGCORD OMID GRDPNT PRTMAXIM PRGPST NOCOMPS NOELOF NOELOP NOGPF CURV
+    CURVPLOT USETPRT USETSEL EXTOUT OGEOM OMACHPR DBDICT EST GEOM1 BGPDT EQEXIN CSTM COORID DDRMM
+    LSTRN SRCOMPS S1 S1G S1M S1AM BIGER NUMOUT OG SERST PRTRESLT PRTCSTM PRTEQXIN PRTGPL PRTPG
+    SPCGEN OUNIT1 OUNIT2 PDRMSG PDRG OIBULK""".split()
+)
 STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the frequency
     "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT",
 )  # fmt: skip
@@ -39,7 +47,7 @@ def analysis(deck: Deck, units: Units | None = None) -> Analysis:
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
-        notes=tuple(left_out(deck)),
+        notes=(*left_out(deck), *second_axes(ctx)),
     )
 
 
@@ -53,7 +61,18 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
 
 
 def left_out(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
-    """Cards that are read but not acted upon, one sentence each."""
+    """Cards and parameters that are read but not acted upon, one sentence each."""
     for name in names:
         for cards in deck.present(name):
             yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
+    yield from _unheeded(deck)
+
+
+def _unheeded(deck: Deck) -> Iterator[str]:
+    """Parameters that nothing here acts upon, but for those that choose output alone."""
+    given = {w.decode("latin-1") for w in deck["PARAM"].words(1).tolist()}
+    left = sorted((given | set(deck.case.parameters)) - _HEEDED - _OUTPUT)
+    if left:
+        yield f"{deck.path}: PARAM {', '.join(left)}: not acted upon"
+    if parameter(deck, "K6ROT") and any(deck.present("CQUADR", "CTRIAR")):
+        yield f"{deck.path}: PARAM K6ROT: not acted upon, as there are CQUADR or CTRIAR"

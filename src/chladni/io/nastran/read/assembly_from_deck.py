@@ -76,7 +76,18 @@ def _made(ctx: Context, subcase: int | None) -> Assembly:
         coupled_mass=real_parameter(deck, "COUPMASS", -1) > 0,
         structural_damping=real_parameter(deck, "G", 0.0),
         auto_spc=parameter(deck, "AUTOSPC") != "NO",
+        k6rot=_k6rot(deck),
     )
+
+
+def _k6rot(deck: Deck) -> float | None:
+    """PARAM,K6ROT; None where it is not given, or for CQUADR and CTRIAR, which do not heed it."""
+    if parameter(deck, "K6ROT") in ("", "AUTO") or any(deck.present("CQUADR", "CTRIAR")):
+        return None
+    value = real_parameter(deck, "K6ROT", 0.0)
+    if value < 0:
+        raise FileError(f"{deck.path}: PARAM,K6ROT is {value:g}; a stiffness cannot be negative")
+    return value
 
 
 def _unique_elements(deck: Deck, names: Sequence[str]) -> None:

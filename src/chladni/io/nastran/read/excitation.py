@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....model.analysis import Excitation, Load, Motion, Table
+from ....model.analysis import Excitation, Load, Motion, Tabulated
 from ..text.table import Cards
 from .context import Context, digits
 from .static_loads import terms
@@ -58,7 +58,7 @@ def _rload(
     ctx: Context,
     cards: Cards,
     i: int,
-    tables: dict[int, Table],
+    tables: dict[int, Tabulated],
     areas: dict[int, Dofs],
     motions: dict[int, Motion],
 ) -> Excitation:
@@ -84,13 +84,15 @@ def _rload(
     return Excitation(kind, rows, components, values, delay, phase, made[0], made[1], polar)
 
 
-def _table(ctx: Context, cards: Cards, i: int, k: int, tables: dict[int, Table]) -> Table | None:
+def _table(
+    ctx: Context, cards: Cards, i: int, k: int, tables: dict[int, Tabulated]
+) -> Tabulated | None:
     """The table in field k: an id, or a real that is constant over frequency."""
     word = cards.word(i, k)
     if not word or word == "0":
         return None
     if not word.isdigit():
-        return Table(np.zeros(1), np.array([cards.real(i, k)]))
+        return Tabulated(np.zeros(1), np.array([cards.real(i, k)]))
     if int(word) not in tables:
         there = ", ".join(map(str, sorted(tables)[:8])) or "none"
         raise cards.refuse(i, f"there is no TABLED {word}; there are {there}")
@@ -178,9 +180,9 @@ def _pairs(card: Cards, first: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(x)[order], np.array(y)[order]
 
 
-def _tables(ctx: Context) -> dict[int, Table]:
+def _tables(ctx: Context) -> dict[int, Tabulated]:
     """TABLED1 to TABLED3; frequencies in Hz."""
-    out: dict[int, Table] = {}
+    out: dict[int, Tabulated] = {}
     for name in ("TABLED1", "TABLED2", "TABLED3"):
         for cards in ctx.deck.present(name):
             for i, tid in enumerate(cards.unique().tolist()):
@@ -195,7 +197,7 @@ def _tables(ctx: Context) -> dict[int, Table]:
                     x = card.real(0, 2, 0.0) + x * (
                         card.real(0, 3, 1.0) if name == "TABLED3" else 1.0
                     )
-                out[tid] = Table(x / ctx.scale.time, y, *logs)
+                out[tid] = Tabulated(x / ctx.scale.time, y, *logs)
     return out
 
 

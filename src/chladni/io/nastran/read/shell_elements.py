@@ -1,5 +1,7 @@
 """Shell elements: corners, thickness, material direction, offset."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ....model.assembly import Shells, Solids
@@ -10,6 +12,7 @@ from .sections import Parts
 
 _QUADS = ("CQUAD4", "CQUADR", "CQUAD1", "CQUAD2")
 _TRIANGLES = ("CTRIA3", "CTRIAR", "CTRIA1", "CTRIA2")
+NORMAL = 1e-6  # length of what is left of a unit vector laid on an element: it stands normal to it
 
 
 def shells(ctx: Context, parts: Parts) -> Shells:
@@ -114,8 +117,7 @@ def _smeared(section: object) -> bool:
 
 def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int) -> np.ndarray:
     """Material axis 1 (n, 3): THETA from side G1-G2, or x of system MCID, laid on the element."""
-    words = cards.words(k)
-    system = np.array([w != b"" and w.isdigit() for w in words.tolist()], bool)
+    words, system = cards.words(k), _by_system(cards, k)
     side = X[:, 1] - X[:, 0]
     side = side - np.einsum("ni,ni->n", side, normal)[:, None] * normal
     side /= np.linalg.norm(side, axis=1)[:, None]
@@ -132,22 +134,55 @@ def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int)
     return np.asarray(axis)
 
 
+def _by_system(cards: Cards, k: int) -> np.ndarray:
+    """(n,) bool, True where field k is an integer: MCID, not THETA."""
+    return np.array([w.isdigit() for w in cards.words(k).tolist()], bool)
+
+
 def _from_systems(
     ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int
 ) -> np.ndarray:
-    """Axis x (or radial) of coordinate systems at element centres, laid on the elements."""
+    """Axis x (or radial) of coordinate systems at element centres, laid on the elements (n, 3).
+
+    Where x is normal to the element, y (which then lies in it) takes its place.
+    """
+    flat, size = _laid(ctx, cards, X, normal, k)
+    first = np.where(size[:, 0] < NORMAL, 1, 0)
+    at = np.arange(len(cards))
+    return np.asarray(flat[at, first] / size[at, first, None])
+
+
+def _laid(
+    ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Axes x and y of each element's system without their normal part (n, 2, 3), their lengths."""
     cid, centre = cards.integers(k), X.mean(axis=1)
-    axis = np.zeros((len(cards), 3))
+    axes = np.zeros((len(cards), 2, 3))
     for c in np.unique(cid):
         mine = np.flatnonzero(cid == c)
         frame = ctx.frames.get(int(c), cards, int(mine[0]))
-        axis[mine] = frame.at(centre[mine])[:, 0]
-    flat = axis - np.einsum("ni,ni->n", axis, normal)[:, None] * normal
-    size = np.linalg.norm(flat, axis=1)
-    if np.any(bad := size < 1e-6):
-        i = int(np.argmax(bad))
-        raise cards.refuse(i, f"x of coordinate system {cid[i]} is normal to the element")
-    return np.asarray(flat / size[:, None])
+        axes[mine] = frame.at(centre[mine])[:, :2]
+    flat = axes - np.einsum("nai,ni->na", axes, normal)[..., None] * normal[:, None]
+    return flat, np.linalg.norm(flat, axis=2)
+
+
+def second_axes(ctx: Context) -> Iterator[str]:
+    """Shells whose material axis 1 is y of their MCID, one sentence a kind of card."""
+    for names, corners in ((_QUADS, 4), (_TRIANGLES, 3)):
+        for every in ctx.deck.present(*names):
+            k = corners + 3
+            cards = every.take(_by_system(every, k))
+            if not len(cards):
+                continue
+            nodes = ctx.rows(cards, cards.ids(3, corners))
+            _, size = _laid(ctx, cards, ctx.places[nodes], _normals(ctx, cards, nodes), k)
+            if len(found := np.flatnonzero(size[:, 0] < NORMAL)):
+                i = int(found[0])
+                yield (
+                    f"{cards.where(i)}: {cards.name} {cards.integers(1)[i]} and "
+                    f"{len(found) - 1} others lie across x of their MCID; "
+                    "its y is their material axis 1"
+                )
 
 
 def filled_thickness(parts: Parts, shells: Shells) -> None:

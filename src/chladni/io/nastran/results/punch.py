@@ -45,7 +45,7 @@ Record = tuple[int, tuple[float, int], np.ndarray]  # point, (abscissa, mode), v
 
 
 @dataclass
-class _Block:
+class _PunchBlock:
     """Header of the records being read, and the records."""
 
     kind: str = ""
@@ -110,19 +110,19 @@ def _table(
     return values, ids, np.array([x for x, _ in abscissa])
 
 
-def _blocks(path: Path) -> Iterator[_Block]:
+def _blocks(path: Path) -> Iterator[_PunchBlock]:
     """Blocks of records with the header that stands above each."""
     try:
         text = path.read_text("latin-1")
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}") from None
-    block = _Block()
+    block = _PunchBlock()
     rows: list[tuple[int, str]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("$"):
             if rows:
                 yield _filled(block, rows, path)
-                block, rows = _Block(block.kind, block.polar, block.complex, block.subcase), []
+                block, rows = _PunchBlock(block.kind, block.polar, block.complex, block.subcase), []
             _header(block, line[:72], path, number)
         elif line.strip() and block.kind:
             rows.append((number, line[:72]))
@@ -130,7 +130,7 @@ def _blocks(path: Path) -> Iterator[_Block]:
         yield _filled(block, rows, path)
 
 
-def _header(block: _Block, line: str, path: Path, number: int) -> None:
+def _header(block: _PunchBlock, line: str, path: Path, number: int) -> None:
     """Take in one header line."""
     word = line.split("(")[0].strip()
     if word.startswith(("$TITLE", "$SUBTITLE", "$LABEL")):
@@ -157,7 +157,7 @@ def _value(line: str, path: Path, number: int) -> float:
     return value
 
 
-def _filled(block: _Block, rows: list[tuple[int, str]], path: Path) -> _Block:
+def _filled(block: _PunchBlock, rows: list[tuple[int, str]], path: Path) -> _PunchBlock:
     """The block with its records: lines joined with their continuations."""
     starts = [k for k, (_, line) in enumerate(rows) if not line.startswith("-CONT-")]
     for a, b in zip(starts, [*starts[1:], len(rows)], strict=True):
@@ -175,7 +175,7 @@ def _filled(block: _Block, rows: list[tuple[int, str]], path: Path) -> _Block:
     return block
 
 
-def _complex(block: _Block, values: np.ndarray) -> np.ndarray:
+def _complex(block: _PunchBlock, values: np.ndarray) -> np.ndarray:
     """Real and imaginary halves, or modulus and phase [deg], as complex numbers."""
     if not block.complex:
         return values[:6].astype(complex)

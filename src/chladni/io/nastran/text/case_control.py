@@ -29,7 +29,7 @@ _SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
 
 
 @dataclass(frozen=True)
-class Subcase:
+class SubcaseSelection:
     """What one subcase selects: {"SPC": 1, "LOAD": 2, ...}."""
 
     id: int
@@ -48,7 +48,7 @@ class CaseControl:
     """Solution number (0: not stated) and the subcases; always at least one where there are any."""
 
     sol: int = 0
-    subcases: tuple[Subcase, ...] = ()
+    subcases: tuple[SubcaseSelection, ...] = ()
     present: bool = False
     parameters: dict[str, str] = field(default_factory=dict)  # PARAM above BEGIN BULK
 
@@ -96,11 +96,11 @@ class _Case:
         elif name and "2" in name:
             self.matrices[name] = value
 
-    def over(self, common: "_Case") -> Subcase:
+    def over(self, common: "_Case") -> SubcaseSelection:
         """The subcase with what stands above all subcases."""
         own = (self.outputs, common.outputs)
         residual = (self.residual, common.residual)
-        return Subcase(
+        return SubcaseSelection(
             self.id,
             {**common.selects, **self.selects},
             {**common.matrices, **self.matrices},

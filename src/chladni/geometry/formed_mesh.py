@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import readonly
 from ..errors import ModelError, ShapeError
+from .facets import cell_areas
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +60,7 @@ class FormedMesh:
     @property
     def area(self) -> np.ndarray:
         """Area of each cell (m,) [m²]."""
-        x = self.points[self.cells]
-        return np.asarray(
-            np.linalg.norm(np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]), axis=1) / 2
-        )
+        return cell_areas(self.points, self.cells)
 
     def of_part(self, id_: int) -> "FormedMesh":
         """The cells of one part, on the same points."""

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
-from chladni.model.refine import refined
+from chladni.geometry.refine import refined
 from chladni_specimens.plates import box, grid, plate, sheet
 
 

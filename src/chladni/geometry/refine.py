@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .assembly import Assembly, Shells
+from ..model.assembly import Assembly, Shells
+from .facets import cell_normals, point_normals
 
 SMOOTH = np.cos(np.radians(35.0))  # facets that differ by more make a fold
 
@@ -59,13 +60,7 @@ def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
     """Vertex normals (n, 3) and whether all facets of one part agree there (n,)."""
     nodes = assembly.shells.nodes
-    X = assembly.points[nodes]
-    face = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
-    total = np.zeros_like(assembly.points)
-    for k in range(4):
-        np.add.at(total, nodes[:, k], face)
-    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    face, total = (of(assembly.points, nodes) for of in (cell_normals, point_normals))
     least, low, high = (np.full(len(total), v) for v in (1.0, 1e9, -1e9))
     for k in range(4):
         np.minimum.at(least, nodes[:, k], np.einsum("ij,ij->i", face, total[nodes[:, k]]))

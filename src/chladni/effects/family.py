@@ -1,0 +1,99 @@
+"""A family of effects: all that the rest of the program knows of it."""
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..fem.energy import mass_properties
+from ..model.assembly import Assembly
+from .effect import Effect
+from .search_context import Candidate, SearchContext, best_starts
+from .surroundings import Surroundings
+
+
+@dataclass(frozen=True, eq=False)
+class Article:
+    """What stands on the virtual bench and how it is tested, with the sealed truth.
+
+    Attributes
+    ----------
+    assembly : the article, meshed finer than the deck
+    deck : what the user will have
+    outputs, hangers : (k,) int    grid ids of the deck
+    gains : (n_out,)               factor on every channel
+    off_scale : mass that is taken off before the article is weighed [kg]
+    truth : what was concealed; ``parameters`` by the names the effect reports, ``value`` the first
+        of them, ``point_m`` and ``channel`` where it has a place
+    """
+
+    assembly: Assembly
+    deck: Assembly
+    outputs: np.ndarray
+    hangers: np.ndarray
+    gains: np.ndarray
+    off_scale: float = 0.0
+    truth: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def weight(self) -> float:
+        """Mass of the article [kg]."""
+        return mass_properties(self.assembly)[0]
+
+    def grids_at(self, grids: np.ndarray) -> tuple[int, ...]:
+        """Ids of the article's grids that lie where these of the deck lie."""
+        where = self.deck.points[self.deck.rows(grids)]
+        d2 = ((self.assembly.points[None] - where[:, None]) ** 2).sum(axis=-1)
+        return tuple(int(i) for i in self.assembly.ids[d2.argmin(axis=1)])
+
+    def shell_grid(self, rng: np.random.Generator) -> int:
+        """Id of a grid of the deck's shells, any of them."""
+        return int(self.deck.ids[rng.choice(np.unique(self.deck.shells.nodes))])
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """One kind of physics as search, bench, deck and page know it.
+
+    Attributes
+    ----------
+    effect : its class, which holds name, claim and physics
+    conceal : puts it into an article, of a size and at a place drawn at random, with the truth
+    placed : its effects where deck and test tell their place
+    candidates : what is worth a fit, where the place is unknown; of ``placed`` the best starts
+    cards : of the deck that hold it
+    no_cards : why none can
+    """
+
+    effect: type[Effect]
+    conceal: Callable[[Article, np.random.Generator], Article]
+    placed: Callable[[Surroundings], Sequence[Effect]] | None = None
+    candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
+    cards: tuple[str, ...] = ()
+    no_cards: str = ""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:
+            raise ModelError(
+                f"{self.effect.__name__} has the name {self.name!r}; a family's is its own, in "
+                "small letters and hyphens, as point-mass"
+            )
+        if self.placed is None and self.candidates is None:
+            raise ModelError(f"{self.name} has neither candidates nor places it is known to act at")
+        if bool(self.cards) == bool(self.no_cards):
+            raise ModelError(f"{self.name} needs the cards that hold it, or a reason why none can")
+
+    @property
+    def name(self) -> str:
+        """The name of the public contract."""
+        return self.effect.name
+
+    def proposed(self, context: SearchContext) -> list[Candidate]:
+        """What of this family is worth a fit."""
+        if self.candidates is not None:
+            return list(self.candidates(context))
+        assert self.placed is not None
+        return best_starts(context, self.placed(context.where))

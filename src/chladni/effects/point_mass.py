@@ -1,0 +1,61 @@
+"""A mass the model does not know of."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from ..model.assembly import Assembly
+from .family import Article, Family
+from .movable_attachment import MovableAttachment, attachments, moved, patch, there
+from .points import strength, with_masses
+from .search_context import Candidate, SearchContext
+from .surroundings import Surroundings
+
+SHARE = 0.03  # of the structure's mass: prior median
+TRIED = np.exp(np.linspace(-3.0, 1.5, 7))  # multiples of the median
+
+
+@dataclass(frozen=True, eq=False)
+class PointMass(MovableAttachment):
+    """A mass sits at a place the model does not know of."""
+
+    name = "point-mass"
+    claim = "something sits on the structure that the model does not have"
+    matrix = "M"
+
+    @classmethod
+    def near(cls, where: Surroundings, k: int) -> Self:
+        """A mass near the k-th grid."""
+        m = strength("M", "kg", SHARE * where.setup.weight, 1.2, (-1.5, -0.5, 0.5))
+        return cls(moved(m), patch=patch(where, k, np.eye(3)), **there(where, k))
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The mass itself."""
+        m = self.parameters[0].value(x[0])
+        return m, np.array([m, 0.0, 0.0])
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CONM2 at the nearest grid, offset to the place."""
+        m, grid = self.parameters[0].value(x[0]), self.nearest(x)
+        offset = self.at(x) - assembly.points[assembly.rows([grid])[0]]
+        return with_masses(assembly, (grid,), m, offset)
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """Masses at the places where they explain most."""
+    strengths = SHARE * context.where.setup.weight * TRIED
+    return attachments(context, PointMass.near, "M", strengths)
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """1.5 to 8 % of the article's mass at a grid."""
+    weight, grid = article.weight, article.shell_grid(rng)
+    m = float(rng.uniform(0.015, 0.08)) * weight
+    at = article.grids_at(np.array([grid]))
+    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
+    truth = {"point_m": point, "value": m, "parameters": {"M": m}}
+    return replace(article, assembly=with_masses(article.assembly, at, m), truth=truth)
+
+
+FAMILY = Family(PointMass, conceal, candidates=candidates, cards=("CONM2",))

@@ -1,0 +1,113 @@
+"""Families of effects by name: ours, those of installed packages, those a program registers.
+
+A package adds a family by an entry point, with nothing of chladni touched::
+
+    [project.entry-points."chladni.effects"]
+    crack = "my_package.crack:FAMILY"
+"""
+
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+
+from ..errors import ExtensionError, LabelError
+from . import (
+    extra_support,
+    orthotropic_material,
+    point_mass,
+    sensor_fault,
+    sensor_mass,
+    suspension,
+    thickness_distribution,
+)
+from .family import Family
+
+GROUP = "chladni.effects"
+BUILT_IN = (
+    orthotropic_material.FAMILY,
+    sensor_mass.FAMILY,
+    point_mass.FAMILY,
+    extra_support.FAMILY,
+    suspension.FAMILY,
+    thickness_distribution.FAMILY,
+    sensor_fault.FAMILY,
+)
+_added: dict[str, Family] = {}
+
+
+def families() -> tuple[Family, ...]:
+    """Every family that is known, ours first.
+
+    Raises
+    ------
+    ExtensionError
+        If an installed package offers one that cannot be used.
+    """
+    return (*BUILT_IN, *_installed(), *_added.values())
+
+
+def names() -> tuple[str, ...]:
+    """Their names."""
+    return tuple(family.name for family in families())
+
+
+def family(name: str) -> Family:
+    """The family of a name."""
+    for known in families():
+        if known.name == name:
+            return known
+    raise LabelError(f"no effect {name!r}; there are {', '.join(names())}")
+
+
+def register(family: Family) -> None:
+    """Add a family for this process.
+
+    Raises
+    ------
+    ExtensionError
+        If its name is taken.
+    """
+    if family.name in names():
+        raise ExtensionError(f"an effect {family.name!r} is registered already")
+    _added[family.name] = family
+
+
+def unregister(name: str) -> None:
+    """Take back what :func:`register` added."""
+    if name not in _added:
+        raise LabelError(f"no effect {name!r} was registered; there are {', '.join(_added)}")
+    del _added[name]
+
+
+@cache
+def _installed() -> tuple[Family, ...]:
+    """Families of the installed packages, by the order of their names."""
+    out: dict[str, Family] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda e: (e.name, e.value)):
+        found = _loaded(entry)
+        if found.name in out or any(found.name == own.name for own in BUILT_IN):
+            raise ExtensionError(
+                f"{_whose(entry)} offers the effect {found.name!r}, and another one has that name "
+                "already; rename or uninstall one of them"
+            )
+        out[found.name] = found
+    return tuple(out.values())
+
+
+def _loaded(entry: EntryPoint) -> Family:
+    try:
+        found = entry.load()
+    except Exception as error:
+        raise ExtensionError(
+            f"{_whose(entry)} offers the effect {entry.name!r}, but {entry.value} cannot be loaded "
+            f"({type(error).__name__}: {' '.join(str(error).split())}); repair or uninstall it"
+        ) from error
+    if not isinstance(found, Family):
+        raise ExtensionError(
+            f"{_whose(entry)} offers the effect {entry.name!r}, but {entry.value} is a "
+            f"{type(found).__name__}, no chladni.effects.family.Family; repair or uninstall it"
+        )
+    return found
+
+
+def _whose(entry: EntryPoint) -> str:
+    return f"the package {entry.dist.name}" if entry.dist is not None else "a package"

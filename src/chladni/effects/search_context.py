@@ -1,0 +1,134 @@
+"""What a search offers a family of effects that proposes its candidates.
+
+Effects stand below the search and do not know it; they see it as these protocols. A family says
+which service it wants; how the service works is the search's own affair.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import norm, qmc
+
+from .effect import Effect
+from .surroundings import Surroundings
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect worth a fit: its start (n_p,), and the start of the base effects (n_base,)."""
+
+    effect: Effect
+    start: np.ndarray
+    base: np.ndarray
+
+
+class ResponseScan(Protocol):
+    """Scores of many changes at once, where responses were measured.
+
+    ``about`` is the position in :attr:`SearchContext.bases` of the state that is changed.
+    """
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines."""
+
+    def point_scores(self, about: int, matrix: str, strengths: np.ndarray) -> np.ndarray:
+        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
+
+    def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
+
+
+class SearchContext(Protocol):
+    """The structure, the test, two states of the base effects, and scores of what is tried.
+
+    A score is -2 ln posterior up to a constant: the smaller, the better.
+    """
+
+    @property
+    def where(self) -> Surroundings:
+        """The structure and its test."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Outputs of the test."""
+
+    @property
+    def bases(self) -> tuple[np.ndarray, ...]:
+        """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
+
+    @property
+    def null(self) -> np.ndarray:
+        """Base parameters of the best fit without any effect."""
+
+    @property
+    def scan(self) -> ResponseScan | None:
+        """Fast scores; None where only natural frequencies are known."""
+
+    def scores(self, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
+        """Score of an effect at each start about the calibrated model (n_ways, n_starts)."""
+
+
+DRAWS = 1024  # of the prior, where pairing of poles makes many valleys
+VALLEYS = 6  # of them that are followed
+
+
+def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
+    """Effects whose place is known, each from the best of its starts.
+
+    With poles alone an effect of many parameters also begins at draws of its prior.
+    """
+    out: list[Candidate] = []
+    for effect in effects:
+        starts, several = effect.starts(), 1
+        if context.scan is None and len(effect.parameters) > 2:
+            starts, several = [*starts, *_draws(effect, DRAWS)], VALLEYS
+        for scores in context.scores(effect, starts):
+            best = np.argsort(scores)[:several]
+            out += [Candidate(effect, starts[k], context.bases[-1]) for k in best]
+    return out
+
+
+def best_places(
+    context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2
+) -> list[Candidate]:
+    """The same effect at many places, each evaluated at all its starts: the best places.
+
+    Parameters
+    ----------
+    point : (n_effects, 3)   their places [m]
+    """
+    options = []
+    for effect in effects:
+        scores = context.scores(effect, effect.starts())[0]
+        options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
+    best = distinct(np.array([score for score, _ in options]), point, [], wanted)
+    return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]
+
+
+def distinct(score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted: int) -> list[int]:
+    """The best positions, none within a sixth of the structure's size of another one chosen.
+
+    Parameters
+    ----------
+    score : (n,)       the smaller, the better
+    point : (n, 3)     [m]
+    taken : positions chosen before
+    """
+    reach = np.linalg.norm(np.ptp(point, axis=0)) / 6
+    out: list[int] = []
+    for k in np.argsort(score):
+        if all(np.linalg.norm(point[k] - point[j]) > reach for j in [*taken, *out]):
+            out.append(int(k))
+        if len(out) == wanted:
+            break
+    return out
+
+
+def _draws(effect: Effect, n: int) -> list[np.ndarray]:
+    """Sobol points of an effect's prior."""
+    u = qmc.Sobol(len(effect.parameters), seed=1).random(n)
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
+    return list(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))

@@ -1,0 +1,62 @@
+"""Where sensors and shakers are on a structure: one type from the case to the picture."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..geometry.facets import tangents
+from .assemble import Structure
+from .locate import rows_of
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredDofs:
+    """Measured or driven dofs: grids, free points on the nearest shell, or the motion of the base.
+
+    Attributes
+    ----------
+    labels : (k,) text
+    grids : (k,) int       id, 0 where the place is no grid
+    points : (k, 3)        [m], basic frame; nan for the motion of the base
+    directions : (k, 3)    unit vectors, basic frame
+    sd : (k,)              uncertainty of the place [m]
+    mass : (k,)            of the sensor [kg]
+    """
+
+    labels: tuple[str, ...]
+    grids: np.ndarray
+    points: np.ndarray
+    directions: np.ndarray
+    sd: np.ndarray
+    mass: np.ndarray
+
+    @property
+    def base(self) -> np.ndarray:
+        """True where the dof is the enforced motion of the supports (k,)."""
+        return np.isnan(self.points[:, 0])
+
+    def rows(self, built: Structure) -> sp.csr_array:
+        """Motion of each dof over the free dofs of the structure (k, n); the base has none (zero).
+
+        A place that is no grid moves with the nearest point of the shells.
+        """
+        found = sp.lil_array((len(self.labels), built.T.shape[1]))
+        real = np.flatnonzero(~self.base)
+        if len(real):
+            found[real] = rows_of(built, self.grids[real], self.points[real], self.directions[real])
+        return sp.csr_array(found)
+
+    def around(self, built: Structure) -> sp.csr_array:
+        """Rows at each place, then at four more round each that is uncertain (k + 4 m, n).
+
+        They lie √2 standard deviations away in the sheet, so that the mean square of the four along
+        either axis is sd².
+        """
+        rows = [self.rows(built)]
+        for k in np.flatnonzero(self.sd > 0):
+            n = self.directions[k]
+            u, v = tangents(n)
+            near = self.points[k] + np.sqrt(2) * self.sd[k] * np.array([u, -u, v, -v])
+            rows.append(rows_of(built, np.zeros(4, int), near, np.tile(n, (4, 1))))
+        return sp.csr_array(sp.vstack(rows))

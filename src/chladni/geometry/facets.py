@@ -1,0 +1,84 @@
+"""Areas, normals and tangents of shells: the one account that labels, effects and pictures share.
+
+The sign of a normal. A shell's normal follows the right-hand rule round its grids in the deck's
+order, as Nastran's does. The normal at a grid is the mean of the normals of the shells around it,
+weighted by area; a shell that looks the other way (more than 135 degrees from the first of them,
+in the deck's order) is turned over first, so that neither a panel with some shells numbered the
+other way round nor a flange folded flat makes the mean vanish. The sense is that of most of the
+area; where that is even, of the first shell. So ``12:n``, an attachment at grid 12 and the arrow
+in a picture agree. At a place within a shell the normal is that of the triangle it lies in.
+
+Cells are rows of points (m, 4); a triangle repeats its third.
+"""
+
+import numpy as np
+
+OPPOSITE = -np.sqrt(0.5)  # cosine to the first shell below which one is turned over
+EVEN = 1e-9  # of the area: a sense decided by less is decided by rounding
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    """V / |v| along the last axis (..., 3); zero stays zero."""
+    length: np.ndarray = np.linalg.norm(v, axis=-1, keepdims=True)
+    return v / np.where(length == 0, 1.0, length)
+
+
+def vector_areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Vector areas a = ½ d₁₃ x d₂₄ (m, 3) [m²], d the diagonals; exact for triangles too.
+
+    Parameters
+    ----------
+    points : (n, 3)      [m]
+    cells : (m, 4) int   rows of points
+    """
+    x = points[cells]
+    return 0.5 * np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1])
+
+
+def cell_areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """A = |a| (m,) [m²]."""
+    area: np.ndarray = np.linalg.norm(vector_areas(points, cells), axis=1)
+    return area
+
+
+def cell_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Unit normals n = a / |a| (m, 3); zero for a cell without area."""
+    return unit(vector_areas(points, cells))
+
+
+def point_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Unit normals at the points, n = Σ ±a / |Σ ±a| (n, 3), with the sign stated above.
+
+    Zero at a point that no cell holds.
+    """
+    a, (point, cell) = vector_areas(points, cells), _corners(cells)
+    first = np.full(len(points), len(cells))
+    np.minimum.at(first, point, cell)
+    own, lead = a[cell], a[first[point]]
+    cosine = np.einsum("ci,ci->c", unit(own), unit(lead))
+    turned = np.where(cosine < OPPOSITE, -1.0, 1.0)
+    total, plain = (_at_points(point, v, len(points)) for v in (turned[:, None] * own, own))
+    area = _at_points(point, np.linalg.norm(own, axis=1), len(points))
+    most = np.einsum("ni,ni->n", unit(total), plain)
+    return unit(total) * np.where(most < -EVEN * area, -1.0, 1.0)[:, None]
+
+
+def _corners(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Point and cell of every corner; a triangle's repeated one counts once."""
+    real = np.ones(cells.shape, bool)
+    real[:, 3] = cells[:, 3] != cells[:, 2]
+    return cells[real], np.nonzero(real)[0]
+
+
+def _at_points(point: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Sum of the corners' values at each of ``count`` points."""
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, point, values)
+    return total
+
+
+def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors (..., 3) with u x v = n, u as near as can be to the axis farthest from n."""
+    e = np.eye(3)[np.abs(normal).argmin(axis=-1)]
+    u = unit(e - (e * normal).sum(axis=-1, keepdims=True) * normal)
+    return u, np.cross(normal, u)

@@ -1,0 +1,25 @@
+"""A few points that cover many."""
+
+import numpy as np
+
+
+def farthest_point_sample(points: np.ndarray, count: int) -> np.ndarray:
+    """Order of ``count`` points in which each is the farthest from those before it (k,) int.
+
+    The largest distance from any point to the sample is at most twice the least possible
+    (Gonzalez 1985, Theoretical Computer Science 38, 293-306). It begins at the point farthest from
+    the middle. Of points equally far, to rounding, the first is taken.
+
+    Parameters
+    ----------
+    points : (n, d) [m]
+    count : at most this many; all points, in this order, where there are fewer
+    """
+    far: np.ndarray = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    order: list[int] = []
+    for _ in range(min(count, len(points))):
+        order.append(int(np.argmax(far >= (1 - 1e-9) * far.max())))
+        away: np.ndarray = np.linalg.norm(points - points[order[-1]], axis=1)
+        far = np.minimum(far, away) if len(order) > 1 else away
+        far[order] = -1.0  # one of several points at one place is not taken twice
+    return np.array(order, dtype=int)
