@@ -8,9 +8,10 @@ import numpy as np
 
 from chladni.dofs import label
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.catalogue import spread
 from chladni.fem.assemble import structure
-from chladni.fem.locate import locate
+from chladni.geometry.facets import cell_normals, point_normals
+from chladni.geometry.nearest import ShellSurface
+from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
 from chladni.planning import Wishes, plan
@@ -22,7 +23,7 @@ from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
 from .concealed import SPECIMENS
-from .footing import Spots, normals
+from .footing import Spots
 
 ZETA = 0.007  # median damping ratio of an article
 FLAT = 0.999  # length of the mean normal of a point's shells where a sensor can be glued
@@ -81,7 +82,7 @@ def form_bench(name: str, seed: int) -> Bench:
     every = _candidates(deck)
     spots = every.only(_spread(every, int(rng.integers(8, 31)), rng))
     return Bench(
-        name=f"{name} {seed}",
+        name=name,
         deck=deck,
         meshes={k: partial(form.made, seed, finer) for k, finer in FINER.items()},
         outputs=spots,
@@ -134,7 +135,7 @@ def tailgate_bench() -> Bench:
     sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
 
     def spots(at: np.ndarray) -> Spots:
-        shell = locate(deck.points, deck.shells.nodes, m.points[at]).shell
+        shell = ShellSurface.whole(deck).feet(m.points[at]).shell
         is_grid = np.isin(m.ids[at], deck.ids)
         return Spots(
             tuple(m.labels[int(k)] for k in at),
@@ -163,7 +164,7 @@ def tailgate_bench() -> Bench:
 
 def _candidates(deck: Assembly) -> Spots:
     """Grids where a sensor can be glued: flat on a sheet, or on a tube across it."""
-    n = normals(deck)
+    n = point_normals(deck.points, deck.shells.nodes)
     part, way = np.full(len(deck.points), -1), n.copy()
     if len(deck.shells):
         part[deck.shells.nodes.ravel()] = np.repeat(deck.shells.part, 4)
@@ -184,9 +185,7 @@ def _candidates(deck: Assembly) -> Spots:
 
 def _mean_normal(deck: Assembly) -> np.ndarray:
     """Length of the mean of the unit normals of the shells round each point."""
-    X = deck.points[deck.shells.nodes]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n = cell_normals(deck.points, deck.shells.nodes)
     total, count = np.zeros_like(deck.points), np.zeros(len(deck.points))
     for corner in range(4):
         np.add.at(total, deck.shells.nodes[:, corner], n)
@@ -204,7 +203,7 @@ def _label(grid: int, direction: np.ndarray) -> str:
 def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
     """Places far from each other, shaken a little by the seed."""
     jitter = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
-    return spread(every.points + jitter, count)
+    return farthest_point_sample(every.points + jitter, count)
 
 
 def _driven(

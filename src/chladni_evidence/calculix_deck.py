@@ -13,6 +13,7 @@ import numpy as np
 
 from chladni.errors import ModelError
 from chladni.fem.rigid import transformation
+from chladni.geometry.facets import cell_normals
 from chladni.model.assembly import Assembly, Average, Bushes, RigidBody
 from chladni.model.properties import BeamSection, Isotropic, Orthotropic, Part, ShellSection
 
@@ -180,11 +181,7 @@ def _nodal_thickness(t: np.ndarray, nodes: np.ndarray) -> Iterator[tuple[int, fl
 
 def _axes(a: Assembly, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Material axes 1 and 2 of shells: the projection of ``axis`` and what is square to it."""
-    X = a.points[a.shells.nodes[at]]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    tri = a.shells.triangle[at]
-    n[tri] = np.cross(X[tri, 1] - X[tri, 0], X[tri, 2] - X[tri, 0])
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n = cell_normals(a.points, a.shells.nodes[at])
     e = a.shells.axis[at]
     e = e - np.einsum("ki,ki->k", e, n)[:, None] * n
     e /= np.linalg.norm(e, axis=1, keepdims=True)

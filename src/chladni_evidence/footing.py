@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.fem.locate import locate
+from chladni.geometry.nearest import ShellSurface
 from chladni.model.assembly import Assembly
 
 
@@ -57,10 +57,9 @@ def footing(assembly: Assembly, spots: Spots) -> Footing:
     for name in dict.fromkeys(spots.parts):
         mine = np.array([p == name for p in spots.parts])
         p = assembly.part(name)
-        quads = assembly.shells.nodes[assembly.shells.part == p]
-        if len(quads):
-            found = locate(assembly.points, quads, spots.points[mine])
-            rows[mine], weights[mine] = found.nodes, found.weights
+        if (assembly.shells.part == p).any():
+            feet = ShellSurface.of(assembly, name).feet(spots.points[mine])
+            rows[mine], weights[mine] = feet.nodes, feet.weight
         else:
             rows[mine] = nearest_rows(assembly, p, spots.points[mine])[:, None]
             weights[mine] = [1.0, 0.0, 0.0]
@@ -79,15 +78,3 @@ def nearest_rows(assembly: Assembly, p: int, points: np.ndarray) -> np.ndarray:
     rows = rows_of_part(assembly, p)
     d2 = ((assembly.points[rows][None] - points[:, None]) ** 2).sum(axis=-1)
     return np.asarray(rows[d2.argmin(axis=1)])
-
-
-def normals(assembly: Assembly) -> np.ndarray:
-    """Unit normal of every point, the mean of its shells' weighted by area; 0 off the shells."""
-    X = assembly.points[assembly.shells.nodes]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    tri = assembly.shells.triangle
-    n[tri] = np.cross(X[tri, 1] - X[tri, 0], X[tri, 2] - X[tri, 0])
-    total = np.zeros_like(assembly.points)
-    for corner in range(4):
-        np.add.at(total, assembly.shells.nodes[:, corner], n)
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])

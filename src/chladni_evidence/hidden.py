@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from chladni.geometry.nearest import tangents
+from chladni.geometry.facets import point_normals, tangents
 from chladni.model.assembly import Assembly, Bushes, Masses
 
-from .footing import Spots, nearest_rows, normals, rows_of_part
+from .footing import Spots, nearest_rows, rows_of_part
 from .response_of_article import Coupling
+
+FACING = 0.85  # cosine between normals of one face
+LEAST = 12  # points of a patch
 
 Spoil = Callable[[np.ndarray], np.ndarray]  # recorded values (n_f, n_out, n_in) made worse
 
@@ -65,7 +68,7 @@ class Site:
 
     def normal(self, row: int) -> np.ndarray:
         """Unit normal at a point; on a beam, a direction across it."""
-        n = normals(self.article)[row] if len(self.article.shells) else np.zeros(3)
+        n = point_normals(self.article.points, self.article.shells.nodes)[row]
         if n.any():
             return np.asarray(n)
         beams = self.article.beams.nodes
@@ -144,18 +147,11 @@ def near_outputs(site: Site) -> np.ndarray:
 
 
 def around(site: Site, row: int, radius: float) -> np.ndarray:
-    """Rows of points of the same face within a radius of one, itself first."""
-    a, n = site.article, normals(site.article)
+    """Rows of points of the same face within a radius of one (a dozen at least), itself first."""
+    a, n = site.article, point_normals(site.article.points, site.article.shells.nodes)
     part = a.shells.part[(a.shells.nodes == row).any(axis=1)][0]
     rows = rows_of_part(a, int(part))
+    rows = rows[np.abs(n[rows] @ n[row]) > FACING]
     d = np.linalg.norm(a.points[rows] - a.points[row], axis=1)
-    facing = np.abs(n[rows] @ n[row]) > 0.85
-    near = rows[facing & (d <= radius)]
-    return np.asarray(near[np.argsort(np.linalg.norm(a.points[near] - a.points[row], axis=1))])
-
-
-def cell_areas(assembly: Assembly) -> np.ndarray:
-    """A = |d1 x d2| / 2 of every shell (m,) [m²]."""
-    X = assembly.points[assembly.shells.nodes]
-    d1, d2 = X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]
-    return np.asarray(np.linalg.norm(np.cross(d1, d2), axis=1) / 2)
+    order = np.argsort(d, kind="stable")
+    return np.asarray(rows[order[: max(LEAST, int((d <= radius).sum()))]])

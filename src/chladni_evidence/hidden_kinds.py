@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.errors import ModelError
+from chladni.geometry.facets import cell_normals
 from chladni.model.assembly import Assembly
 from chladni.model.properties import Isotropic, Orthotropic, ShellSection
 
@@ -73,6 +75,8 @@ def _has_points(a: Assembly, p: int) -> bool:
 def thinning(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A patch of a sheet thinner by 12 to 25 % in its middle, t (1 - α e^(-d²/2R²))."""
     a, part = site.article, site.part(rng)
+    if not (a.shells.part == a.part(part)).any():
+        raise ModelError(f"part {part} has no sheet that could be thinner")
     centre = a.points[rng.choice(site.rows(part))]
     R = float(rng.uniform(0.06, 0.12)) * site.size * min(size, 1.6) ** 0.5
     alpha = min(0.45, float(rng.uniform(0.12, 0.25)) * size)
@@ -87,7 +91,7 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """Sheets rolled: E1/E2 = e^±(0.12 to 0.3), G12 off by up to 15 %."""
     a, rolled = site.article, [site.article.part(name) for name in site.rolled]
     ratio = float(rng.choice([-1, 1]) * rng.uniform(0.12, 0.3)) * min(size, 2.0)
-    shear = float(np.exp(rng.uniform(-0.15, 0.15)))
+    shear = float(np.exp(rng.uniform(-0.15, 0.15) * min(size, 2.0)))
     parts = list(a.parts)
     for p in rolled:
         m = _sheet(a, p)
@@ -103,18 +107,11 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
         "G12": first.shear_modulus * shear,
         "parts": list(site.rolled),
     }
-    mine = np.isin(a.shells.part, rolled) & (np.abs(_facing(a) @ site.grain) < STEEP)
+    mine = np.isin(a.shells.part, rolled) & (
+        np.abs(cell_normals(a.points, a.shells.nodes) @ site.grain) < STEEP
+    )
     shells = replace(a.shells, axis=np.where(mine[:, None], site.grain, a.shells.axis))
     return Hidden(replace(a.with_parts(tuple(parts)), shells=shells), truth)
-
-
-def _facing(a: Assembly) -> np.ndarray:
-    """Unit normals of the shells."""
-    X = a.points[a.shells.nodes]
-    n = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1])
-    tri = a.shells.triangle
-    n[tri] = np.cross(X[tri, 1] - X[tri, 0], X[tri, 2] - X[tri, 0])
-    return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
 
 
 def _sheet(a: Assembly, p: int) -> Isotropic:

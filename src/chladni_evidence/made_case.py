@@ -11,7 +11,9 @@ import numpy as np
 from chladni.bench.article import Front, recorded
 from chladni.dynamics.frf import FRF
 from chladni.effects.ordinary import value
+from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
+from chladni.geometry.facets import cell_areas
 from chladni.io.nastran import write_assembly
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
@@ -22,7 +24,7 @@ from chladni.units import units
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
 from .footing import Spots, footing
-from .hidden import Hidden, Site, cell_areas
+from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
 from .outside_kinds import OUTSIDE
 from .part_scatter import scattered
@@ -32,6 +34,7 @@ KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE}
 UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # as large as they are
 TWICE = 2.0  # an effect moves the responses at least this many times as far as the scatter does
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
+NOTHING = 0.02  # an effect that moves less is none: a bad draw [rms decades]
 GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
 FRONT = Front(noise=0.01, floor=0.001)
 DAMPING_SPREAD = 0.3  # of ln ζ between modes
@@ -119,7 +122,7 @@ def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
     """E, rho and t of every sheet of the article [SI], and what each part of the deck weighs."""
     sheets = [p for p in article.parts if isinstance(p.section, ShellSection)]
     known = {q: {p.name: value(p, q) for p in sheets} for q in ("E", "rho", "t")}
-    area = cell_areas(deck) * deck.thickness()
+    area = cell_areas(deck.points, deck.shells.nodes) * deck.thickness()
     weight = {
         p.name: float(area[deck.shells.part == k].sum() * value(p, "rho"))
         for k, p in enumerate(deck.parts)
@@ -156,6 +159,8 @@ def _sized(
         if kind in UNSIZED or moved >= TWICE * min(scatter, FULL):
             break
         size *= GROWTH
+    if kind not in UNSIZED and moved < NOTHING:
+        raise ModelError(f"{kind} of size {size:.3g} moves {rig.bench.name} by {moved:.1e} decades")
     return hidden, moved, size
 
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.errors import ModelError
-from chladni.geometry.nearest import tangents
+from chladni.geometry.facets import cell_areas, point_normals, tangents, unit
 from chladni.model.assembly import Assembly
 from chladni.model.properties import BeamSection, Part, ShellSection, SolidSection
 
-from .footing import normals
-from .hidden import Hidden, Site, around, cell_areas
+from .hidden import Hidden, Site, around
 from .hidden_kinds import Kind
 from .part_scatter import stiffer
 from .response_of_article import Coupling
 
+CRACKED = 4  # shells of a crack, at least
 PATCH = 0.06  # radius of rotors' feet and foam, of the structure's size
 
 
@@ -25,7 +25,7 @@ def _patch(site: Site, rng: np.random.Generator) -> tuple[int, np.ndarray]:
         rows = around(site, row, PATCH * site.size)[:40]
         X = site.article.points[rows] - site.article.points[row]
         extent = np.linalg.svd(X, compute_uv=False)
-        if len(rows) >= 8 and extent[1] > 0.3 * extent[0]:
+        if extent[1] > 0.3 * extent[0]:
             return row, rows
     raise ModelError("no sheet of the article has room for a patch")
 
@@ -50,7 +50,7 @@ def rotor(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """Foam between a patch and ground: k (1 + Δ iωτ/(1 + iωτ)), Zener's solid, per point."""
     row, rows = _patch(site, rng)
-    n = normals(site.article)[rows]
+    n = point_normals(site.article.points, site.article.shells.nodes)[rows]
     k = 0.03 * site.scale * size
     relaxed, tau = float(rng.uniform(4.0, 8.0)), 1 / (2 * np.pi * np.sqrt(site.first * site.top))
 
@@ -86,28 +86,38 @@ def resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
-    a, row = site.article, site.row(rng)
-    p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
-    n = site.normal(row)
-    longest = _longest(a.points[site.rows(a.parts[p].name)])
-    across = np.cross(n, longest - (longest @ n) * n)
-    across /= np.linalg.norm(across)
-    angle = rng.uniform(-np.pi / 6, np.pi / 6)
-    along = np.cos(angle) * across + np.sin(angle) * np.cross(n, across)
+    a = site.article
     length = float(rng.uniform(0.12, 0.2)) * site.size * min(size, 3.0)
-    X = a.points[a.shells.nodes].mean(axis=1) - a.points[row]
-    t, q = X @ along, X @ np.cross(n, along)
-    h = float(np.sqrt(np.median(cell_areas(a))))
-    mine = (a.shells.part == p) & (np.abs(t) <= length / 2) & (np.abs(q) <= 0.55 * h)
-    mine &= np.abs(X @ n) < length / 4
+    for _ in range(50):
+        row, angle = site.row(rng), rng.uniform(-np.pi / 6, np.pi / 6)
+        p, mine = _along(site, row, angle, length)
+        if mine.sum() >= CRACKED:
+            break
     kept = 0.25 / size**2
     section = a.parts[p].section
     assert isinstance(section, ShellSection)
     new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
     shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
-    truth = {"value": kept, "point_m": a.points[row].tolist(), "length_m": length}
-    truth["shells"] = int(mine.sum())
+    truth = {
+        "value": kept,
+        "point_m": a.points[row].tolist(),
+        "length_m": length,
+        "shells": int(mine.sum()),
+    }
     return Hidden(replace(a, parts=(*a.parts, new), shells=shells), truth)
+
+
+def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.ndarray]:
+    """The part at a point, and its shells (m,) bool on a line through it across its length."""
+    a, n = site.article, site.normal(row)
+    p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
+    e = _longest(a.points[site.rows(a.parts[p].name)])
+    across = unit(np.cross(n, e))
+    along = np.cos(angle) * across + np.sin(angle) * np.cross(n, across)
+    X = a.points[a.shells.nodes].mean(axis=1) - a.points[row]
+    h = float(np.sqrt(np.median(cell_areas(a.points, a.shells.nodes))))
+    mine = (a.shells.part == p) & (np.abs(X @ np.cross(n, along)) <= 0.55 * h)
+    return p, mine & (np.abs(X @ along) <= length / 2) & (np.abs(X @ n) < length / 4)
 
 
 def _longest(points: np.ndarray) -> np.ndarray:

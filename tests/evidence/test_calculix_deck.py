@@ -14,8 +14,8 @@ from chladni_evidence import calculix
 from chladni_evidence.calculix import calculix_modes, installed
 from chladni_evidence.calculix_deck import deck
 from chladni_evidence.hidden import with_ground_springs, with_lumps
-from chladni_specimens.plates import plate
 from chladni_specimens.forms.tube_frame import pipe, tube_frame
+from chladni_specimens.plates import plate
 
 needs_ccx = pytest.mark.skipif(not installed(), reason="CalculiX (ccx) is not installed")
 A, T = 0.3, 1e-3

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from chladni.geometry.nearest import Surface
+from chladni.geometry.nearest import ShellSurface
 from chladni.model.assembly import Assembly
 from chladni.model.properties import Isotropic
 
@@ -123,7 +123,7 @@ def bonded_plates(d: Numbers, h: float) -> Assembly:
     x = stops([L1 - lap + edge, L1 - edge], 1.2 * h)
     y = stops([side + edge, side + W2 - edge], 1.2 * h)
     corners = _layer(x, y, t1 / 2, t1 / 2 + glue)
-    sheets = (Surface.of(a, "lower"), Surface.of(a, "upper"))
+    sheets = (ShellSurface.of(a, "lower"), ShellSurface.of(a, "upper"))
     return hexahedra(
         a, corners, sheets, material=EPOXY, name="adhesive", kind="adhesive", reach=0.01
     )[0]
