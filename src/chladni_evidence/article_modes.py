@@ -19,6 +19,7 @@ from .calculix import calculix_modes
 Solver = Literal["chladni", "calculix"]
 ABOVE = 1.6  # our modes reach up to this many times the highest recorded frequency
 BY_CALCULIX = 70  # modes CalculiX is asked for
+RIGID = 0.02  # below it a frequency of CalculiX is rounding [Hz]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,19 +63,39 @@ def article_modes(
     residual_bending : of our shells; False is another formulation
     """
     rows = np.unique(np.concatenate([rows.ravel(), loaded.ravel()]))
-    if solver == "calculix":
-        f, shapes = calculix_modes(assembly, BY_CALCULIX, rows, cache)
-        f = np.where(f < 0.02, 0.0, f)  # rigid modes, their rounding
-        return ArticleModes(f, rows, shapes, np.zeros((len(f), len(f))))
-    mark = fingerprint((assembly, rows, loaded, top, residual_bending))
-    kept = None if cache is None else cache / f"{mark}.npz"
+    ours = _kept((assembly, rows, loaded, top, residual_bending), cache)
+    if solver == "chladni":
+        return ours
+    return _completed(*calculix_modes(assembly, BY_CALCULIX, rows, cache), ours, top)
+
+
+def _kept(
+    asked: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
+) -> ArticleModes:
+    """Modes by our elements, from the cache where they are."""
+    kept = None if cache is None else cache / f"{fingerprint(asked)}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
             return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
-    found = _ours(structure(assembly, residual_bending=residual_bending), rows, loaded, top)
+    assembly, rows, loaded, top, bending = asked
+    found = _ours(structure(assembly, residual_bending=bending), rows, loaded, top)
     if kept is not None:
         write_npz(kept, **{f.name: getattr(found, f.name) for f in fields(ArticleModes)})
     return found
+
+
+def _completed(
+    frequency: np.ndarray, shapes: np.ndarray, ours: ArticleModes, top: float
+) -> ArticleModes:
+    """CalculiX' modes, and in place of those it was not asked for our own above them.
+
+    Without them the flexibility of the higher modes at the shaker would be missing.
+    """
+    n = min(len(frequency), int((ours.frequency <= ABOVE * top).sum()))
+    f = np.where(frequency < RIGID, 0.0, frequency)[:n]
+    f = np.concatenate([f, ours.frequency[n:]])
+    both = np.concatenate([shapes[..., :n], ours.shapes[..., n:]], axis=-1)
+    return ArticleModes(f, ours.rows, both, np.zeros((len(f), len(f))))
 
 
 def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, top: float) -> ArticleModes:

@@ -180,3 +180,15 @@ def test_scatter_is_as_wide_as_it_says():
     assert np.std(E) == pytest.approx(0.01, rel=4 / np.sqrt(2 * 800))
     assert np.std(welds) == pytest.approx(0.3, rel=4 / np.sqrt(2 * 200))
     assert [p.name for p in drawn.parts[:3]] == [p.name for p in a.parts]
+
+
+def test_modes_another_code_was_not_asked_for_are_ours(monkeypatch):
+    """Were CalculiX' modes ours, so would be the drive point: no flexibility is lost above them."""
+    a = FORMS["tube frame"].made(0)
+    rows = a.rows([5, 40])
+    ours = article_modes(a, rows, rows[:1], 130.0)
+    first = ours.frequency[:8], ours.shapes[..., :8]
+    monkeypatch.setattr("chladni_evidence.article_modes.calculix_modes", lambda *_: first)
+    both = article_modes(a, rows, rows[:1], 130.0, "calculix")
+    np.testing.assert_allclose(both.frequency[6:], ours.frequency[6:])
+    np.testing.assert_array_equal(both.shapes, ours.shapes)
