@@ -1,8 +1,13 @@
-"""Where the real recordings lie, beside the checkout."""
+"""What all tests share: the recordings beside the checkout, counted work in place of seconds."""
 
+import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("unhurried", deadline=None)  # a busy machine is no counterexample
+settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session")
@@ -11,3 +16,24 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip("the folder of real recordings is not beside the checkout")
     return folder
+
+
+@pytest.fixture
+def work():
+    """Calls of Python functions that an action takes: its speed, on any machine however busy."""
+
+    def counted(action):
+        calls = [0]
+
+        def see(frame, event, argument):
+            calls[0] += event == "call"
+
+        before = sys.getprofile()
+        sys.setprofile(see)
+        try:
+            action()
+        finally:
+            sys.setprofile(before)
+        return calls[0]
+
+    return counted

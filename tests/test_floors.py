@@ -36,21 +36,22 @@ MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "i
 BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
 MAY_IMPORT["planning"] = BELOW | {"view"}
-MAY_IMPORT["report"] = BELOW | {"view", "planning"}
-MAY_IMPORT["workflows"] = BELOW | {"planning", "report", "view"}
+MAY_IMPORT["workflows"] = BELOW | {"planning", "view"}
+MAY_IMPORT["report"] = MAY_IMPORT["workflows"] | {"workflows"}
 MAY_IMPORT["chladni_specimens"] = GROUND | {"model", "geometry"}
-MAY_IMPORT["cli"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens", "chladni_evidence"}
-MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
+MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report", "chladni_specimens", "chladni_evidence"}
+MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["report"] | {"report", "chladni_specimens"}
 MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_specimens"}
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pyyeti", "pyuff"},
+    "io": {"meshio", "pyyeti", "pyuff", "trimesh"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
-    "cli": {"typer", "rich", "threadpoolctl"},
+    "workflows": {"threadpoolctl"},
+    "cli": {"typer", "rich"},
     "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
@@ -61,7 +62,6 @@ WAITING_FOR = {  # module no command, environment or public name reaches: what w
     "chladni/ema/screening": "screening of a recording before anything is fitted",
     "chladni/ema/shapes": "shapes of identified modes, their covariance and complexity",
     "chladni/ema/realisation": "an identified model as a state space",
-    "chladni/geometry/thickness_alignment": "thickness mapping",
     "chladni/geometry/thickness_prior": "thickness mapping",
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
@@ -122,6 +122,22 @@ def test_imports_point_down(path):
     assert outside <= EVERYWHERE | LIBRARIES.get(floor, set())
 
 
+def test_no_command_imports_another():
+    """What commands share is in run.py, or further down; the list of commands imports them all."""
+    commands = {("chladni", "cli", name) for name in COMMANDS}
+    assert commands <= MODULES
+    for path in (p for p in SOURCES if module(p) in commands):
+        assert not imports(path)[0] & commands, path
+
+
+def test_workflows_touch_no_terminal_and_no_page():
+    """A notebook, an environment and a command call the same function."""
+    for path in (p for p in SOURCES if floor_of(module(p)) in ("workflows", "chladni_envs")):
+        own, outside = imports(path)
+        assert not {floor_of(m) for m in own} & {"cli", "report", "output"}, path
+        assert not outside & {"typer", "rich", "jinja2"}, path
+
+
 def test_no_cycles():
     """A package re-exports its modules, so only imports of modules proper can make a cycle."""
     packages = {module(p) for p in SOURCES if p.name == "__init__.py"}
@@ -161,10 +177,15 @@ def test_nothing_is_out_of_reach():
 
 
 def test_names_stand_once():
-    """A class or a file can be spoken of by its name; a command's file is called as the command."""
+    """A class or a file can be spoken of by its name.
+
+    A command's file is called as the command, and so is that of its workflow.
+    """
     classes, files = defaultdict(list), defaultdict(list)
     for path in SOURCES:
-        if path.stem not in ("__init__", "__main__") and module(path)[:2] != ("chladni", "cli"):
+        called = floor_of(module(path)) == "workflows" and path.stem in COMMANDS
+        named = path.stem in ("__init__", "__main__") or module(path)[:2] == ("chladni", "cli")
+        if not (called or named):
             files[path.stem].append(path)
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef):

@@ -26,8 +26,9 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         Position of the next actuator; ``action_masks()`` and ``info["action_mask"]`` say which are
         legal: not chosen yet, accessible, without rattle. An illegal action changes nothing.
     Reward
-        Change of -log10 κ, κ the condition number of the Hankel values (thesis table 2) cut at
-        1e6; at the first step -log10 κ itself. The rewards add up to ``info["score"]`` = -log10 κ.
+        Change of -log10 κ, κ the condition number of the Hankel values (Echaniz Granado 2015, table
+        2) cut at 1e6; at the first step -log10 κ itself. The rewards add up to ``info["score"]``
+        = -log10 κ.
     End
         Terminated with ``n_actuators`` chosen, truncated after four times as many steps.
 

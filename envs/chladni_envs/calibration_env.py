@@ -23,8 +23,9 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         (p,) in [-1, 1]: step of each parameter in units of 0.2 of half its range; the parameters
         stay within their bounds.
     Reward
-        log10 Q_before/Q_after, Q = mean |log10(H_model / H_recorded)|² with wrapped phase (thesis
-        eq. 4), floored at 1e-12. The rewards add up to ``info["score"]``: decades of Q gained.
+        log10 Q_before/Q_after, Q = mean |log10(H_model / H_recorded)|² with wrapped phase
+        (Echaniz Granado 2015, eq. 4), floored at 1e-12. The rewards add up to
+        ``info["score"]``: decades of Q gained.
     End
         Terminated when Q < 1e-5, truncated after ``max_steps``.
 

@@ -48,6 +48,6 @@ def plate_question(modes: int = 8, lines: int = 96) -> CalibrationQuestion:
         lam, X = np.linalg.eigh(L @ K @ L.T)
         psi = L.T @ X
         h = 1j * omega[:, None] / (lam * (1 + 0.02j) - omega[:, None] ** 2)
-        return np.asarray((h * (drive @ psi)) @ (out @ psi).T)
+        return (h * (drive @ psi)) @ (out @ psi).T
 
     return CalibrationQuestion(("E", "rho", "mass", "spring"), frequency, predict)

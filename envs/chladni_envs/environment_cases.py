@@ -11,11 +11,9 @@ from chladni.planning import Linearised, Wishes, find_sensor_candidates
 from chladni.planning.rattle import openings
 from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
-from chladni.updating.preparation import prepare
-from chladni.updating.question import Prepared
 from chladni.updating.reduced_model import State, evaluate
 from chladni.workflows.loaded_model import load_model
-from chladni.workflows.question_of_case import question
+from chladni.workflows.question_of_case import prepared
 
 from .calibration_questions import CalibrationQuestion
 from .small_specimens import ModalSpecimen
@@ -68,7 +66,7 @@ class Recorded:
     """
 
     def __init__(self, case: str) -> None:
-        self.prepared = _prepared(case)
+        self.prepared = prepared(load_case(case))
         search = self.prepared.search
         score = self.prepared.score
         if not isinstance(score, Responses):
@@ -100,7 +98,7 @@ class Recorded:
         outputs = np.flatnonzero(self.score.use.any(axis=0))
 
         def fitted(values: np.ndarray) -> np.ndarray:
-            return np.asarray(values[np.ix_(lines, outputs)].reshape(len(lines), -1))
+            return values[np.ix_(lines, outputs)].reshape(len(lines), -1)
 
         def predict(x: np.ndarray) -> np.ndarray:
             return fitted(self.score.model(self.state(REACH * np.asarray(x, float))))
@@ -111,11 +109,3 @@ class Recorded:
 
 def _name(effect: Effect, parameter: Parameter) -> str:
     return f"{parameter.name}, {effect.text}" if effect.text else parameter.name
-
-
-def _prepared(path: str) -> Prepared:
-    """The case's first FRF, made ready for updating."""
-    case = load_case(path)
-    if not case.frfs:
-        raise FileError(f"{case.path}: no recording holds an FRF")
-    return prepare(question(case))

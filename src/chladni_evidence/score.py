@@ -6,23 +6,28 @@ from typing import Any
 
 import numpy as np
 
+from chladni.updating.result import Agreement, NamedEffect, Scores
+from chladni.workflows.diagnosis_result import DiagnosisResult
+
 NULLS = ("nothing", "calibration")
 Row = dict[str, Any]
 
 
-def scored(answer: Row, truth: Row) -> Row:
-    """One case: what it was called, distance of the place [mm], held-out Q after over before."""
-    effects = answer["effects"]
-    called = effects[0]["name"] if effects else answer["verdict"]
+def scored(found: DiagnosisResult, truth: Row) -> Row:
+    """One case: what it was called, distance of the place [mm], held-out Q after over before.
+
+    The ratio is that of the decks as written; ``fine`` that on an infinitely fine mesh, by which
+    an effect is judged.
+    """
+    effect = found.effects[0] if found.effects else None
+    called = found.verdict if effect is None else effect.name
     place = None
-    if effects and "point_m" in truth and effects[0]["where"]["point_m"]:
-        apart = np.subtract(effects[0]["where"]["point_m"], truth["point_m"])
-        place = 1e3 * float(np.linalg.norm(apart))
-    held = answer["held_out"]
-    ratio = held["Q_with_effect"] / held["Q_calibrated"] if effects and held else None
-    channel = (
-        not effects or "channel" not in truth or truth["channel"] in effects[0]["where"]["channels"]
-    )
+    if effect is not None and "point_m" in truth and effect.where.point_m:
+        place = 1e3 * float(np.linalg.norm(np.subtract(effect.where.point_m, truth["point_m"])))
+    agreement = found.agreement or Agreement()
+    held = agreement.held_out if effect is not None else Scores()
+    channel = effect is None or truth.get("channel") in (None, *effect.where.channels)
+    covered = (0, 0) if effect is None or called != truth["effect"] else _covered(effect, truth)
     return {
         "specimen": truth["specimen"],
         "seed": truth["seed"],
@@ -30,19 +35,24 @@ def scored(answer: Row, truth: Row) -> Row:
         "called": called,
         "right": _right(called, truth["effect"]) and channel,
         "place_mm": place,
-        "ratio": ratio,
-        "gain": max(answer.get("gain", {"": 0.0}).values()),
-        "covered": _covered(effects[0], truth) if called == truth["effect"] else (0, 0),
+        "ratio": _over(held.with_effect, held.calibrated),
+        "fine": _over(held.with_mesh_error, held.calibrated_with_mesh_error),
+        "gain": agreement.largest_gain or 0.0,
+        "covered": covered,
     }
 
 
-def _covered(effect: Row, truth: Row) -> tuple[int, int]:
+def _over(after: float | None, before: float | None) -> float | None:
+    return after / before if after is not None and before else None
+
+
+def _covered(effect: NamedEffect, truth: Row) -> tuple[int, int]:
     """How many intervals hold the truth, of how many whose truth is known."""
     known = truth.get("parameters", {})
     held = [
-        p["low"] <= value <= p["high"]
-        for p in effect.get("parameters", [])
-        if (value := known.get(p["name"])) is not None
+        p.low <= value <= p.high
+        for p in effect.parameters
+        if p.low is not None and p.high is not None and (value := known.get(p.name)) is not None
     ]
     return sum(held), len(held)
 
@@ -86,6 +96,10 @@ def summary(rows: Sequence[Row]) -> str:
             half = sum(q <= 0.5 for q in ratios)
             text += f"; held-out Q halved {half} of {len(ratios)}"
             text += f", median x {np.median(ratios):.2f}"
+        fine = [r["fine"] for r in mine if r["right"] and r.get("fine") is not None]
+        if fine:
+            half = sum(q <= 0.5 for q in fine)
+            text += f"; on a fine mesh halved {half} of {len(fine)}, median x {np.median(fine):.2f}"
         inside, known = (sum(r.get("covered", (0, 0))[k] for r in mine) for k in (0, 1))
         if known:
             text += f"; intervals hold the truth {inside} of {known}"

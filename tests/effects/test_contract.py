@@ -22,6 +22,7 @@ from chladni.effects.surroundings import Setup, Surroundings
 from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
+from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
 from chladni.updating.reduced_model import Reduced, evaluate
@@ -61,8 +62,8 @@ def cases(bench):
     k = bench.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
     ortho = material_axes(where)[0]
-    over = mesh.mesh_error(bench.structure, TOP)
-    own = mesh.jitter(bench.structure, TOP, over)
+    over = mesh.mesh_error(solved(bench.structure, 2 * TOP), TOP)
+    own = mesh.jitter(solved(bench.structure, 2 * TOP), TOP, over)
     waves = scatter(groups, "t", 0.03)
     n = len(waves.parameters)
     means = np.array([p.mean for p in ortho.parameters])

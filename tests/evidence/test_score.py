@@ -2,17 +2,22 @@
 
 import pytest
 
+from chladni.report.diagnosis_json import from_json
 from chladni_evidence.score import confusion, scored, summary
 
 
 def answer(name=None, verdict="missing physics", point=None, channels=(), held=(0.4, 0.1)):
     where = {"point_m": point, "channels": list(channels)}
+    q = {"Q_calibrated": held[0], "Q_with_effect": held[1]}
     return {
         "verdict": verdict,
         "effects": [] if name is None else [{"name": name, "where": where}],
-        "held_out": {"Q_calibrated": held[0], "Q_with_effect": held[1]},
-        "gain": {"point-mass": 7.0, "suspension": 55.0},
+        "fit": {"held_out": q, "largest_gain": 55.0},
     }
+
+
+def score(answer, truth):
+    return scored(from_json(answer), truth)
 
 
 def truth(effect, **more):
@@ -20,7 +25,7 @@ def truth(effect, **more):
 
 
 def test_place_is_a_distance_in_millimetres():
-    row = scored(
+    row = score(
         answer("point-mass", point=[0.13, 0.24, 0.0]), truth("point-mass", point_m=[0.1, 0.2, 0.0])
     )
     assert row["right"]
@@ -32,7 +37,7 @@ def test_place_is_a_distance_in_millimetres():
 @pytest.mark.parametrize("effect", ["nothing", "calibration"])
 @pytest.mark.parametrize("verdict", ["nothing missing", "calibration only"])
 def test_null_is_right_where_no_effect_is_named(effect, verdict):
-    row = scored(answer(verdict=verdict), truth(effect))
+    row = score(answer(verdict=verdict), truth(effect))
     assert row["right"]
     assert row["called"] == verdict
     assert row["place_mm"] is None
@@ -50,12 +55,12 @@ def test_null_is_right_where_no_effect_is_named(effect, verdict):
     ],
 )
 def test_wrong_is_wrong(given, due):
-    assert not scored(given, due)["right"]
+    assert not score(given, due)["right"]
 
 
 @pytest.mark.parametrize(("channel", "right"), [("7:+Z", True), ("8:+Z", False)])
 def test_a_faulty_sensor_is_right_on_its_own_channel_only(channel, right):
-    row = scored(answer("sensor-fault", channels=[channel]), truth("sensor-fault", channel="7:+Z"))
+    row = score(answer("sensor-fault", channels=[channel]), truth("sensor-fault", channel="7:+Z"))
     assert row["right"] is right
 
 
@@ -63,15 +68,15 @@ def test_intervals_are_held_against_the_truth_that_is_known():
     """Thinning inside, radius outside; a parameter without a truth does not count."""
     named = answer("thickness-distribution", point=[0.0, 0.0, 0.0])
     named["effects"][0]["parameters"] = [
-        {"name": "thinning", "low": 0.1, "high": 0.3},
+        {"name": "thinning", "value": 0.2, "low": 0.1, "high": 0.3},
         {"name": "R", "low": 0.1, "high": 0.2},
         {"name": "other", "low": 0.0, "high": 1.0},
     ]
     sealed = truth("thickness-distribution", parameters={"thinning": 0.2, "R": 0.09})
-    row = scored(named, sealed)
+    row = score(named, sealed)
     assert row["covered"] == (1, 2)
     assert summary([row]).endswith("; intervals hold the truth 1 of 2")
-    assert scored(named, {**sealed, "effect": "point-mass"})["covered"] == (0, 0)
+    assert score(named, {**sealed, "effect": "point-mass"})["covered"] == (0, 0)
 
 
 def test_confusion_counts_every_case_once():

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from chladni.cli.app import application
 from chladni.io.nastran import write_assembly
 from chladni.model.properties import Isotropic
+from chladni.report.diagnosis_json import read_diagnosis
 from chladni.units import units
 from chladni_specimens.plates import plate
 
@@ -54,7 +55,7 @@ fit = [20.0, 400.0]
     "name",
     ["5L", pytest.param("5R", marks=pytest.mark.slow), pytest.param("2L", marks=pytest.mark.slow)],
 )
-def test_the_grain_of_a_spruce_plate(name, tmp_path):
+def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
     out = tmp_path / "answer"
     source = case(name, tmp_path)
     done = CliRunner().invoke(application(), ["diagnose", str(source), "--out", str(out)])
@@ -82,6 +83,14 @@ def test_the_grain_of_a_spruce_plate(name, tmp_path):
             assert min(abs(row["after_hz"] / x - 1) for x in f if x > 1) < 1e-4
 
     truth = json.loads((RECORDINGS / f"truth_{name}.json").read_text())
+    moduli = {modulus: truth[f"{modulus}_Pa"] for modulus in WITHIN}
+    sealed = {
+        "effect": "orthotropic-material",
+        "specimen": f"spruce {name}",
+        "seed": 0,
+        "parameters": moduli,
+    }
+    evidence(read_diagnosis(out), sealed)
     found = {p["name"]: p["value"] for p in d["effects"][0]["parameters"]}
     for modulus, most in WITHIN.items():
         assert abs(found[modulus] / truth[f"{modulus}_Pa"] - 1) < most, modulus

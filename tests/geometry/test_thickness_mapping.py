@@ -234,7 +234,7 @@ def tailgate_mapped():
 
 @pytest.mark.slow
 def test_tailgate_loses_what_the_thesis_says(tailgate_mapped):
-    """Mass -5 to -7 % (thesis -5.92), every part covered; Table 11's order of thinning."""
+    """Mass -5 to -7 % (published: -5.92), every part covered; Table 11's order of thinning."""
     change = tailgate_mapped.mass_after / tailgate_mapped.mass_before - 1
     assert -0.07 < change < -0.05
     parts = {p.part: p for p in tailgate_mapped.parts}

@@ -93,7 +93,7 @@ def test_balanced_realisation(quantity):
 
 
 def test_hankel_values_do_not_depend_on_coordinates():
-    """Gramians do (thesis 2.4.2.2), Hankel values do not."""
+    """Gramians do (Echaniz Granado 2015, section 2.4.2.2), Hankel values do not."""
     f, zeta, phi_out, phi_in = specimen(seed=5)
     ss = system(f, zeta, phi_out, phi_in)
     T = np.random.default_rng(1).normal(size=ss.A.shape) + 3 * np.eye(len(ss.A))
@@ -131,7 +131,7 @@ def test_twin_poles_need_two_sensors():
     assert modal_rank(f, phi) == 6
 
 
-def test_quotient_in_the_thesis_coordinates():
+def test_quotient_in_coordinates_of_displacement_and_velocity():
     """With states (η, η') the velocity entries are smaller by ω²."""
     f, zeta, phi_out, _ = specimen()
     W = observability_gramian(f, zeta, phi_out)
@@ -140,7 +140,7 @@ def test_quotient_in_the_thesis_coordinates():
 
 
 def test_actuator_condition_is_that_of_its_system():
-    """Each candidate's figure (thesis table 2) by scipy's gramians, one system at a time."""
+    """Each candidate's figure by scipy's gramians, one system at a time (Echaniz Granado 2015)."""
     f, zeta, phi_out, phi_in = specimen(n_in=6, seed=8)
     ours = shaking(f, zeta, phi_out, phi_in).conditions()
     for k in range(6):

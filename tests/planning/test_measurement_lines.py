@@ -53,7 +53,7 @@ def test_lines_for_poles_spend_fewer_for_the_same():
     assert np.all(np.diff(np.diff(lines)) <= 0.31 * np.diff(lines)[:-1])
 
 
-def test_table_3_of_the_thesis():
+def test_table_3():
     """915 lines, 1.8 h for five sweeps against 400 s of burst random, sixteen times as long."""
     assert len(stage_lines(TABLE_3)) == 915
     duration = stepped_sine_time(TABLE_3, sweeps=5)
@@ -69,7 +69,7 @@ def test_a_stage_by_hand():
 
 
 def test_delay_leaves_the_residual_asked_for():
-    """And the thesis' own delays do not leave 1 % (11.7 % after 30 cycles of mode 1)."""
+    """And the delays of table 3 do not leave 1 % (11.7 % after 30 cycles of mode 1)."""
     cycles = delay_cycles(np.array([0.0115, 0.0037]), 0.01)
     assert np.all(transient_left(np.array([0.0115, 0.0037]), cycles) <= 0.01)
     assert np.all(transient_left(np.array([0.0115, 0.0037]), cycles - 1) > 0.01)
@@ -119,7 +119,7 @@ def in_plane_case():
 
 
 def test_an_in_plane_mode_gets_its_sensor():
-    """The least ranked sensor moves (thesis 4.2.4.6), and no other mode is lost for it."""
+    """The least ranked sensor moves (section 4.2.4.6), and no other mode is lost for it."""
     phi, largest = in_plane_case()
     ranked = np.arange(12)
     assert visibility(phi[ranked], largest)[4] < 0.01

@@ -1,12 +1,14 @@
 """The page: everything inside, everything escaped, every verdict a sentence."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
 
 from chladni.errors import FileError
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
+from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.page import write_page, write_sections
 from chladni.report.verdict import HEADING, sentence
 from chladni.view import plots
@@ -46,6 +48,17 @@ DIAGNOSIS = {
             "what": EVIL,
         },
     },
+    "calibrated": [
+        {
+            "where": f"E of {EVIL}",
+            "name": "E",
+            "value": 2.0e11,
+            "unit": "Pa",
+            "low": 1.9e11,
+            "high": 2.1e11,
+            "deck_value": 2.1e11,
+        }
+    ],
     "mass": {"weighed_kg": 10.508, "model_kg": 10.51},
     "frequencies": [
         {
@@ -58,6 +71,7 @@ DIAGNOSIS = {
     ],
     "files": {"deck": f"{EVIL}.bdf", "report": "report.html"},
 }
+RESULT = from_json(DIAGNOSIS)
 
 
 class Tags(HTMLParser):
@@ -85,7 +99,7 @@ def read(path):
 def test_text_of_decks_and_recordings_is_escaped(tmp_path):
     """Whatever field a deck or a recording can fill: no tag comes out of it."""
     more = [Section(EVIL, [Text([EVIL]), Table((EVIL,), [(EVIL,)]), Facts([(EVIL, EVIL)])])]
-    page = write_page(tmp_path, DIAGNOSIS, {}, [EVIL], more, command=EVIL, title=EVIL)
+    page = write_page(tmp_path, RESULT, {}, [EVIL], more, command=EVIL, title=EVIL)
     text, tags = read(page)
     assert "script" not in tags.seen
     assert text.count("&lt;script&gt;") >= 14
@@ -94,7 +108,7 @@ def test_text_of_decks_and_recordings_is_escaped(tmp_path):
 
 def test_page_is_self_contained(tmp_path):
     figure = plots.waterfall(tmp_path / "w.png", {"a": 1.0, "b": 0.5})
-    page = write_page(tmp_path, DIAGNOSIS, {"waterfall": figure, "where": figure, "mine": figure})
+    page = write_page(tmp_path, RESULT, {"waterfall": figure, "where": figure, "mine": figure})
     text, tags = read(page)
     assert tags.seen.count("img") == 3
     assert all(src.startswith("data:image/png;base64,") for src in tags.loaded)
@@ -103,15 +117,18 @@ def test_page_is_self_contained(tmp_path):
 
 
 def test_numbers_an_engineer_asks_for_are_there(tmp_path):
-    text, _ = read(write_page(tmp_path, DIAGNOSIS))
-    for due in ("0.2411", "0.0151", "-94 %", "3.1 GN/m² (2.2 to 4.4)", "-310", "10.51", "24.9"):
+    text, _ = read(write_page(tmp_path, RESULT))
+    for due in (
+        *("0.2411", "0.0151", "-94 %", "3.1 GN/m² (2.2 to 4.4)", "-310", "10.51", "24.9"),
+        *("210 GPa", "200 GPa (190 to 210)", "-4.8 %"),
+    ):
         assert due in text, due
 
 
 @pytest.mark.parametrize("verdict", HEADING)
 def test_every_verdict_is_one_sentence(verdict):
     for d in ({"verdict": verdict}, {**DIAGNOSIS, "verdict": verdict}):
-        said = sentence(d)
+        said = sentence(from_json(d))
         assert said[0].isupper()
         assert said.endswith(".")
         assert "None" not in said
@@ -120,20 +137,21 @@ def test_every_verdict_is_one_sentence(verdict):
 def test_a_calibration_alone_claims_no_more():
     """No alternative was tried: nothing is said of what is missing."""
     d = {"verdict": "calibration only", "effects": [], "alternatives": [], "fit": None}
-    assert "not looked for" in sentence(d)
-    assert "no physics is missing" in sentence({**d, "alternatives": [{"name": "point-mass"}]})
+    assert "not looked for" in sentence(from_json(d))
+    tried = {**d, "alternatives": [{"name": "point-mass"}]}
+    assert "no physics is missing" in sentence(from_json(tried))
 
 
 @pytest.mark.parametrize("d", [{}, {"verdict": "nothing missing", "effects": [], "fit": None}])
 def test_what_is_missing_is_left_out(tmp_path, d):
-    text, tags = read(write_page(tmp_path, d))
+    text, tags = read(write_page(tmp_path, from_json(d)))
     assert tags.seen.count("section") == 0
     assert "None" not in text
 
 
 def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):
     with pytest.raises(FileError, match=r"nix\.png"):
-        write_page(tmp_path, DIAGNOSIS, {"where": tmp_path / "nix.png"})
+        write_page(tmp_path, RESULT, {"where": tmp_path / "nix.png"})
     with pytest.raises(FileError, match="no picture"):
         write_sections(tmp_path / "p.html", "x", [Section("a", [Picture(tmp_path / "a.exe")])])
     assert not list(tmp_path.iterdir())
@@ -144,3 +162,22 @@ def test_sections_without_content_are_left_out(tmp_path):
     text, _ = read(write_sections(tmp_path / "p.html", "t", body))
     assert "full" in text
     assert "empty" not in text
+
+
+def test_a_page_can_be_written_again_from_its_json():
+    """What is written is read back whole; every key that was given is in it."""
+    written = diagnosis_json(RESULT)
+    assert diagnosis_json(from_json(written)) == written
+    for key, value in DIAGNOSIS.items():
+        assert set(value) <= set(written[key]) if isinstance(value, dict) else written[key]
+
+
+def test_values_that_the_deck_keeps_are_not_called_calibrated(tmp_path):
+    """Nothing missing: the updated deck is the deck, whatever the fit tried."""
+    text, _ = read(write_page(tmp_path, replace(RESULT, verdict="nothing missing")))
+    assert "What was calibrated" not in text
+
+
+def test_reasons_not_to_trust_stand_first(tmp_path):
+    text, _ = read(write_page(tmp_path, replace(RESULT, distrust=("the basis is too small",))))
+    assert text.index("the basis is too small") < text.index("At a glance")

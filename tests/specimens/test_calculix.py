@@ -18,8 +18,12 @@ pytestmark = [
 ]
 H, GAP = 0.005, 0.0015
 KNOWN = {  # measured, where the first ten modes of the tailgate are more than 3 % apart
-    0.03: {2: 0.035, 4: 0.057, 5: 0.032, 8: 0.037},
-    0.02: {4: 0.034, 8: 0.033},
+    # Before membranes hung on warped corners by each corner's slope: 2: 3.4, 4: 5.6, 5: 3.1,
+    # 8: 3.6 % at 30 mm and 4: 3.3, 8: 3.1 % at 20 mm. Most came nearer; 9 and 10 moved away but
+    # stay within 3 %; 8 left it, because ours fell (131.8 -> 128.7, 128.6 -> 127.1 Hz) towards the
+    # 124.8 Hz of 8 mm while CalculiX's still stands high (136.6, 132.8, at 16 mm 131.1 Hz).
+    0.03: {8: 0.059},
+    0.02: {8: 0.043},
 }
 
 
@@ -61,7 +65,7 @@ def test_welds(patch):
     ids=["soft", "cured", "steel-like"],
 )
 def test_bead(material):
-    """The same of a glued one, from sealant to the thesis' steel-like adhesive."""
+    """The same of a glued one, from sealant to a steel-like adhesive."""
     assembly, _ = adhesive_bead(coupon(), LINE, ("a", "b"), width=0.012, material=material)
     compare(assembly)
 
@@ -80,7 +84,7 @@ def test_first_ten_modes_of_the_tailgate(size):
 
     CalculiX has quadratic shells on the same corners, ours are linear: on a coarse mesh ours are
     higher, least so for the finer one. Mode 8, a strut one shell wide, is lower here: CalculiX
-    joins the expanded shells of its folds by rigid knots. At 16 mm the other nine are within 1.2 %.
+    joins the expanded shells of its folds by rigid knots. At 16 mm the other nine are within 1.6 %.
     """
     assembly = tailgate(TailgateDesign(size=size, screws=False))
     theirs, mine = calculix(assembly, 16)[6:], ours(assembly, 16)[6:]

@@ -59,7 +59,7 @@ def test_parts_are_table_1(coarse):
 
 @pytest.mark.parametrize("size", [0.030, 0.020])
 def test_mass_at_any_size(size):
-    """10.5 to 11.1 kg (thesis 10.82 to 10.87), pieces joined, no fold, normals alike."""
+    """10.5 to 11.1 kg (published: 10.82 to 10.87), pieces joined, no fold, normals alike."""
     made = tailgate_specimen(TailgateDesign(size=size))
     mass, centre = mass_properties(made.assembly)
     assert 10.5 < mass < 11.1
@@ -73,7 +73,7 @@ def test_mass_at_any_size(size):
 
 @pytest.mark.slow
 def test_forming_takes_mass_away():
-    """5 to 7 % (thesis 5.92)."""
+    """5 to 7 % (published: 5.92)."""
     after = mass_properties(tailgate(replace(COARSE, formed=True)))[0]
     before = mass_properties(tailgate(COARSE))[0]
     assert 0.05 < 1 - after / before < 0.07

@@ -1,4 +1,4 @@
-"""The tailgate's modes beside the thesis' nominal model (Table 14) and from mesh to mesh."""
+"""The tailgate's modes beside those of Echaniz Granado (2015), table 14, and from mesh to mesh."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from chladni_specimens.tailgate.tailgate import tailgate, tailgate_specimen
 
 pytestmark = pytest.mark.slow
 
-THESIS = np.array(
+PUBLISHED = np.array(
     "24.9 50.4 78.4 84.7 94.6 114.2 115.1 131.4 147.1 153.2 159.5 179.9 183.3 191.7 194.2".split(),
     dtype=float,
 )
@@ -68,7 +68,7 @@ def test_modes_are_the_thesis_kind(solved):
     for size, s in solved.items():
         assert s.rigid == 6, size
         assert 23 < s.frequency[0] < 30
-        error = s.frequency[:15] / THESIS - 1
+        error = s.frequency[:15] / PUBLISHED - 1
         assert np.sqrt(np.mean(error**2)) < 0.04, (size, error)
         counts.add(int((s.frequency < 200).sum()))
     assert len(counts) == 1
@@ -106,7 +106,7 @@ def test_window_frame_sways(solved):
 
 @pytest.mark.parametrize("size", [0.016, 0.012])
 def test_steel_like_adhesive(solved, size):
-    """Mode 1 rises by 8-14 %, mode 2 by 7-12 % (thesis: 24.9 -> 27.9 Hz and more)."""
+    """Mode 1 rises by 8-14 %, mode 2 by 7-12 % (table 14: 24.9 -> 27.9 Hz and more)."""
     stiff = Solved(size=size, adhesive=STIFF.E, adhesive_nu=STIFF.nu)
     f, mac = paired(solved[size], stiff)
     shift = f / solved[size].frequency - 1
@@ -123,7 +123,7 @@ def test_formed_thickness_lowers_the_modes(solved):
 
 
 def string(E):
-    """A one-sided uniform string between the thesis' two: E, and nu from 0.4 to 0.49."""
+    """A one-sided uniform string between the two published: E, and nu from 0.4 to 0.49."""
     share = np.log(E / 6e6) / np.log(210e9 / 6e6)
     return {"adhesive": E, "adhesive_nu": 0.4 + 0.09 * share}
 
@@ -165,7 +165,7 @@ def test_patched_welds_depend_less_on_the_mesh(solved):
 
 
 def test_middle_string_has_no_say(solved):
-    """Thesis 5.3.2: stiff or soft in the middle, the modes stay (1.5 % at most here)."""
+    """Section 5.3.2: stiff or soft in the middle, the modes stay (1.5 % at most here)."""
     base = solved[0.016]
     parts = list(base.made.assembly.parts)
     at = base.made.assembly.part("middle adhesive")

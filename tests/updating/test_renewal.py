@@ -10,6 +10,24 @@ from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
 
 
+class Remade(Effect):
+    """So strong that the structure is another one."""
+
+    remakes_structure = True
+
+
+@pytest.mark.parametrize(("effect", "structure"), [(Effect(), "deck"), (Remade(), "remade")])
+def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effect, structure):
+    """Not by name or class: the effect says so itself."""
+    found = Accuracy(np.array([10.0]), np.array([0.0]), np.zeros((3, 1)))
+    remade = SimpleNamespace(structure="remade")
+    monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
+    monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
+    prepared = SimpleNamespace(search=SimpleNamespace())
+    begun = SimpleNamespace(effect=effect, structure="deck")
+    assert renewal.renewed(None, prepared, begun).trial.structure == structure
+
+
 def a_trial():
     fit = SimpleNamespace(effects=(), x=np.zeros(0))
     data = SimpleNamespace(over=lambda model: model)
@@ -22,8 +40,30 @@ def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
     found = Accuracy(np.array([10.0]), np.array([error]), np.zeros((3, 1)))
     monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
     monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
-    monkeypatch.setattr(renewal, "fitted", lambda *given: "fit")
+    fit = a_trial().fit
+    fit.data = a_trial().data
+    monkeypatch.setattr(renewal, "fitted", lambda *given: fit)
     prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
-    trial, said = renewal.renewed(None, prepared, a_trial())
-    assert trial.model == model
-    assert f"{error:.2%}" in said
+    done = renewal.renewed(None, prepared, a_trial())
+    assert done.trial.model == model
+    assert f"{error:.2%}" in done.note
+    assert bool(done.distrust) == (model == "wide")
+
+
+def test_is_widened_until_it_serves(monkeypatch):
+    """Two times too narrow, then wide enough: fitted twice, and trusted."""
+    errors = iter([2e-2, 2e-3, 2e-4])
+    fits = []
+    monkeypatch.setattr(
+        renewal, "_accuracy",
+        lambda search, trial: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
+    )  # fmt: skip
+    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
+    kept = a_trial().fit
+    monkeypatch.setattr(renewal, "fitted", lambda *given: fits.append(given) or kept)
+    monkeypatch.setattr(renewal, "Trial", lambda effect, fit, model: a_trial())
+    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
+    done = renewal.renewed(None, prepared, a_trial())
+    assert len(fits) == 2
+    assert done.worst == 2e-4
+    assert done.distrust == ()

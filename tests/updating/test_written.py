@@ -13,7 +13,7 @@ from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.hypothesis_fit import Trial, as_written
 from chladni.updating.map_fit import fit
-from chladni.updating.outcome import Scores
+from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
 
 
@@ -46,8 +46,8 @@ def test_is_the_best_without_scatter(trial):
 
 def test_what_the_held_out_data_refuse_is_not_written(monkeypatch, trial):
     """No name, and nothing of it in the deck that is reported."""
-    refused = Scores(1.0, 1.0, 2.0, 1.0)
-    monkeypatch.setattr(outcome, "scores", lambda prepared, diagnosis: (refused, refused))
+    refused = FittedScores(1.0, 2.0, 1.0)
+    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, diagnosis: (refused, refused))
     null = Trial(Effect(), replace(trial.fit, S=trial.S + 1e6), trial.model)
     found = Diagnosis(null, null, null, (trial,), "missing physics")
     prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))

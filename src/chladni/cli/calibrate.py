@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from .diagnose import answer, opened
-from .run import Out, started
+from ..workflows.calibrate import calibrate
+from .run import Out, diagnosed
 
 
 def run(
@@ -14,5 +14,4 @@ def run(
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts (or what the case frees); write the updated deck and a page."""
-    with started("calibrate", source, out) as job:
-        answer(job, opened(source), search=False)
+    diagnosed("calibrate", source, out, calibrate)

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
-from ..output import write_text
-from ..planning import Wishes, plan, sensors_csv, summary
+from ..planning import Wishes
 from ..progress import within
+from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
+from ..workflows.plan import plan
 from .run import Out, Units, started
 
 
@@ -52,23 +53,13 @@ def run(
         mass=mass,
         draws=drawn,
     )
-    from ..report.plan_page import PICTURES, lead, notes, sections
+    from ..report.plan_page import plan_page
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units)
-        stage = within(job.progress, 0.1, 0.8)
-        built = model.structure
-        found = plan(model.assembly, wishes, built=built, unit=model.unit, progress=stage)
-        result = summary(found)
+        found = plan(model, wishes, within(job.progress, 0.1, 0.8))
+        result = to_json(found)
         job.json("plan.json", result)
-        write_text(
-            job.keep("sensors.csv", "sensors and shakers, for case.toml"), sensors_csv(found)
-        )
         job.progress("pictures", 0.8)
-        for section in sections(found, result, model.seen, built, job.folder):
-            job.section(section.title, section.blocks)
-        job.files += list(PICTURES.items())
-        job.notes += notes(found)
-        job.lead = lead(result)
-        job.say(job.lead)
+        job.show(plan_page(job.folder, model, found, result))

@@ -15,6 +15,7 @@ from ..report.blocks import Block, Picture, Table
 from ..report.words import number
 from ..workflows.loaded_model import Model, load_model, on_faces
 from .run import Out, Run, Units, started
+from .shape_pictures import against_scan, cuts
 
 
 def run(
@@ -28,12 +29,24 @@ def run(
     clearance: Annotated[
         bool, typer.Option("--clearance", help="Map and table of the clearance between sheets.")
     ] = False,
+    section: Annotated[
+        list[str] | None,
+        typer.Option(help="A plane to cut at, as x=0.3 [m, or the deck's unit] (repeatable)."),
+    ] = None,
+    scan: Annotated[
+        Path | None,
+        typer.Option(help="STL, PLY or OBJ of the real part, in the deck's unit of length."),
+    ] = None,
+    align: Annotated[
+        bool, typer.Option("--align", help="Bring the scan onto the model first.")
+    ] = False,
     units: Units = None,
     out: Out = None,
 ) -> None:
-    """Pictures: modes, animations, thickness, strain energy, clearance; modes are elastic ones.
+    """Pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
 
-    The first mode is the first elastic one: rigid motions are not counted.
+    The first mode is the first elastic one: rigid motions are not counted. A scan without --align
+    lies where the model lies.
     """
     chosen = numbers(modes)
     with started("render", source, out) as job:
@@ -46,6 +59,10 @@ def run(
         if modal is not None:
             _moving(job, model, modal, chosen, gif or [])
             _energies(job, model, modal, energy or [])
+        if section:
+            cuts(job, model, section)
+        if scan is not None:
+            against_scan(job, model, scan, align)
         if clearance:
             _clearance(job, model, modal, sorted({*chosen, *(gif or []), *(energy or [])}))
         job.lead = f"{len(job.files)} pictures of {source.name}."

@@ -6,14 +6,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 import typer
 
+from ..case import Case, load_case
+from ..errors import FileError
 from ..output import run_folder, write_json
-from ..progress import Progress, terminal
-from ..report.blocks import Block, Code, Items, Links, Section
+from ..progress import Progress, terminal, within
+from ..report.blocks import Block, Code, Items, Links, PageParts, Section
 from ..report.page import write_sections
+from ..workflows.diagnosis_result import DiagnosisResult
+from ..workflows.loaded_model import is_case
 
 Out = Annotated[
     Path | None,
@@ -56,6 +60,14 @@ class Run:
         """Add to the page."""
         self.sections.append(Section(title, list(blocks)))
 
+    def show(self, parts: PageParts) -> None:
+        """Add a page's sections, notes and files, and say its lead."""
+        self.sections += parts.sections
+        self.notes += parts.notes
+        self.files += parts.files
+        self.lead = parts.lead
+        self.say(parts.lead)
+
     def say(self, text: str) -> None:
         """One line on standard output."""
         typer.echo(text)
@@ -87,6 +99,63 @@ def started(command: str, source: Path | str, out: Path | None) -> Iterator[Run]
             run.page()
     page = place / "report.html"
     typer.echo(f"results in {page if page.exists() else place}")
+
+
+def opened(source: Path) -> Case:
+    """The case of a folder or a case.toml.
+
+    Raises
+    ------
+    FileError
+        If it is no case.
+    """
+    if source.exists() and not is_case(source):
+        raise FileError(f"{source} is no case; give a folder with case.toml")
+    return load_case(source)
+
+
+class Diagnosing(Protocol):
+    """A workflow from a case to a diagnosis."""
+
+    def __call__(self, case: Case, progress: Progress) -> DiagnosisResult:
+        """Diagnose or calibrate."""
+
+
+def diagnosed(
+    command: str, source: Path, out: Path | None, workflow: Diagnosing
+) -> DiagnosisResult:
+    """Diagnose or calibrate a case into a folder and say the verdict.
+
+    Raises
+    ------
+    AccuracyError
+        After all is written, if the result is not to be trusted.
+    """
+    from ..report.diagnosis_folder import write_diagnosis
+    from ..report.verdict import sentence
+
+    with started(command, source, out) as job:
+        case = opened(source)
+        found = workflow(case, within(job.progress, 0.0, 0.85))
+        stage = within(job.progress, 0.85, 1.0)
+        found = write_diagnosis(job.folder, case, found, command_line(), stage)
+        job.say(sentence(found))
+    return found.trusted()
+
+
+def limits(text: str) -> tuple[float, float]:
+    """A band as two numbers [Hz].
+
+    >>> limits("20:200")
+    (20.0, 200.0)
+    """
+    try:
+        low, high = (float(x) for x in text.replace(",", ":").split(":"))
+    except ValueError:
+        raise FileError(f"--band {text!r} is not of the form 20:200") from None
+    if not 0 <= low < high:
+        raise FileError(f"--band {text!r} must increase and not be negative")
+    return low, high
 
 
 def command_line() -> str:

@@ -57,7 +57,7 @@ def _solved(
 ) -> np.ndarray:
     """L [diag(d) + i Σ ω^p A_p]⁻¹ R line by line; ``tied`` is {p: A_p}."""
     if not tied:
-        return np.asarray((left / d[:, None, :]) @ right)
+        return (left / d[:, None, :]) @ right
     r, out = d.shape[1], []
     step = max(1, _ENTRIES // max(r * r, 1))
     for k in range(0, len(omega), step):

@@ -289,8 +289,7 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
     """Lanczos from a shift that suits; a guessed one is renewed when it lies far from the modes."""
     sigma = shift
     if sigma is None:
-        scale = _scale(problem.K, problem.M, problem.dofs)
-        sigma = -max(_GUESS * scale.typical, 10 * scale.rounding)
+        sigma = -_GUESS * _scale(problem.K, problem.M, problem.dofs).typical
     for _ in range(2):
         factor = problem.factor(sigma)
         ritz = block_lanczos(factor.solve, problem.M, k)

@@ -48,4 +48,4 @@ def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> F
 
 def attachments(factor: Factor, rows: sp.csr_array) -> np.ndarray:
     """Static responses (K + σM)⁻¹ Bᵀ to unit loads along the rows of B (n, k)."""
-    return np.asarray(factor.solve(rows.toarray().T))
+    return factor.solve(rows.toarray().T)

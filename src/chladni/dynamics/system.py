@@ -1,4 +1,4 @@
-"""The second-order system M q'' + V q' + K q = f (thesis eq. 1)."""
+"""The second-order system M q'' + V q' + K q = f."""
 
 from dataclasses import dataclass
 

@@ -6,9 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.optimize import linear_sum_assignment
 
-from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
-from ..fem.assemble import Structure, structure
+from ..fem.assemble import Structure
+from ..fem.modelled import Modelled, modelled
 from ..geometry.refine import refined
 from .effect import Effect, Parameter, PointTerm
 
@@ -28,7 +28,7 @@ class MeshError(Effect):
     change: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """X ΔK over the modes."""
+        """x ΔK over the modes."""
         return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None]),)
 
 
@@ -49,18 +49,19 @@ class Jitter(Effect):
         return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam)),)
 
 
-def mesh_error(built: Structure, top: float) -> MeshError | None:
+def mesh_error(model: Modelled, top: float) -> MeshError | None:
     """The mesh error of a structure up to 1.4 times the frequency ``top``; None if too large.
 
     With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
     ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
     """
+    built = model.structure
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
         return None
-    coarse = _flexible(normal_modes(built.system, band=1.4 * top), top)
-    finer = structure(refined(built.assembly))
-    fine = _flexible(normal_modes(finer.system, band=1.6 * top), top)
-    rows = _rows_of(finer, built)
+    coarse = _flexible(model.up_to(1.4 * top), top)
+    finer = modelled(refined(built.assembly), 1.6 * top)
+    fine = _flexible(finer.modes, top)
+    rows = _rows_of(finer.structure, built)
     M_phi = built.system.M @ coarse.shapes
     overlap = M_phi.T @ (rows @ fine.shapes)
     own, partner = linear_sum_assignment(-(overlap**2))
@@ -74,12 +75,12 @@ def mesh_error(built: Structure, top: float) -> MeshError | None:
     return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
 
 
-def jitter(built: Structure, top: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
+def jitter(model: Modelled, top: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
     """Independent scatter of each modal frequency up to ``top``.
 
     Standard deviation of ln f: ``sd``, and half of what the finer mesh changes in that mode.
     """
-    modes = _flexible(normal_modes(built.system, band=1.1 * top), top)
+    modes = _flexible(model.up_to(1.1 * top), top)
     lam = (2 * np.pi * modes.frequency) ** 2
     own = np.zeros(len(lam))
     if mesh is not None:
@@ -89,7 +90,7 @@ def jitter(built: Structure, top: float, mesh: MeshError | None, sd: float = 0.0
         Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(spread), kind="linear", step=0.02)
         for r, spread in enumerate(np.hypot(sd, own))
     )
-    rows = sp.csr_array((built.system.M @ modes.shapes).T)
+    rows = sp.csr_array((model.structure.system.M @ modes.shapes).T)
     return Jitter(unknown, "every mode", rows=rows, lam=lam)
 
 

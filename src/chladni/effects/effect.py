@@ -36,7 +36,8 @@ class Parameter:
     """One unknown x with prior N(mean, sd²).
 
     The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``.
-    ``step`` is the longest step a fit may take at once, ``starts`` where a search begins.
+    ``step`` is the longest step a fit may take at once, ``starts`` where a search begins. With all
+    parameters at ``nominal`` an effect does nothing.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Parameter:
     kind: Literal["log", "linear"] = "log"
     step: float = 0.7
     starts: tuple[float, ...] = ()
+    nominal: float = 0.0
 
     def value(self, x: float) -> float:
         """Physical value."""

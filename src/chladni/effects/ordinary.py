@@ -29,7 +29,7 @@ class PartScale(Effect):
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n_groups,) 1 in these parts
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Ln factor x on the groups of these parts."""
+        """ln factor x on the groups of these parts."""
         return (FieldChange(self.quantity, x[0] * self.inside, self.inside[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
@@ -192,7 +192,7 @@ class Gain(Effect):
     n_outputs: int = 1
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
-        """X / ln 10 on every channel."""
+        """x / ln 10 on every channel."""
         one = np.ones(self.n_outputs) / np.log(10)
         return ChannelChange(x[0] * one.astype(complex), one[:, None].astype(complex))
 

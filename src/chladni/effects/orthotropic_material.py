@@ -49,7 +49,7 @@ class OrthotropicMaterial(Effect):
         return [*rows[:3], last]
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
-        """Ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
+        """ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""
         m = _mean_ratio(x[3])
         base = np.log(1 - self.nu**2) - np.log(1 - m**2)
         return np.array(
@@ -57,11 +57,9 @@ class OrthotropicMaterial(Effect):
         )
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Ln factors of the four components of the plane stiffness."""
-        logs, h = (
-            self._logs(x) - (0.0 if self.reference is None else self._logs(self.reference)),
-            1e-6,
-        )
+        """ln factors of the four components of the plane stiffness."""
+        has = 0.0 if self.reference is None else self._logs(self.reference)
+        logs, h = self._logs(x) - has, 1e-6
         slopes = np.stack(
             [(self._logs(x + h * e) - self._logs(x - h * e)) / (2 * h) for e in np.eye(4)], axis=1
         )
@@ -115,11 +113,12 @@ def orthotropic(
     if not isinstance(material, Isotropic):
         raise TypeError(f"part {parts[positions[0]].name} is not isotropic")
     nu = min(max(material.nu, 0.02), 0.55)
+    nu_mean = float(np.log(nu / (0.6 - nu)))
     unknown = (
         Parameter("E1", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
         Parameter("E2", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
         Parameter("G12", "Pa", 0.0, 0.7, material.shear_modulus, step=0.3, starts=(-0.3, 0.0, 0.3)),
-        Parameter("nu mean", "-", float(np.log(nu / (0.6 - nu))), 1.0, kind="linear", step=0.5),
+        Parameter("nu mean", "-", nu_mean, 1.0, kind="linear", step=0.5, nominal=nu_mean),
     )
     names = tuple(parts[k].name for k in positions)
     direction = "xyz"[int(np.argmax(np.abs(axis)))]

@@ -8,6 +8,8 @@ import scipy.sparse as sp
 from ..model.assembly import Assembly, Masses, Scalars
 from .effect import Effect, Parameter, PointTerm
 
+NOTHING = -30.0  # ln of a strength over its median that is none
+
 
 def _empty() -> sp.csr_array:
     return sp.csr_array((0, 0))
@@ -47,7 +49,7 @@ class MassEffect(AtPoints):
 
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
-    return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts)
+    return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts, nominal=NOTHING)
 
 
 def with_masses(

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from .effect import Effect
 from .surroundings import Surroundings
@@ -73,6 +72,7 @@ class SearchContext(Protocol):
 
 DRAWS = 1024  # of the prior, where pairing of poles makes many valleys
 VALLEYS = 6  # of them that are followed
+APART = 1 / 6  # of the structure's size lie between places that are both followed
 
 
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
@@ -92,32 +92,37 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 
 def best_places(
-    context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2
-) -> list[Candidate]:
+    context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2,
+    apart: float = APART,
+) -> list[Candidate]:  # fmt: skip
     """The same effect at many places, each evaluated at all its starts: the best places.
 
     Parameters
     ----------
     point : (n_effects, 3)   their places [m]
+    apart : see :func:`distinct`
     """
     options = []
     for effect in effects:
         scores = context.scores(effect, effect.starts())[0]
         options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
-    best = distinct(np.array([score for score, _ in options]), point, [], wanted)
+    best = distinct(np.array([score for score, _ in options]), point, [], wanted, apart)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]
 
 
-def distinct(score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted: int) -> list[int]:
-    """The best positions, none within a sixth of the structure's size of another one chosen.
+def distinct(
+    score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted: int, apart: float = APART
+) -> list[int]:
+    """The best positions, none within a share of the structure's size of another one chosen.
 
     Parameters
     ----------
     score : (n,)       the smaller, the better
     point : (n, 3)     [m]
     taken : positions chosen before
+    apart : the share; negative: they may share a place
     """
-    reach = np.linalg.norm(np.ptp(point, axis=0)) / 6
+    reach = apart * np.linalg.norm(np.ptp(point, axis=0))
     out: list[int] = []
     for k in np.argsort(score):
         if all(np.linalg.norm(point[k] - point[j]) > reach for j in [*taken, *out]):
@@ -129,6 +134,8 @@ def distinct(score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted:
 
 def _draws(effect: Effect, n: int) -> list[np.ndarray]:
     """Sobol points of an effect's prior."""
+    from scipy.stats import norm, qmc  # half a second that few need
+
     u = qmc.Sobol(len(effect.parameters), seed=1).random(n)
     mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
     return list(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))

@@ -30,7 +30,7 @@ class SensorFault(Effect):
         return [{**row, "value": self.sign * row["value"], "low": low, "high": high}]
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
-        """X / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
+        """x / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
         value, slope = np.zeros(self.n_outputs, complex), np.zeros((self.n_outputs, 1), complex)
         value[self.channel] = (x[0] + (1j * np.pi if self.sign < 0 else 0)) / np.log(10)
         slope[self.channel] = 1 / np.log(10)

@@ -35,7 +35,7 @@ class ThicknessDistribution(Effect):
     ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def _bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
-        """Q at points X (n,), averaged over a group of variance ``blur``."""
+        """q at points X (n,), averaged over a group of variance ``blur``."""
         d2 = ((X - self.at(x)) ** 2).sum(axis=1)
         R2 = (self.size * np.exp(x[1])) ** 2
         return np.asarray(R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur))))
@@ -108,7 +108,7 @@ def thickness_distribution(
     size = float(np.sqrt(groups.area[groups.part == part].sum()))
     name = assembly.parts[part].name
     unknown = (
-        Parameter("thinning", "-", -1.6, 1.2, kind="linear", step=0.8, starts=(-1.0,)),
+        Parameter("thinning", "-", -1.6, 1.2, 1.0, "linear", 0.8, starts=(-1.0,), nominal=-40.0),
         Parameter("R", "m", np.log(0.15), 0.5, size, step=0.3, starts=(np.log(0.18),)),
         Parameter("along", "m", 0.0, 0.4, size, "linear", step=0.1, starts=(0.0,)),
         Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(0.0,)),

@@ -1,7 +1,8 @@
 """How alike two sets of modes, or a model's and a recording's responses, are.
 
 Sources: Allemang (2003), Sound and Vibration 37(8), 14-23 (MAC, COMAC, FRAC);
-Hunt (1992), IMAC X, 66-71 (enhanced COMAC); thesis eq. 4 (the deviation δ and Q).
+Hunt (1992), IMAC X, 66-71 (enhanced COMAC);
+Echaniz Granado (2015), section 2.7.2.1 (the deviation δ and Q, eq. 4).
 """
 
 from collections.abc import Sequence
@@ -44,7 +45,7 @@ def auto_mac(phi: np.ndarray) -> np.ndarray:
 
 
 def _power(x: np.ndarray, axis: int) -> np.ndarray:
-    return np.asarray((np.abs(x) ** 2).sum(axis=axis))
+    return (np.abs(x) ** 2).sum(axis=axis)
 
 
 def _ratio(above: np.ndarray, below: np.ndarray) -> np.ndarray:
@@ -87,7 +88,7 @@ def comac(phi: np.ndarray, psi: np.ndarray, convention: Convention = "allemang")
     if convention == "allemang":
         return _ratio(np.abs(phi * psi.conj()).sum(1) ** 2, _power(phi, 1) * _power(psi, 1))
     if convention == "enhanced":
-        return np.asarray(_power(phi - psi, 1) / (2 * phi.shape[1]))
+        return _power(phi - psi, 1) / (2 * phi.shape[1])
     raise LabelError(f"no convention {convention!r}; there are allemang, enhanced")
 
 
@@ -109,7 +110,7 @@ def wrapped(delta: np.ndarray) -> np.ndarray:
 
 
 def deviation(model: FRF, test: FRF) -> np.ndarray:
-    """δ = log₁₀(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in) (thesis eq. 4).
+    """δ = log₁₀(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in); Echaniz Granado 2015, (4).
 
     Logarithmic, so an anti-resonance counts like a resonance.
 
@@ -142,7 +143,7 @@ class Quality:
     Attributes
     ----------
     Q : float                 mean |δ|²
-    total : float             Σ |δ|², the thesis' own, unnormalised
+    total : float             Σ |δ|², unnormalised as in Echaniz Granado (2015)
     magnitude, phase : float  the shares of Q from |H| (log₁₀) and from the angle
     channel : (n_out, n_in)   mean over lines
     band : (n_bands,)         mean over the lines of each band

@@ -93,12 +93,12 @@ def spread(frf: FRF, averages: int = 1) -> np.ndarray:
     H = np.abs(frf.values)
     rms = np.sqrt((H**2).mean(axis=0))
     if frf.variance is not None:
-        return np.asarray(frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2)
+        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2
     if frf.coherence is not None:
         gamma = np.clip(frf.coherence, 1e-3, 1.0)
         ratio = _smooth((1 - gamma) / gamma) / averages
-        return np.asarray((ratio + 0.01**2) * H**2 + (1e-4 * rms) ** 2)
-    return np.asarray((0.01 * H) ** 2 + (1e-3 * rms) ** 2)
+        return (ratio + 0.01**2) * H**2 + (1e-4 * rms) ** 2
+    return (0.01 * H) ** 2 + (1e-3 * rms) ** 2
 
 
 def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
@@ -106,7 +106,7 @@ def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
     half = min(width, len(x)) // 2
     padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
     total = padded.cumsum(axis=0)
-    return np.asarray((total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1))
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
 
 
 def identify(
@@ -220,7 +220,7 @@ def evaluate(
     r = R.reshape(len(p), -1)
     H = (1 / (s - p)) @ r + (1 / (s - p.conj())) @ r.conj()
     H = H + identified.lower.ravel() / s**2 + identified.upper.ravel()
-    return np.asarray((s ** DERIVATIVES[identified.quantity] * H).reshape(-1, *shape))
+    return (s ** DERIVATIVES[identified.quantity] * H).reshape(-1, *shape)
 
 
 def equalised(identified: Identified, s: np.ndarray) -> np.ndarray:

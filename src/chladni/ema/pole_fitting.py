@@ -96,7 +96,7 @@ class PoleFit:
     def residues(self) -> np.ndarray:
         """(r, n_c) complex."""
         pairs = self.x[:-2].reshape(len(self.p), 2, self.x.shape[1])
-        return np.asarray(pairs[:, 0] + 1j * pairs[:, 1])
+        return pairs[:, 0] + 1j * pairs[:, 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def _gains(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndar
     a, d = (root[:, k] ** 2).sum(0), (root[:, k + 1] ** 2).sum(0)
     b = (root[:, k] * root[:, k + 1]).sum(0)
     u, v = x[k], x[k + 1]
-    return np.asarray((d * u**2 - 2 * b * u * v + a * v**2) / np.maximum(a * d - b * b, _TINY))
+    return (d * u**2 - 2 * b * u * v + a * v**2) / np.maximum(a * d - b * b, _TINY)
 
 
 def polish(
@@ -200,14 +200,14 @@ def _step(slope: PoleSystem, damping: float) -> np.ndarray:
     """Marquardt's step of every pole, complex (r,)."""
     d = np.maximum(np.diag(slope.H), 1e-12 * np.diag(slope.H).max(initial=_TINY))
     dp = np.linalg.solve(slope.H + damping * np.diag(d), slope.g)
-    return np.asarray(dp[0::2] + 1j * dp[1::2])
+    return dp[0::2] + 1j * dp[1::2]
 
 
 def bounded(p: np.ndarray, largest: float) -> np.ndarray:
     """Poles in the upper left quadrant with 1e-6 <= ζ <= largest."""
     size = np.abs(p)
     zeta = np.clip(np.abs(p.real) / np.maximum(size, _TINY), 1e-6, largest)
-    return np.asarray(size * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+    return size * (-zeta + 1j * np.sqrt(1 - zeta**2))
 
 
 def relocated(data: PoleData, p: np.ndarray) -> np.ndarray:

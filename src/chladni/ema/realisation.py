@@ -1,7 +1,8 @@
 """An identified model as a first-order system, residual terms turned into modes (inflation).
 
-Gilbert (1963), SIAM J. Control 1, 128-151 (one block per pole and rank of its residue); thesis
-section 5.1, eqs. 6-8 (pseudo-rigid and high pole; mobility and acceleration by C A, D = C B).
+Gilbert (1963), SIAM J. Control 1, 128-151 (one block per pole and rank of its residue);
+Echaniz Granado (2015), section 5.1, eqs. 6-8 (pseudo-rigid and high pole; mobility and acceleration
+by C A, D = C B).
 """
 
 import numpy as np

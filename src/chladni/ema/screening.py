@@ -158,7 +158,7 @@ def _interpolated(f: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.nda
     """Values at f, linear between the lines of grid (n_f, ...)."""
     k = np.clip(np.searchsorted(grid, f, side="right") - 1, 0, len(grid) - 2)
     t = ((f - grid[k]) / (grid[k + 1] - grid[k])).reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray((1 - t) * values[k] + t * values[k + 1])
+    return (1 - t) * values[k] + t * values[k + 1]
 
 
 def noise_of(frf: FRF) -> np.ndarray:
@@ -182,4 +182,4 @@ def roughness(frf: FRF) -> np.ndarray:
     power = np.abs(frf.values[2 : n - 2] - smooth) ** 2 * 35 / 18
     width = min(21, n - 4)
     inner = median_filter(power, size=(width, 1, 1), mode="reflect") / np.log(2)
-    return np.asarray(np.pad(inner, ((2, 2), (0, 0), (0, 0)), mode="edge"))
+    return np.pad(inner, ((2, 2), (0, 0), (0, 0)), mode="edge")

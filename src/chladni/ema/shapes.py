@@ -93,7 +93,7 @@ def _drive(identified: Identified) -> tuple[int, int, int] | None:
 def _turned(psi: np.ndarray) -> np.ndarray:
     """Each row turned by the phase that makes Σ ψ² real and positive (r, n)."""
     phase = 0.5 * np.angle((psi**2).sum(axis=1))
-    return np.asarray(psi * np.exp(-1j * phase)[:, None])
+    return psi * np.exp(-1j * phase)[:, None]
 
 
 def collinearity(psi: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ def collinearity(psi: np.ndarray) -> np.ndarray:
     array([1., 0.])
     """
     power = (np.abs(psi) ** 2).sum(axis=0)
-    return np.asarray(np.abs((psi**2).sum(axis=0)) ** 2 / np.maximum(power, 1e-300) ** 2)
+    return np.abs((psi**2).sum(axis=0)) ** 2 / np.maximum(power, 1e-300) ** 2
 
 
 def modal_model(identified: Identified) -> ModalModel:
@@ -131,8 +131,8 @@ def modal_model(identified: Identified) -> ModalModel:
 def lines_per_bandwidth(identified: Identified, frequency: np.ndarray) -> np.ndarray:
     """Lines within the half-power bandwidth 2 ζ f of each mode, over two: per half bandwidth (r,).
 
-    Three or more are needed for the damping (thesis, lines 1045-1051).
+    Three or more are needed for the damping (Echaniz Granado 2015, section 5.2).
     """
     f, half = identified.frequency, identified.damping * identified.frequency
     inside = (frequency >= (f - half)[:, None]) & (frequency <= (f + half)[:, None])
-    return np.asarray(inside.sum(axis=1) / 2)
+    return inside.sum(axis=1) / 2

@@ -153,7 +153,7 @@ def _H2(s: Spectra) -> np.ndarray:
     """S_yy / S_fy, one input."""
     if s.ff.shape[1] != 1:
         raise ShapeError(f"H2 needs one input, there are {s.ff.shape[1]}; use H1 or Hv")
-    return np.asarray(s.yy[:, :, None] / s.yf.conj())
+    return s.yy[:, :, None] / s.yf.conj()
 
 
 def _Hv(s: Spectra) -> np.ndarray:

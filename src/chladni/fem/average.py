@@ -92,7 +92,7 @@ def motion(assembly: Assembly, means: list[Average], terms: _Terms) -> np.ndarra
     x = w[:, None] * np.einsum("tij,tj->ti", inverse[terms.element], S)
     x[:, 3:] /= L[terms.element, None]
     turned = np.einsum("tij,tkj->tki", axes[terms.element], x.reshape(-1, 2, 3))
-    return np.asarray(turned.reshape(-1, 6))
+    return turned.reshape(-1, 6)
 
 
 def _lengths(terms: _Terms, arm: np.ndarray, n: int) -> np.ndarray:
@@ -123,7 +123,7 @@ def _inverse(A: np.ndarray, means: list[Average], axes: np.ndarray) -> np.ndarra
                 f"RBE3 {means[k].id}: its {len(means[k].terms)} points do not determine components"
                 f" {lost} of the reference; add points out of line, or rotations 456"
             )
-    return np.asarray(inverse)
+    return inverse
 
 
 def _moved(rows: Rows, moved: dict[int, Average]) -> Rows:

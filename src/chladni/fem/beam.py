@@ -106,7 +106,7 @@ def stiffness(
     K = np.einsum("m,mi,mj->mij", EA / L, e, e) + np.einsum("m,mi,mj->mij", GJ / L, t, t)
     K += np.einsum("mpq,mpi,mqj->mij", EI / L[:, None, None], kappa, kappa)
     K += np.einsum("mpq,mpi,mqj->mij", S, w, w)
-    return np.asarray(K)
+    return K
 
 
 def _deformations(
@@ -175,7 +175,7 @@ def _offset_mass(m: np.ndarray, at: np.ndarray) -> np.ndarray:
     R = np.zeros((len(m), 3, 6))
     R[:, :, :3] = np.eye(3)
     R[:, 0, 4], R[:, 0, 5], R[:, 1, 3], R[:, 2, 3] = z, -y, -z, y
-    return np.asarray(m[:, None, None] * (R.transpose(0, 2, 1) @ R))
+    return m[:, None, None] * (R.transpose(0, 2, 1) @ R)
 
 
 def _consistent(
@@ -200,7 +200,7 @@ def _cubic(L: np.ndarray) -> np.ndarray:
     """∫ N Nᵀ dx / L of the Hermite cubics, dofs (v, v', v, v') (m, 4, 4)."""
     M = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
     scale = np.stack([np.ones_like(L), L, np.ones_like(L), L], axis=1)
-    return np.asarray(M / 420 * scale[:, :, None] * scale[:, None, :])
+    return M / 420 * scale[:, :, None] * scale[:, None, :]
 
 
 def _halves() -> np.ndarray:
@@ -213,7 +213,7 @@ def _moved(M: np.ndarray, at: np.ndarray) -> np.ndarray:
     y, z = at.T
     for k in (0, 6):
         T[:, k, k + 4], T[:, k, k + 5], T[:, k + 1, k + 3], T[:, k + 2, k + 3] = z, -y, -z, y
-    return np.asarray(T.transpose(0, 2, 1) @ M @ T)
+    return T.transpose(0, 2, 1) @ M @ T
 
 
 def _to_nodes(R: np.ndarray, offset: np.ndarray) -> np.ndarray:

@@ -72,7 +72,7 @@ def _modes(built: Structure, analysis: Analysis, case: Subcase) -> ModalModel:
 
 
 def _places(built: Structure) -> np.ndarray:
-    return np.asarray(built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])])
+    return built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
 
 
 def _completed(
@@ -97,7 +97,7 @@ def _patterns(built: Structure, loads: tuple[Excitation, ...], f: np.ndarray) ->
             out += [part.real, part.imag]
     P = np.concatenate(out, axis=1)
     size = np.linalg.norm(P, axis=0)
-    return np.asarray(P[:, size > _RANK * size.max(initial=0.0)])
+    return P[:, size > _RANK * size.max(initial=0.0)]
 
 
 def _spread(built: Structure, load: Excitation, pattern: np.ndarray) -> np.ndarray:
@@ -119,7 +119,7 @@ def _forced(
         phi_i = (built.T.T @ whole).T @ modal.shapes
         loss = sp.csr_array(built.hysteretic().K.imag)
         H = coupled_receptance(modal, pick @ modal.shapes, phi_i, f, V=built.system.V, loss=loss)
-    return np.asarray(np.einsum("fok,fk->fo", H, amplitude))
+    return np.einsum("fok,fk->fo", H, amplitude)
 
 
 def _factored(P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

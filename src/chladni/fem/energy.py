@@ -123,7 +123,7 @@ def _quadratic(
     """½ uᵀ K_e u with the first 3 or all 6 motions of the nodes (m, k): (m, r)."""
     u = np.asarray(structure.T @ phi).reshape(len(structure.assembly.points), 6, -1)
     u_e = u[nodes, :motions].reshape(len(nodes), K.shape[1], phi.shape[1])
-    return np.asarray(0.5 * np.einsum("eir,eir->er", u_e, K @ u_e))
+    return 0.5 * np.einsum("eir,eir->er", u_e, K @ u_e)
 
 
 def _picked(family: Any, which: np.ndarray) -> Any:

@@ -244,7 +244,7 @@ def _chunks(geo: ShellGeometry) -> Iterator[Rows]:
 
 
 def _quadrature(geo: ShellGeometry) -> tuple[np.ndarray, np.ndarray]:
-    """DA (m, g) and N (g, 4)."""
+    """dA (m, g) and N (g, 4)."""
     if geo.triangle.any():
         return np.repeat(geo.area[:, None] / 3, 3, axis=1), triangle.N
     return jacobians(geo.corners)[0], QUAD_N
@@ -349,7 +349,7 @@ def _mass(
 
 
 def _carry_offset(M: np.ndarray, m_ij: np.ndarray, offset: np.ndarray, n: np.ndarray) -> None:
-    """U = u_node + r x (offset n) = u_node + C r: adds m C to (u, r) and m CᵀC to (r, r)."""
+    """u = u_node + r x (offset n) = u_node + C r: adds m C to (u, r) and m CᵀC to (r, r)."""
     d = offset[:, None] * n
     C = np.zeros((len(n), 3, 3))
     C[:, 0, 1], C[:, 1, 2], C[:, 2, 0] = d[:, 2], d[:, 0], d[:, 1]

@@ -85,12 +85,12 @@ class SectionArrays:
     def drill_by_thickness(
         self, geo: ShellGeometry, t: np.ndarray, change: np.ndarray
     ) -> np.ndarray:
-        """Ds = s δt/t (m, 2) [N/m]."""
+        """ds = s δt/t (m, 2) [N/m]."""
         ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
         return np.asarray(self.drill * ratio[:, None])
 
     def drill_by_membrane(self, dQm: np.ndarray) -> np.ndarray:
-        """Ds = s dQ_66/Q_66 (m, 2) [N/m]."""
+        """ds = s dQ_66/Q_66 (m, 2) [N/m]."""
         G, dG = self.Qm[:, 2, 2], np.broadcast_to(dQm, (len(self), 3, 3))[:, 2, 2]
         return np.asarray(self.drill * np.divide(dG, G, np.zeros_like(G), where=G > 0)[:, None])
 

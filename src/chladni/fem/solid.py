@@ -212,7 +212,7 @@ def _tied(X: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
         gamma = t[:, k, :, None] * rows[:, k, None] + n[:, k, :, None] * across[:, None]
         inside = local @ B
         inside[:, [5, 4]] = gamma
-        return np.asarray(back @ inside)
+        return back @ inside
 
     return tie
 
@@ -275,4 +275,4 @@ def lumped_mass(X: np.ndarray, rho: np.ndarray) -> np.ndarray:
 
 def volume(X: np.ndarray) -> np.ndarray:
     """V_e = ∫ dV (m,) [m³]."""
-    return np.asarray(_shares(X).sum(axis=(1, 2)))
+    return _shares(X).sum(axis=(1, 2))

@@ -40,7 +40,7 @@ class SolidFamily:
 
 def _hexa_values(xi: np.ndarray) -> np.ndarray:
     """N_i = (1 + ξ_i ξ)(1 + η_i η)(1 + ζ_i ζ) / 8."""
-    return np.asarray(np.prod(1 + _CUBE * xi, axis=1) / 8)
+    return np.prod(1 + _CUBE * xi, axis=1) / 8
 
 
 def _hexa_gradients(xi: np.ndarray) -> np.ndarray:

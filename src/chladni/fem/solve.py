@@ -29,7 +29,7 @@ def static(built: Structure, load: np.ndarray) -> np.ndarray:
     ModelError
         If the structure can move without strain.
     """
-    return np.asarray(built.T @ _solved(built.system.K, built.T.T @ load, built.system.dofs))
+    return built.T @ _solved(built.system.K, built.T.T @ load, built.system.dofs)
 
 
 def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
@@ -46,7 +46,7 @@ def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
             f"the structure can move freely, hold it by supports: of {scale:.1e} N {gap:.1e} N "
             f"find no resistance"
         )
-    return np.asarray(q)
+    return q
 
 
 def subcase_statics(assembly: Assembly, analysis: Analysis, case: Subcase) -> np.ndarray:
@@ -79,7 +79,7 @@ def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
     """
     a = np.asarray(acceleration, dtype=float)
     field = rigid_motions(assembly)[:, : len(a)] @ a
-    return np.asarray(_families(assembly, True)[0] @ field)
+    return _families(assembly, True)[0] @ field
 
 
 def enforced(
@@ -105,7 +105,7 @@ def enforced(
     if load is not None:
         force = force + built.T.T @ load
     q[f] = _solved(sp.csr_array(built.system.K[f][:, f]), force[f], built.system.dofs[f])
-    return np.asarray(built.T @ q)
+    return built.T @ q
 
 
 def _split(assembly: Assembly, dofs: np.ndarray) -> tuple[Structure, np.ndarray, np.ndarray]:
@@ -167,7 +167,7 @@ def _by_modes(modal: ModalModel, dofs: np.ndarray) -> Answer:
 
     def answer(w: float, Z: sp.csr_array, f: np.ndarray) -> np.ndarray:
         A = phi.T @ (Z @ phi) + np.diag(2j * modal.damping * w_r * w)
-        return np.asarray(phi @ np.linalg.solve(A, phi.T @ f))
+        return phi @ np.linalg.solve(A, phi.T @ f)
 
     return answer
 
@@ -178,7 +178,7 @@ def _shapes_at(modal: ModalModel, dofs: np.ndarray) -> np.ndarray:
     if np.any(at < 0):
         point, component = dofs[np.argmax(at < 0)]
         raise LabelError(f"the modes have no {point}:+{COMPONENTS[component - 1]}")
-    return np.asarray(modal.shapes[at])
+    return modal.shapes[at]
 
 
 def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
@@ -191,7 +191,7 @@ def _at(built: Structure, dofs: np.ndarray) -> np.ndarray:
             f"{point}:+{COMPONENTS[component - 1]} cannot be moved: it depends on other dofs, "
             f"or nothing stiff is there"
         )
-    return np.asarray(at)
+    return at
 
 
 def harmonic(

@@ -39,7 +39,7 @@ def _thrice(B: np.ndarray) -> np.ndarray:
 def _gradients(corners: np.ndarray) -> np.ndarray:
     """∂N/∂x, ∂N/∂y (m, 2, 4)."""
     _, inverse = invert(_SLOPES @ corners)
-    return np.asarray(inverse @ _SLOPES)
+    return inverse @ _SLOPES
 
 
 def _covariant(corners: np.ndarray, point: tuple[float, float]) -> np.ndarray:

@@ -40,8 +40,16 @@ def directed_edges(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sides[real], np.repeat(np.arange(len(cells)), cells.shape[1])[real]
 
 
+def point_means(cells: np.ndarray, corner: np.ndarray, count: int) -> np.ndarray:
+    """Mean at each of ``count`` points of values at the corners of cells (m, k); nan at no cell."""
+    at = cells.ravel()
+    held = np.bincount(at, minlength=count)
+    total = np.bincount(at, corner.ravel(), minlength=count)
+    return np.where(held > 0, total / np.maximum(held, 1), np.nan)
+
+
 def components(quads: np.ndarray, count: int) -> np.ndarray:
     """Number (from 0) of the connected piece each of `count` points belongs to."""
     a, b = edges_of(quads).T
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return connected_components(graph, directed=False)[1]

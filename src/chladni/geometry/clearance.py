@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, RigidBody
+from .cells import point_means
 from .curvature import part_curvature
 from .nearest import ShellSurface
 from .thickness_mapping import shell_area
@@ -55,7 +56,7 @@ class Gaps:
         shapes : (n_points, 3, r)   translations of all points of the assembly
         """
         other = np.einsum("kc,kcir->kir", self.weight, shapes[self.opposite])
-        return np.asarray(np.einsum("ki,kir->kr", self.normal, other - shapes[self.rows]))
+        return np.einsum("ki,kir->kr", self.normal, other - shapes[self.rows])
 
     def first_contact(
         self,
@@ -75,7 +76,7 @@ class Gaps:
         omega = 2 * np.pi * np.asarray(frequency)
         per_force = np.abs(self.relative_motion(shapes) * drive) / (2 * damping * omega**2)
         gap = np.maximum(self.clearance, 0.0)[:, None]
-        return np.asarray(gap / np.maximum(per_force, 1e-30))
+        return gap / np.maximum(per_force, 1e-30)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +89,11 @@ class _Sheets:
 
 
 def _sheets(assembly: Assembly) -> _Sheets:
+    nodes, n = assembly.shells.nodes, len(assembly.points)
     facet = shell_area(assembly)[:, None] * part_curvature(assembly) / 8
     return _Sheets(
-        _nodal(assembly, assembly.shells.thickness),
-        _nodal(assembly, facet),
+        point_means(nodes, assembly.shells.thickness, n),
+        point_means(nodes, facet, n),
         assembly.points[joint_points(assembly)],
     )
 
@@ -144,14 +146,7 @@ def _gaps(
 
 def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
     low, high = other.min(axis=0) - margin, other.max(axis=0) + margin
-    return np.asarray(np.all((points >= low) & (points <= high), axis=1))
-
-
-def _nodal(assembly: Assembly, corner: np.ndarray) -> np.ndarray:
-    """Mean at the points of values at the shells' corners."""
-    at, n = assembly.shells.nodes.ravel(), len(assembly.points)
-    count = np.bincount(at, minlength=n)
-    return np.asarray(np.bincount(at, corner.ravel(), minlength=n) / np.maximum(count, 1))
+    return np.all((points >= low) & (points <= high), axis=1)
 
 
 @dataclass(frozen=True)

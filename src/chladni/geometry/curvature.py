@@ -64,7 +64,7 @@ def _tensors(x: np.ndarray, normal: np.ndarray, cross: np.ndarray) -> np.ndarray
     AtA += 1e-12 * np.trace(AtA, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     s = np.linalg.solve(AtA, np.einsum("mki,mk->mi", A, right)[..., None])[..., 0]
     S = np.stack([s[:, :2], s[:, 1:]], axis=1)  # (m, 2, 2): e f / f g
-    return np.asarray(basis.swapaxes(1, 2) @ S @ basis)
+    return basis.swapaxes(1, 2) @ S @ basis
 
 
 def _principal(tensor: np.ndarray, normal: np.ndarray) -> Curvature:

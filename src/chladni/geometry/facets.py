@@ -18,7 +18,7 @@ EVEN = 1e-9  # of the area: a sense decided by less is decided by rounding
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    """V / |v| along the last axis (..., 3); zero stays zero."""
+    """v / |v| along the last axis (..., 3); zero stays zero."""
     length: np.ndarray = np.linalg.norm(v, axis=-1, keepdims=True)
     return v / np.where(length == 0, 1.0, length)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import readonly
 from ..errors import ModelError, ShapeError
+from .cells import point_means
 from .facets import cell_areas
 
 
@@ -51,11 +52,7 @@ class FormedMesh:
 
     def _nodal(self) -> np.ndarray:
         """Mean over the cells at each point."""
-        at, t = self.cells.ravel(), self.thickness.ravel()
-        n = len(self.points)
-        count = np.bincount(at, minlength=n)
-        total = np.bincount(at, t, minlength=n)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        return point_means(self.cells, self.thickness, len(self.points))
 
     @property
     def area(self) -> np.ndarray:

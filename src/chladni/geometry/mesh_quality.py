@@ -103,7 +103,7 @@ class MeshCheck:
 def free_edges(nodes: np.ndarray) -> np.ndarray:
     """Sides (k, 2) of one cell only."""
     sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
-    return np.asarray(sides[count == 1])
+    return sides[count == 1]
 
 
 def edge_faults(nodes: np.ndarray) -> tuple[int, int]:
@@ -177,7 +177,7 @@ def structure_pieces(assembly: Assembly) -> np.ndarray:
     a, b = np.vstack([p.reshape(-1, 2) for p in pairs]).astype(int).T
     n = len(assembly.points)
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return connected_components(graph, directed=False)[1]
 
 
 def _chain(nodes: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 A quadrilateral is taken as the two triangles at its diagonal 1-3. The shells are tried in the order
 of the distance to points spread over them; every point of a shell is within ``cover`` of one of its
-own, so that the search ends when no shell left over can be nearer than the best one found.
+own, so that all shells that can be nearer than the best of those are tried too.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from ..model.assembly import Assembly
 from .facets import tangents, unit
 
 NEAR = 12  # quads around a place whose triangles are tried first
-BLOCK = 200_000  # quads tried at a time, so that far places need little memory
+BLOCK = 256  # far places looked at together: each may need thousands of shells
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
 
 ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
@@ -55,8 +55,8 @@ class ShellSurface:
     points : (n, 3)     all points of the assembly [m]
     nodes : (m, 4)      rows of points
     rows : (m,)         rows of ``assembly.shells``
-    tree, owner :       places along the shells' longer middle lines, and whose they are
-    cover : float       farthest that a point of a shell is from a place of its own [m]
+    tree, owner :       places along the shells' longer middle lines (k,), and whose they are
+    cover :             farthest that a point of the shell is from that place [m]
     """
 
     name: str
@@ -65,7 +65,7 @@ class ShellSurface:
     rows: np.ndarray
     tree: cKDTree = field(repr=False)
     owner: np.ndarray = field(repr=False)
-    cover: float = field(repr=False)
+    cover: np.ndarray = field(repr=False)
 
     @classmethod
     def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
@@ -106,54 +106,55 @@ class ShellSurface:
         distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
-        feet, bound = self._tried(places, min(near, len(self.owner)), normal, cosine)
-        if normal is None:
-            self._improve(feet, places, bound, 4 * near)
+        k, count = len(places), min(near, len(self.owner))
+        reach, at = (v.reshape(k, count) for v in self.tree.query(places, count))
+        of = np.repeat(np.arange(k), count)
+        feet = self._nearest(places, of, self.owner[at.ravel()], normal, cosine)
+        if normal is None and count < len(self.owner):
+            open_ = np.flatnonzero(feet.distance > reach[:, -1] - self.cover.max())
+            for first in range(0, len(open_), BLOCK):
+                self._improve(feet, places, open_[first : first + BLOCK])
         return feet
 
-    def _improve(self, feet: Feet, places: np.ndarray, bound: np.ndarray, count: int) -> None:
-        """Try more shells where one not yet tried may be nearer, until none may."""
-        while len(open_ := np.flatnonzero(feet.distance > bound)):
-            count = min(count, len(self.owner))
-            for k in range(0, len(open_), max(1, BLOCK // count)):
-                block = open_[k : k + max(1, BLOCK // count)]
-                found, bound[block] = self._tried(places[block], count)
-                for name, value in vars(found).items():
-                    getattr(feet, name)[block] = value
-            count *= 4
+    def _improve(self, feet: Feet, places: np.ndarray, rows: np.ndarray) -> None:
+        """Try every shell that may be nearer to some of the places than what was found."""
+        x, reach = places[rows], feet.distance[rows] + 1e-12
+        near = self.tree.query_ball_point(x, reach + self.cover.max())
+        of = np.repeat(np.arange(len(rows)), [len(n) for n in near])
+        at = np.concatenate(near).astype(int)
+        least = np.linalg.norm(x[of] - self.tree.data[at], axis=1) - self.cover[at]
+        worth = least <= reach[of]
+        found = self._nearest(x, of[worth], self.owner[at[worth]])
+        for name, value in vars(found).items():
+            getattr(feet, name)[rows] = value
 
-    def _tried(
+    def _nearest(
         self,
         places: np.ndarray,
-        count: int,
+        of: np.ndarray,
+        shell: np.ndarray,
         normal: np.ndarray | None = None,
         cosine: float = 0.0,
-    ) -> tuple[Feet, np.ndarray]:
-        """Nearest points on the `count` nearest shells, and what all others are beyond (k,) [m]."""
-        k = len(places)
-        reach, at = (v.reshape(k, count) for v in self.tree.query(places, count))
-        tried = self.owner[at]
-        triangles = self.nodes[tried][..., _HALVES].reshape(k, 2 * count, 3)
-        x = self.points[triangles]
-        weight = barycentric_foot(places[:, None], x)
-        foot = np.einsum("kta,ktai->kti", weight, x)
-        distance = np.linalg.norm(foot - places[:, None], axis=-1)
-        facing = unit(np.cross(x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]))
-        distance = np.where(facing.any(axis=-1), distance, np.inf)  # half of a triangle is a line
+    ) -> Feet:
+        """The nearest point to each place on the shells tried for it: place ``of``, rising, each.
+
+        Of equally near ones, to 1e-12 m, the first.
+        """
+        triangles = self.nodes[shell][:, _HALVES].reshape(-1, 3)
+        of, x = np.repeat(of, 2), self.points[triangles]
+        weight = barycentric_foot(places[of], x)
+        foot = np.einsum("ta,tai->ti", weight, x)
+        distance = np.linalg.norm(foot - places[of], axis=-1)
+        facing = unit(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]))
+        distance[~facing.any(axis=-1)] = np.inf  # a triangle's second half is a line
         if normal is not None:
-            away = np.abs(np.einsum("kti,ki->kt", facing, normal)) < cosine
-            distance = np.where(away, np.inf, distance)
-        row, best = np.arange(k), distance.round(12).argmin(axis=1)
-        feet = Feet(
-            tried[row, best // 2],
-            foot[row, best],
-            triangles[row, best],
-            weight[row, best],
-            distance[row, best],
-            facing[row, best],
-        )
-        every = count == len(self.owner)
-        return feet, np.full(k, np.inf) if every else reach[:, -1] - self.cover
+            distance[np.abs(np.einsum("ti,ti->t", facing, normal[of])) < cosine] = np.inf
+        rounded, begin = distance.round(12), np.flatnonzero(np.diff(of, prepend=-1))
+        lowest = np.minimum.reduceat(rounded, begin)
+        candidate = np.where(rounded == lowest[of], np.arange(len(of)), len(of))
+        best = np.minimum.reduceat(candidate, begin)
+        rows = (foot, triangles, weight, distance, facing)
+        return Feet(shell[best // 2], *(v[best] for v in rows))
 
     def within(self, feet: Feet, places: np.ndarray, reach: float) -> None:
         """Refuse places farther than `reach` from the surface.
@@ -197,7 +198,7 @@ class ShellSurface:
         return nodes[keep], weight[keep]
 
 
-def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, float]:
+def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, np.ndarray]:
     """Places along the longer middle line of each cell (m, 4, 3), closer than the usual size.
 
     A long cell's centre may be far from a point that the cell itself is near. With them goes whose
@@ -222,8 +223,8 @@ def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, float]:
 
 def _reach(
     x: np.ndarray, places: np.ndarray, owner: np.ndarray, t: np.ndarray, h: np.ndarray
-) -> float:
-    """Farthest corner of the slices t ± h/2 into which the cells x (m, 4, 3) are cut [m].
+) -> np.ndarray:
+    """Farthest corner (k,) of the slices t ± h/2 into which the cells x (m, 4, 3) are cut [m].
 
     Sides 0-3 and 1-2, which the middle line does not cross, are cut in proportion. The triangles of
     a cell lie up to |x0 - x1 + x2 - x3| / 4 off the surface that these cuts follow.
@@ -235,7 +236,7 @@ def _reach(
             corner = X[:, u] + s * (X[:, v] - X[:, u])
             far = np.maximum(far, np.linalg.norm(corner - places, axis=1))
     bow = np.linalg.norm(X[:, 0] - X[:, 1] + X[:, 2] - X[:, 3], axis=1) / 4
-    return float((far + np.where(h[:, 0] < 1, bow, 0.0)).max(initial=0.0))
+    return far + np.where(h[:, 0] < 1, bow, 0.0)
 
 
 _HALVES = np.array([(0, 1, 2), (0, 2, 3)])

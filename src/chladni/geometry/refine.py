@@ -80,7 +80,7 @@ def _bent(
         np.einsum("ij,ij->i", d, n_a)[:, None] * n_a - np.einsum("ij,ij->i", d, n_b)[:, None] * n_b
     )
     both = (smooth[edges[:, 0]] & smooth[edges[:, 1]])[:, None]
-    return np.asarray((a + b) / 2 - np.where(both, lift / 8, 0.0))
+    return (a + b) / 2 - np.where(both, lift / 8, 0.0)
 
 
 def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:

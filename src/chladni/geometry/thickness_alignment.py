@@ -196,4 +196,4 @@ def _rotation(w: np.ndarray) -> np.ndarray:
         return np.eye(3)
     x, y, z = w / angle
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K

@@ -107,7 +107,7 @@ def _fit(X: np.ndarray, y: np.ndarray, weight: np.ndarray, rows: list[np.ndarray
     r = np.concatenate(rows)
     w = np.concatenate([weight[k] / weight[k].sum() for k in rows])
     root = np.sqrt(w)[:, None]
-    return np.asarray(np.linalg.lstsq(root * X[r], root[:, 0] * y[r], rcond=1e-10)[0])
+    return np.linalg.lstsq(root * X[r], root[:, 0] * y[r], rcond=1e-10)[0]
 
 
 def _strength(guess: np.ndarray, y: np.ndarray, weight: np.ndarray) -> float:

@@ -78,7 +78,7 @@ class Tabulated:
         run = X[k + 1] - X[k]
         slope = np.divide(Y[k + 1] - Y[k], run, out=np.zeros_like(u), where=run > 0)
         y = Y[k] + slope * (u - X[k])
-        return np.asarray(np.exp(y) if self.log_y else y)
+        return np.exp(y) if self.log_y else y
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class Excitation:
         b = np.zeros_like(f) if self.second is None else self.second(f)
         g = a * np.exp(1j * np.radians(b)) if self.polar else a + 1j * b
         turn = np.exp(1j * (self.phase - 2 * np.pi * f[:, None] * self.delay))
-        return np.asarray(self.amplitude * g[:, None] * turn)
+        return self.amplitude * g[:, None] * turn
 
 
 @dataclass(frozen=True, eq=False)

@@ -265,4 +265,4 @@ class Assembly:
 
     def thickness(self) -> np.ndarray:
         """Mean thickness of every shell (n,) [m]."""
-        return np.asarray(self.shells.thickness.mean(axis=1))
+        return self.shells.thickness.mean(axis=1)

@@ -36,7 +36,7 @@ class Between:
         way = np.sign(x) * np.abs(x) ** (1 / self.cluster)
         a, b = ends[:-1, None], ends[1:, None]
         f = np.append(((a + b) / 2 + (b - a) / 2 * way).ravel(), ends)
-        return np.asarray(np.exp(f) if self.logarithmic else f)
+        return np.exp(f) if self.logarithmic else f
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Times:
     def __call__(self, modes: np.ndarray) -> np.ndarray:
         """Products that lie in the band."""
         f = np.outer(modes, self.factors).ravel()
-        return np.asarray(f[(f >= self.low) & (f <= self.high) & (f > 0)])
+        return f[(f >= self.low) & (f <= self.high) & (f > 0)]
 
 
 def merged(lists: Sequence[np.ndarray]) -> np.ndarray:
@@ -59,4 +59,4 @@ def merged(lists: Sequence[np.ndarray]) -> np.ndarray:
     if not len(f):
         return f
     near = np.diff(f) < SAME * (f[-1] - f[0])
-    return np.asarray(f[np.append(True, ~near)])
+    return f[np.append(True, ~near)]

@@ -1,4 +1,7 @@
-"""Where to shake: every candidate's condition number (thesis table 2), drive point and rattle."""
+"""Where to shake: every candidate's condition number, drive point and rattle.
+
+The condition number is that of Echaniz Granado (2015), section 4.1.1 and table 2.
+"""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -92,7 +95,7 @@ def driving_point_residue(frequency: np.ndarray, phi: np.ndarray) -> np.ndarray:
 
     Its mean over the modes says how well a place drives, its least how surely it drives all.
     """
-    return np.asarray(np.asarray(phi) ** 2 / (4 * np.pi * np.asarray(frequency)))
+    return np.asarray(phi) ** 2 / (4 * np.pi * np.asarray(frequency))
 
 
 def rattle_margin(
@@ -119,7 +122,7 @@ def rattle_margin(
     closing = np.einsum("ir,gr,r->igr", np.abs(phi), np.abs(gap_shapes), peak).max(axis=2)
     with np.errstate(divide="ignore"):
         margin = np.where(closing > 0, np.asarray(clearance) / closing, np.inf)
-    return np.asarray(margin.min(axis=1, initial=np.inf))
+    return margin.min(axis=1, initial=np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,7 +69,7 @@ def ensemble(built: Structure, top: float, spread: float, progress: Progress = s
 
 def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:
     """Log factors of the parts' thickness, normal and clipped at two standard deviations."""
-    return np.asarray(spread * rng.standard_normal(n_parts).clip(-CLIP, CLIP))
+    return spread * rng.standard_normal(n_parts).clip(-CLIP, CLIP)
 
 
 def _solved(

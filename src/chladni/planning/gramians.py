@@ -91,7 +91,7 @@ def _gramian(omega: np.ndarray, zeta: np.ndarray, b1: np.ndarray, b2: np.ndarray
     V = c**2 * X + e * Y - q12
     W = np.stack([np.stack([X, Y / c], -1), np.stack([Z / a, V / (a * c)], -1)], -2)
     W = W.transpose(0, 2, 1, 3).reshape(2 * len(omega), -1)
-    return np.asarray((W + W.T) / 2)
+    return (W + W.T) / 2
 
 
 def gramians(system: StateSpace) -> tuple[np.ndarray, np.ndarray]:
@@ -103,10 +103,10 @@ def gramians(system: StateSpace) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gramian_quotient(W: np.ndarray, frequency: np.ndarray | None = None) -> float:
-    """Largest over smallest diagonal entry of a gramian (thesis 4.1.1); inf where one vanishes.
+    """Largest over smallest diagonal entry of a gramian; inf where one vanishes.
 
-    It depends on the coordinates: with ``frequency`` those of the thesis are taken, (η, η'), where
-    an observability gramian has ω_r² W for the velocity states.
+    It depends on the coordinates: with ``frequency`` those of Echaniz Granado (2015), section
+    4.1.1, are taken, (η, η'), where an observability gramian has ω_r² W for the velocity states.
     """
     diagonal = np.diag(W).copy()
     if frequency is not None:
@@ -121,7 +121,7 @@ def hankel_values(Wc: np.ndarray, Wo: np.ndarray) -> np.ndarray:
     """
     U, L = _factors(Wo)
     values = np.linalg.eigvalsh(L.T @ (U.T @ Wc @ U) @ L)
-    return np.asarray(np.sqrt(np.clip(values[..., ::-1], 0, None)))
+    return np.sqrt(np.clip(values[..., ::-1], 0, None))
 
 
 def _factors(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +138,7 @@ def condition(hankel: np.ndarray) -> np.ndarray:
     """Largest over smallest Hankel value: the lower, the better all modes are seen and driven."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = hankel[..., 0] / hankel[..., -1]
-    return np.asarray(np.where(hankel[..., -1] > 1e-12 * hankel[..., 0], ratio, np.inf))
+    return np.where(hankel[..., -1] > 1e-12 * hankel[..., 0], ratio, np.inf)
 
 
 @dataclass(frozen=True, eq=False)

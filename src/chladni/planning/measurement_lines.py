@@ -1,4 +1,7 @@
-"""Which frequencies to measure and how long that takes (thesis 4.2.5, table 3)."""
+"""Which frequencies to measure and how long that takes.
+
+Echaniz Granado (2015), section 4.2.5 and table 3.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +13,7 @@ from ..errors import ShapeError
 
 def half_bandwidth(frequency: np.ndarray, damping: np.ndarray | float) -> np.ndarray:
     """Width 2 ζ f of a resonance between its half-power points [Hz]."""
-    return np.asarray(2 * np.asarray(damping) * np.asarray(frequency))
+    return 2 * np.asarray(damping) * np.asarray(frequency)
 
 
 def even_lines(low: float, high: float, damping: float, per_bandwidth: float = 3.0) -> np.ndarray:
@@ -27,7 +30,7 @@ def even_lines(low: float, high: float, damping: float, per_bandwidth: float = 3
         raise ShapeError(f"no lines from {low} to {high} Hz with damping {damping}")
     step = np.log1p(2 * damping / per_bandwidth)
     count = int(np.ceil(np.log(high / low) / step - 1e-9))
-    return np.asarray(low * np.exp(step * np.arange(count + 1)))
+    return low * np.exp(step * np.arange(count + 1))
 
 
 def lines_for_poles(
@@ -61,9 +64,7 @@ def lines_per_bandwidth(
 ) -> np.ndarray:
     """Measured lines within the half-bandwidth f_r (1 ± ζ_r) of each mode (r,) int."""
     low, high = frequency * (1 - damping), frequency * (1 + damping)
-    return np.asarray(
-        np.searchsorted(lines, high, side="right") - np.searchsorted(lines, low, side="left")
-    )
+    return np.searchsorted(lines, high, side="right") - np.searchsorted(lines, low, side="left")
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Stage:
     def lines(self) -> np.ndarray:
         """Lines of the stage, its upper end left out [Hz]."""
         count = round(self.per_octave * float(np.log2(self.high / self.low)))
-        return np.asarray(self.low * (self.high / self.low) ** (np.arange(count) / count))
+        return self.low * (self.high / self.low) ** (np.arange(count) / count)
 
 
 TABLE_3 = (
@@ -88,7 +89,7 @@ TABLE_3 = (
     Stage(50, 100, 200, 80),
     Stage(100, 200, 200, 120),
     Stage(200, 400, 200, 300),
-)  # of the thesis, five sweeps
+)  # Echaniz Granado 2015, table 3, five sweeps
 
 
 def stage_lines(stages: Sequence[Stage]) -> np.ndarray:
@@ -114,12 +115,12 @@ def burst_random_time(resolution: float, averages: int) -> float:
 
 def delay_cycles(damping: np.ndarray | float, residual: float = 0.01) -> np.ndarray:
     """Cycles N after which a transient at resonance has decayed to e^(-2πζN) = residual."""
-    return np.asarray(np.ceil(-np.log(residual) / (2 * np.pi * np.asarray(damping))))
+    return np.ceil(-np.log(residual) / (2 * np.pi * np.asarray(damping)))
 
 
 def transient_left(damping: np.ndarray | float, cycles: np.ndarray | float) -> np.ndarray:
     """Share e^(-2πζN) of a transient at resonance that is left after N cycles."""
-    return np.asarray(np.exp(-2 * np.pi * np.asarray(damping) * np.asarray(cycles)))
+    return np.exp(-2 * np.pi * np.asarray(damping) * np.asarray(cycles))
 
 
 def delay_at(
@@ -134,7 +135,7 @@ def delay_at(
     width = half_bandwidth(frequency, damping)
     cycles = -np.log(residual) * f / (2 * np.pi * damping * frequency)
     near = np.abs(f - frequency) <= 5 * width
-    return np.asarray(np.ceil(np.where(near, cycles, 5.0).max(axis=1)))
+    return np.ceil(np.where(near, cycles, 5.0).max(axis=1))
 
 
 def lines_time(lines: np.ndarray, delay: np.ndarray, measure: float = 20.0) -> float:

@@ -44,7 +44,7 @@ class Linearised:
     def posterior(self, freed: np.ndarray) -> np.ndarray:
         """Standard deviation √diag(JᵀJ + I)⁻¹ of the freed, in prior ones: 1 = nothing learned."""
         J = self.jacobian[:, positions_of(freed, len(self))]
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(J.T @ J + np.eye(J.shape[1])))))
+        return np.sqrt(np.diag(np.linalg.inv(J.T @ J + np.eye(J.shape[1]))))
 
     def held_out(self, theta: np.ndarray) -> float:
         """Mean square Q of the held-out residuals."""

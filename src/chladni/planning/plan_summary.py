@@ -17,7 +17,9 @@ from .measurement_lines import (
 )
 from .whole_plan import Plan
 
-PER_BANDWIDTH = 4  # lines in every half-bandwidth; the thesis found three enough
+PER_BANDWIDTH = (
+    4  # lines in every half-bandwidth; three are enough, Echaniz Granado 2015, section 5.2
+)
 AVERAGES = 20
 SHOWN = 20  # actuators listed
 

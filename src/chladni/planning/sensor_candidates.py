@@ -60,13 +60,13 @@ class SensorCandidates:
     def moving(self, values: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Values of the points (n_points, ...) at (some of) the places."""
         at = values[self.nodes[which]]
-        return np.asarray(np.einsum("nc,nc...->n...", self.weights[which], at))
+        return np.einsum("nc,nc...->n...", self.weights[which], at)
 
 
 def centre_ids(assembly: Assembly) -> np.ndarray:
     """Numbers that no grid bears for the centres of all shells: 47 -> 100047 beside grid 12345."""
     longest = max(int(assembly.ids.max(initial=0)), int(assembly.shells.ids.max(initial=0)))
-    return np.asarray(assembly.shells.ids + 10 ** len(str(longest)))
+    return assembly.shells.ids + 10 ** len(str(longest))
 
 
 def find_sensor_candidates(
@@ -175,7 +175,7 @@ def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
     """Whether a corner of the shell around a place is a clear grid (n,)."""
     grids = np.zeros(int(every.nodes.max()) + 1, bool)
     grids[every.nodes[clear & every.is_grid, 0]] = True
-    return np.asarray(grids[every.nodes].any(axis=1))
+    return grids[every.nodes].any(axis=1)
 
 
 def _bend(
@@ -207,7 +207,7 @@ def _off_edges(seen: Surface, points: np.ndarray, foot: float) -> np.ndarray:
     dense = np.concatenate([a + t * (b - a) for t in (0.0, 0.25, 0.5, 0.75, 1.0)])
     if not len(dense):
         return np.ones(len(points), bool)
-    return np.asarray(cKDTree(dense).query(points)[0] >= foot)
+    return cKDTree(dense).query(points)[0] >= foot
 
 
 def _reachable(

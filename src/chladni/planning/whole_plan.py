@@ -1,4 +1,7 @@
-"""From a structure to a test plan (thesis 4.1): sensors with direction, shaker, cords, lines."""
+"""From a structure to a test plan: sensors with direction, shaker, cords, lines.
+
+The road is that of Echaniz Granado (2015), section 4.1.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -114,7 +117,7 @@ class Plan:
     openings : Openings           where sheets may meet
     together : (k,) int           the shakers that drive all modes most evenly together
     observable : (rank, states)
-    quotient : float              of the observability gramian (thesis 4.1.1)
+    quotient : float              of the observability gramian (Echaniz Granado 2015, section 4.1.1)
     auto_mac : (r, r)             at the sensors
     loaded : (r,)                 frequencies with the sensors' mass on [Hz]
     hangers : (k,) int            grids, the quietest first
@@ -250,13 +253,13 @@ def motion(built: Structure, modal: ModalModel) -> np.ndarray:
 def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
     """Translation of every point (n_points, 3, k) in vectors over the free dofs (n_free, k)."""
     u = built.T @ vectors
-    return np.asarray(u.reshape(len(built.assembly.points), 6, -1)[:, :3])
+    return u.reshape(len(built.assembly.points), 6, -1)[:, :3]
 
 
 def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
     """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
     at = places.moving(moving, mounts.place)
-    return np.asarray(np.einsum("mir,mi->mr", at, mounts.directions))
+    return np.einsum("mir,mi->mr", at, mounts.directions)
 
 
 def mounts_at(places: SensorCandidates) -> Mount:
@@ -327,7 +330,9 @@ def _only(kept: np.ndarray, n: int) -> Rules:
 
 
 def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int, float], ...]:
-    """Share of the layout that stays when more modes are targeted (thesis 4.1, figure 8).
+    """Share of the layout that stays when more modes are targeted.
+
+    Echaniz Granado (2015), section 4.1 and figure 8.
 
     Each entry is (modes, overlap of its layout with that of the entry before).
     """

@@ -100,3 +100,19 @@ class Section:
 
     title: str
     blocks: Sequence[Block]
+
+
+@dataclass(frozen=True)
+class PageParts:
+    """What a result puts on the page of its command.
+
+    Attributes
+    ----------
+    lead : the result in one sentence
+    files : (name, what it is) of what was written beside the page
+    """
+
+    lead: str
+    sections: Sequence[Section] = ()
+    notes: Sequence[str] = ()
+    files: Sequence[tuple[str, str]] = ()

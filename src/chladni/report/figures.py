@@ -1,16 +1,17 @@
-"""The pictures of a diagnosis or calibration, from its JSON and its curves."""
+"""The pictures of a result: where it is, how much it helps, frequencies, responses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
 from ..ema.correlation import deviation
+from ..updating.result import Alternative, Location, NamedEffect, Scores
 from ..view import plots, scene
 from ..view.surface import Surface
+from ..workflows.diagnosis_result import DiagnosisResult
 
 _GRID = 8  # channels in the overview
 Bands = Sequence[tuple[float, float]]
@@ -18,7 +19,7 @@ Bands = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What there is to draw beside the numbers of ``diagnosis.json``.
+    """What there is to draw beside the numbers of a result.
 
     Attributes
     ----------
@@ -26,6 +27,7 @@ class Shown:
     parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
     curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
     held_out : labels of outputs that were not fitted
+    compared : False where the responses are only shown, because frequencies were compared
     fitted, excluded : bands [Hz]
     outputs, inputs : sensors and shakers as markers
     mac : (test modes, model modes) after, with their frequencies [Hz], or None
@@ -36,6 +38,7 @@ class Shown:
     ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     curves: Mapping[str, FRF] = field(default_factory=dict)
     held_out: Sequence[str] = ()
+    compared: bool = True
     fitted: Bands = ()
     excluded: Bands = ()
     outputs: Sequence[scene.Marker] = ()
@@ -43,96 +46,106 @@ class Shown:
     mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
 
-def figures(folder: Path, d: Mapping[str, Any], shown: Shown) -> dict[str, Path]:
-    """Draw all that the data allows into ``folder``: {name known to the page: path}."""
-    made = _places(folder, d, shown)
-    made |= _scores(folder, d)
-    made |= _frequencies(folder, d, shown)
-    return made | _curves(folder, shown)
+def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
+    """Draw all that the result allows into ``folder``: {name known to the page: path}."""
+    rows = [(r.test_hz, r.before_hz, r.after_hz) for r in result.frequencies]
+    made = _places(folder, result, shown) | setup(folder, shown)
+    made |= _scores(folder, result)
+    made |= frequencies(folder, rows) | mac_picture(folder, shown)
+    return made | curves(folder, shown)
 
 
-def _places(folder: Path, d: Mapping[str, Any], shown: Shown) -> dict[str, Path]:
+def _places(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
     made = {}
-    for k, effect in enumerate(d.get("effects") or []):
+    for k, effect in enumerate(result.effects):
         name = "where" if k == 0 else f"where_{k + 1}"
         if (path := _where(folder / f"{name}.png", effect, shown)) is not None:
             made[name] = path
-    if shown.outputs or shown.inputs:
-        path = folder / "setup.png"
-        made["setup"] = scene.sensors(path, shown.seen, shown.outputs, shown.inputs)
     return made
 
 
-def _where(path: Path, effect: Mapping[str, Any], shown: Shown) -> Path | None:
+def setup(folder: Path, shown: Shown) -> dict[str, Path]:
+    """Where sensors and shakers sit."""
+    if not (shown.outputs or shown.inputs):
+        return {}
+    path = folder / "setup.png"
+    return {"setup": scene.sensors(path, shown.seen, shown.outputs, shown.inputs)}
+
+
+def _where(path: Path, effect: NamedEffect, shown: Shown) -> Path | None:
     """A marked point, else the middle of the grids, else the parts in colour."""
-    where = effect.get("where") or {}
-    point, grids = where.get("point_m"), list(where.get("grids") or [])
-    if point is None and grids and len(shown.ids):
-        point = shown.seen.points[np.isin(shown.ids, grids)].mean(axis=0)  # rows as ids
-    faces = None if point is not None else _of_parts(where, shown)
-    if point is None and faces is None:
+    where, place = effect.where, None
+    if where.point_m is not None:
+        place = np.array(where.point_m, dtype=float)
+    elif where.grids and len(shown.ids):
+        place = shown.seen.points[np.isin(shown.ids, where.grids)].mean(axis=0)  # rows as ids
+    faces = None if place is not None else _of_parts(where, shown)
+    if place is None and faces is None:
         return None
-    text = " – ".join(str(t) for t in (effect.get("name"), where.get("text")) if t)
-    radius = float(where.get("radius_m") or 0.0)
-    place = None if point is None else np.asarray(point, dtype=float)
-    return scene.location(path, shown.seen, place, radius, text, faces)
+    text = " – ".join(t for t in (effect.name, where.text) if t)
+    return scene.location(path, shown.seen, place, where.radius_m or 0.0, text, faces)
 
 
-def _of_parts(where: Mapping[str, Any], shown: Shown) -> np.ndarray | None:
+def _of_parts(where: Location, shown: Shown) -> np.ndarray | None:
     """Faces of the parts that are named (m,) bool."""
-    named = np.isin(list(shown.parts), [str(p) for p in where.get("parts") or []])
+    named = np.isin(list(shown.parts), list(where.parts))
     return named[np.asarray(shown.seen.part)] if named.any() else None
 
 
-def _scores(folder: Path, d: Mapping[str, Any]) -> dict[str, Path]:
-    made, fit = {}, d.get("fit") or {}
-    for name, q in (("waterfall", fit), ("held_out", fit.get("held_out") or {})):
-        steps = {label: q[key] for label, key in _STEPS if q.get(key) is not None}
-        if len(steps) > 1:
-            path = folder / f"{name}.png"
-            made[name] = plots.waterfall(path, steps, q.get("Q_floor"))
-    evidence = {
-        str(h["name"]): float(h["log_evidence"])
-        for h in [*(d.get("effects") or []), *(d.get("alternatives") or [])]
-        if h.get("log_evidence") is not None
-    }
+def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
+    made = {}
+    if result.agreement is not None:
+        sides = (("waterfall", result.agreement.fitted), ("held_out", result.agreement.held_out))
+        for name, q in sides:
+            if len(steps := _steps(q, bool(result.effects))) > 1:
+                made[name] = plots.waterfall(folder / f"{name}.png", steps, q.floor)
+    tried: list[NamedEffect | Alternative] = [*result.effects, *result.alternatives]
+    evidence = {h.name: h.log_evidence for h in tried if h.log_evidence is not None}
     if len(evidence) > 1:
         made["evidence"] = plots.evidence_bars(folder / "evidence.png", evidence)
     return made
 
 
-_STEPS = (
-    ("nominal", "Q_nominal"),
-    ("calibrated", "Q_calibrated"),
-    ("with the effect", "Q_with_effect"),
-)
+def _steps(q: Scores, named: bool) -> dict[str, float]:
+    """Q of the decks, in the order in which they came about; without an effect there are two."""
+    steps = {"nominal": q.nominal, "calibrated": q.calibrated}
+    if named:
+        steps["with the effect"] = q.with_effect
+    return {name: value for name, value in steps.items() if value is not None}
 
 
-def _frequencies(folder: Path, d: Mapping[str, Any], shown: Shown) -> dict[str, Path]:
-    made, held = {}, [r for r in d.get("frequencies") or [] if r.get("test_hz")]
-    if held:
-        test, before, after = (
-            np.array([r.get(key) or np.nan for r in held], dtype=float)
-            for key in ("test_hz", "before_hz", "after_hz")
-        )
-        path = folder / "frequencies.png"
-        changed = after if np.isfinite(after).any() else None
-        made["frequencies"] = plots.frequency_ladder(path, test, before, changed)
-    if shown.mac is not None:
-        mac, test, model = shown.mac
-        rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
-        title = "MAC: test (rows), model (columns)"
-        made["mac"] = plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)
-    return made
+def frequencies(
+    folder: Path, rows: Sequence[tuple[float, float | None, float | None]]
+) -> dict[str, Path]:
+    """Frequencies of the test, of the model before and, where there is one, after [Hz]."""
+    held = [r for r in rows if r[0]]
+    if not held:
+        return {}
+    test, before, after = np.array([[v or np.nan for v in r] for r in held], dtype=float).T
+    changed = after if np.isfinite(after).any() else None
+    path = folder / "frequencies.png"
+    return {"frequencies": plots.frequency_ladder(path, test, before, changed)}
 
 
-def _curves(folder: Path, shown: Shown) -> dict[str, Path]:
+def mac_picture(folder: Path, shown: Shown) -> dict[str, Path]:
+    """MAC of test and model modes."""
+    if shown.mac is None:
+        return {}
+    mac, test, model = shown.mac
+    rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
+    title = "MAC: test (rows), model (columns)"
+    return {"mac": plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)}
+
+
+def curves(folder: Path, shown: Shown) -> dict[str, Path]:
     """One typical channel of each kind, and an overview: not the best ones, the median ones."""
     if "test" not in shown.curves:
         return {}
     test, made = shown.curves["test"], {}
     held = [o for o in test.outputs if o in set(shown.held_out)]
     kinds = {"frf_fitted": [o for o in test.outputs if o not in held], "frf_held_out": held}
+    if not shown.compared:
+        kinds = {"frf": list(test.outputs)}
     typical = {name: _typical(shown, labels) for name, labels in kinds.items() if labels}
     for name, (output, drive) in typical.items():
         title = f"{output} from {drive}" + (" (held out)" if name == "frf_held_out" else "")

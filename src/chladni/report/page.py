@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from ..output import write_text
+from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Picture, Section
 from .verdict import HEADING, TONE, sections, sentence
 
@@ -20,7 +20,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 def write_page(
     folder: Path | str,
-    diagnosis: Mapping[str, Any],
+    result: DiagnosisResult,
     figures: Mapping[str, Path] | None = None,
     notes: Sequence[str] = (),
     tables: Sequence[Section] = (),
@@ -31,7 +31,7 @@ def write_page(
 
     Parameters
     ----------
-    diagnosis : dict   as ``diagnosis.json`` (verdict, effects, alternatives, fit, mass, ...)
+    result : DiagnosisResult
     figures : dict     name to picture; ``where`` stands on top, known names are put in their
                        section, others at the end (``verdict.PLACES`` lists the known ones)
     notes : sentences  what was done and why
@@ -39,14 +39,13 @@ def write_page(
     command : str      the line that makes this run again
     """
     shown = {name: Path(path) for name, path in (figures or {}).items()}
-    verdict = str(diagnosis.get("verdict", ""))
     return write_sections(
         Path(folder) / "report.html",
         title or "Diagnosis",
-        sections(diagnosis, shown, notes, tables, command),
-        lead=sentence(diagnosis),
-        badge=HEADING.get(verdict, verdict),
-        tone=TONE.get(verdict, "neutral"),
+        sections(result, shown, notes, tables, command),
+        lead=sentence(result),
+        badge=HEADING.get(result.verdict, result.verdict),
+        tone="warn" if result.distrust else TONE.get(result.verdict, "neutral"),
         hero=shown.get("where"),
     )
 

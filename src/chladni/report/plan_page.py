@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 
 from ..fem.assemble import Structure
-from ..planning.plan_summary import AVERAGES, PER_BANDWIDTH
+from ..output import write_text
+from ..planning.plan_summary import AVERAGES, PER_BANDWIDTH, sensors_csv
 from ..planning.whole_plan import Plan, motion
 from ..view import plots, scene
 from ..view.surface import Surface
-from .blocks import Facts, Items, Picture, Section, Table, Text
+from ..workflows.loaded_model import Model
+from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
 from .words import number
 
 PICTURES = {
@@ -19,6 +21,14 @@ PICTURES = {
     "auto_mac.png": "AutoMAC at the sensors",
     "modes.png": "the modes the sensors see least",
 }
+
+
+def plan_page(folder: Path, model: Model, found: Plan, result: dict[str, Any]) -> PageParts:
+    """Sections of the page; its pictures and the table of sensors are written into the folder."""
+    write_text(folder / "sensors.csv", sensors_csv(found))
+    body = sections(found, result, model.seen, model.structure, folder)
+    files = [("sensors.csv", "sensors and shakers, for case.toml"), *PICTURES.items()]
+    return PageParts(lead(result), body, notes(found), files)
 
 
 def lead(result: dict[str, Any]) -> str:

@@ -1,9 +1,10 @@
-"""A diagnosis in words and tables: the contents of its page, from ``diagnosis.json``."""
+"""A diagnosis in words and tables: the contents of its page."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from ..updating.result import Agreement, Estimate, Location, NamedEffect, Scores
+from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
 from .words import interval, number, percent, quantity
 
@@ -24,7 +25,10 @@ TONE = {
     "not in catalogue": "warn",
 }
 PLACES = {  # name of a figure: (section it belongs to, caption)
-    "frf": ("frf", "One channel: test, model before, model after."),
+    "frf": (
+        "frf",
+        "A typical channel: test, model before, model after; frequencies were compared, not this.",
+    ),
     "frf_fitted": ("frf", "A channel that was fitted."),
     "frf_held_out": ("frf", "A channel the fit never saw."),
     "frf_grid": ("frf", "Channels spread evenly over the list."),
@@ -48,12 +52,12 @@ _FILES = {
 }
 
 
-def sentence(d: Mapping[str, Any]) -> str:
+def sentence(result: DiagnosisResult) -> str:
     """The verdict in one sentence."""
-    verdict, effects, gain = d.get("verdict", ""), d.get("effects") or [], _gain(d)
-    names = " and ".join(e.get("name", "?") for e in effects)
-    claims = "; ".join(e["claim"] for e in effects if e.get("claim"))
-    places = "; ".join(p for e in effects if (p := _where(e)))
+    verdict, gain = result.verdict, _gain(result.agreement)
+    names = " and ".join(e.name for e in result.effects)
+    claims = "; ".join(e.claim for e in result.effects if e.claim)
+    places = "; ".join(e.where.text for e in result.effects if e.where.text)
     what = f"{names}{f' ({claims})' if claims else ''}{f', {places}' if places else ''}"
     if verdict == "missing physics":
         return f"The model lacks {what}{gain}."
@@ -62,7 +66,7 @@ def sentence(d: Mapping[str, Any]) -> str:
     if verdict == "nonlinear":
         why = what or "no linear model fits"
         return f"The structure does not answer in proportion to the force: {why}."
-    if "alternatives" in d and not d["alternatives"] and not effects:
+    if not result.searched and not result.effects:
         return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
@@ -71,11 +75,11 @@ def sentence(d: Mapping[str, Any]) -> str:
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."
-    return str(verdict)
+    return verdict
 
 
 def sections(
-    d: Mapping[str, Any],
+    result: DiagnosisResult,
     figures: Mapping[str, Path],
     notes: Sequence[str],
     more: Sequence[Section],
@@ -92,51 +96,47 @@ def sections(
 
     rest = [Picture(p, n) for n, p in figures.items() if n not in PLACES and n != "where"]
     return [
-        Section("At a glance", _glance(d)),
-        Section("What was found", _effects(d)),
+        Section("Not to be trusted", [Items(result.distrust)] if result.distrust else []),
+        Section("At a glance", _glance(result)),
+        Section("What was found", _effects(result.effects)),
+        Section("What was calibrated", _calibrated(result)),
         Section("Test and model", shown("frf")),
-        Section("Scores", [*_scores(d), *shown("scores")]),
-        Section("Frequencies", [*_frequencies(d), *shown("modes")]),
-        Section("Why not something else", [*_alternatives(d), *shown("why")]),
+        Section("Scores", [*_scores(result), *shown("scores")]),
+        Section("Frequencies", [*_frequencies(result), *shown("modes")]),
+        Section("Why not something else", [*_alternatives(result), *shown("why")]),
         Section("The test", shown("test")),
         Section("What was done, and why", [Items(list(notes))] if notes else []),
         *more,
         Section("More pictures", rest),
-        Section("Files", _files(d)),
+        Section("Files", _files(result)),
         Section("Run it again", [Code([command])] if command else []),
     ]
 
 
-def _gain(d: Mapping[str, Any]) -> str:
-    held = (d.get("fit") or {}).get("held_out") or {}
-    after = held.get("Q_with_effect", held.get("Q_calibrated"))
-    if not held.get("Q_nominal") or after is None:
+def _gain(agreement: Agreement | None) -> str:
+    held = Scores() if agreement is None else agreement.held_out
+    if not held.nominal or held.after is None:
         return ""
     return (
-        f"; on data the fit never saw the deviation Q goes from {number(held['Q_nominal'], 3)} "
-        f"to {number(after, 3)}"
+        f"; on data the fit never saw the deviation Q goes from {number(held.nominal, 3)} "
+        f"to {number(held.after, 3)}"
     )
 
 
-def _where(effect: Mapping[str, Any]) -> str:
-    return str((effect.get("where") or {}).get("text") or "")
-
-
-def _glance(d: Mapping[str, Any]) -> list[Block]:
-    fit, mass = d.get("fit") or {}, d.get("mass") or {}
-    held = fit.get("held_out") or {}
-    facts = []
-    for name, q in (("Q, fitted data", fit), ("Q, held-out data", held)):
-        after = q.get("Q_with_effect", q.get("Q_calibrated"))
-        if q.get("Q_nominal") is not None and after is not None:
-            change = percent(after, q["Q_nominal"])
-            facts.append((name, f"{number(q['Q_nominal'], 3)} → {number(after, 3)}  ({change})"))
-    if mass.get("model_kg") is not None:
-        weighed = f", weighed {number(mass['weighed_kg'])}" if mass.get("weighed_kg") else ""
-        facts.append(("Mass", f"model {number(mass['model_kg'])} kg{weighed}"))
-    rows = [r for r in d.get("frequencies") or [] if r.get("test_hz")]
+def _glance(result: DiagnosisResult) -> list[Block]:
+    facts, agreement, mass = [], result.agreement or Agreement(), result.mass
+    for name, q in (
+        ("Q, fitted data", agreement.fitted), ("Q, held-out data", agreement.held_out)
+    ):  # fmt: skip
+        if q.nominal is not None and q.after is not None:
+            change = percent(q.after, q.nominal)
+            facts.append((name, f"{number(q.nominal, 3)} → {number(q.after, 3)}  ({change})"))
+    if mass is not None and mass.model_kg is not None:
+        weighed = f", weighed {number(mass.weighed_kg)}" if mass.weighed_kg else ""
+        facts.append(("Mass", f"model {number(mass.model_kg)} kg{weighed}"))
+    rows = [r for r in result.frequencies if r.test_hz]
     for name, key in (("before", "before_hz"), ("after", "after_hz")):
-        off = [abs(r[key] / r["test_hz"] - 1) for r in rows if r.get(key)]
+        off = [abs(f / r.test_hz - 1) for r in rows if (f := getattr(r, key))]
         if off:
             mean, worst = 100 * sum(off) / len(off), 100 * max(off)
             text = f"mean {number(mean, 2)} %, worst {number(worst, 2)} % off"
@@ -144,12 +144,12 @@ def _glance(d: Mapping[str, Any]) -> list[Block]:
     return [Facts(facts)] if facts else []
 
 
-def _effects(d: Mapping[str, Any]) -> list[Block]:
+def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
     blocks: list[Block] = []
-    for effect in d.get("effects") or []:
-        blocks.append(Text([": ".join(str(effect[k]) for k in ("name", "claim") if effect.get(k))]))
-        rows = [(p.get("name", ""), _interval(p)) for p in effect.get("parameters") or []]
-        place = [(name, text) for name, text in _place(effect.get("where") or {}) if text]
+    for effect in effects:
+        blocks.append(Text([": ".join(t for t in (effect.name, effect.claim) if t)]))
+        rows = [(p.name, _interval(p)) for p in effect.parameters]
+        place = [(name, text) for name, text in _place(effect.where) if text]
         if rows:
             blocks.append(Table(("parameter", "value (interval)"), rows, ("parameter",)))
         if place:
@@ -157,83 +157,112 @@ def _effects(d: Mapping[str, Any]) -> list[Block]:
     return blocks
 
 
-def _interval(p: Mapping[str, Any]) -> str:
-    return interval(p.get("value"), p.get("low"), p.get("high"), p.get("unit") or "")
+def _interval(p: Estimate) -> str:
+    return interval(p.value, p.low, p.high, p.unit)
 
 
-def _place(where: Mapping[str, Any]) -> list[tuple[str, str]]:
-    point, radius, band = where.get("point_m"), where.get("radius_m"), where.get("band_hz")
-    grids = [str(g) for g in where.get("grids") or []]
+def _place(where: Location) -> list[tuple[str, str]]:
+    grids, band = [str(g) for g in where.grids], where.band_hz
     some = ", ".join(grids[:12]) + (f" … ({len(grids)} in all)" if len(grids) > 12 else "")
     at = ""
-    if point:
-        at = "(" + ", ".join(number(x) for x in point) + ") m"
-        at += f", within {quantity(radius, 'm')}" if radius else ""
+    if where.point_m:
+        at = "(" + ", ".join(number(x) for x in where.point_m) + ") m"
+        at += f", within {quantity(where.radius_m, 'm')}" if where.radius_m else ""
     return [
-        ("place", str(where.get("text") or "")),
-        ("parts", ", ".join(str(p) for p in where.get("parts") or [])),
+        ("place", where.text),
+        ("parts", ", ".join(str(p) for p in where.parts)),
         ("grids", some),
         ("point", at),
         ("band", f"{number(band[0])} to {number(band[1])} Hz" if band else ""),
-        ("channels", ", ".join(str(c) for c in where.get("channels") or [])),
+        ("channels", ", ".join(str(c) for c in where.channels)),
     ]
 
 
-def _scores(d: Mapping[str, Any]) -> list[Block]:
-    fit = d.get("fit") or {}
-    held = fit.get("held_out") or {}
+def _calibrated(result: DiagnosisResult) -> list[Block]:
+    """Values of the deck that the updated deck has otherwise."""
+    if not (result.calibrated and result.deck_changed):
+        return []
+    rows = [
+        (
+            c.where,
+            quantity(c.deck_value, c.estimate.unit),
+            _interval(c.estimate),
+            percent(c.estimate.value, c.deck_value),
+        )
+        for c in result.calibrated
+    ]
+    heads = ("parameter", "deck", "updated deck (interval)", "change")
+    return [Table(heads, rows, ("parameter",), _REACHED)]
+
+
+_REACHED = "What this brings is under Scores and Frequencies: before, and after."
+
+
+def _scores(result: DiagnosisResult) -> list[Block]:
+    if result.agreement is None:
+        return []
+    fit, held = result.agreement.fitted, result.agreement.held_out
     steps = (
-        ("nominal model", "Q_nominal"),
-        ("calibrated, nothing added", "Q_calibrated"),
-        ("with the effect", "Q_with_effect"),
-        ("floor (noise, repeats)", "Q_floor"),
+        ("nominal deck", "nominal", False),
+        ("calibrated deck, nothing added", "calibrated", True),
+        *((("updated deck", "with_effect", True),) if result.effects else ()),
+        ("the last of these, its mesh infinitely fine", "with_mesh_error", False),
+        ("and what scatter could explain taken out", "with_scatter", False),
+        ("floor: the recording's noise alone", "floor", False),
     )
     rows = []
-    for name, key in steps:
-        if fit.get(key) is None and held.get(key) is None:
+    for name, key, changed in steps:
+        values = [getattr(q, key) for q in (fit, held)]
+        if values == [None, None]:
             continue
         changes = ["–", "–"]
-        if key in ("Q_calibrated", "Q_with_effect"):
-            changes = [percent(q.get(key), q.get("Q_nominal")) for q in (fit, held)]
-        rows.append((name, number(fit.get(key)), changes[0], number(held.get(key)), changes[1]))
+        if changed:
+            changes = [percent(v, q.nominal) for v, q in zip(values, (fit, held), strict=True)]
+        rows.append((name, number(values[0]), changes[0], number(values[1]), changes[1]))
     if not rows:
         return []
     columns = ("model", "Q fitted", "change", "Q held out", "change ")
-    what = f"Held out: {held['what']}. " if held.get("what") else ""
-    meaning = "Q: mean over channels and lines of |log10(H model / H test)|²; lower is better."
-    return [Table(columns, rows, ("model",), what + meaning)]
+    what = f"Held out: {result.agreement.what}. " if result.agreement.what else ""
+    return [Table(columns, rows, ("model",), what + _MEANING[result.compared])]
 
 
-def _frequencies(d: Mapping[str, Any]) -> list[Block]:
+_MEANING = {
+    "responses": "Q: mean over channels and lines of |log10(H model / H test)|²; lower is better. "
+    "That of a deck is the deck's own: whoever runs it finds the same.",
+    "frequencies": "Q: mean over the paired frequencies of |log10(f model / f test)|²; lower is "
+    "better. That of a deck is the deck's own: whoever runs it finds the same.",
+}
+
+
+def _frequencies(result: DiagnosisResult) -> list[Block]:
     rows = [
         (
-            number(r.get("test_hz")),
-            number(r.get("before_hz")),
-            percent(r.get("before_hz"), r.get("test_hz")),
-            number(r.get("after_hz")),
-            percent(r.get("after_hz"), r.get("test_hz")),
-            number(r.get("mac_before"), 3),
-            number(r.get("mac_after"), 3),
+            number(r.test_hz),
+            number(r.before_hz),
+            percent(r.before_hz, r.test_hz),
+            number(r.after_hz),
+            percent(r.after_hz, r.test_hz),
+            number(r.mac_before, 3),
+            number(r.mac_after, 3),
         )
-        for r in d.get("frequencies") or []
+        for r in result.frequencies
     ]
     heads = ("test [Hz]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before", "MAC after")
     return [Table(heads, rows)] if rows else []
 
 
-def _alternatives(d: Mapping[str, Any]) -> list[Block]:
-    named = [e.get("log_evidence") for e in d.get("effects") or []]
+def _alternatives(result: DiagnosisResult) -> list[Block]:
+    named = [e.log_evidence for e in result.effects]
     top = max((value for value in named if value is not None), default=None)
     rows = []
-    for other in d.get("alternatives") or []:
-        value = other.get("log_evidence")
+    for other in result.alternatives:
+        value = other.log_evidence
         below = None if value is None or top is None else value - top
-        why = other.get("why_not") or ""
-        rows.append((other.get("name", ""), number(value), number(below), why))
+        rows.append((other.name, number(value), number(below), other.why_not))
     heads = ("explanation", "log evidence", "against the best", "why not")
     return [Table(heads, rows, ("explanation", "why not"))] if rows else []
 
 
-def _files(d: Mapping[str, Any]) -> list[Block]:
-    files = [(str(f), _FILES.get(name, name)) for name, f in (d.get("files") or {}).items() if f]
+def _files(result: DiagnosisResult) -> list[Block]:
+    files = [(str(f), _FILES.get(name, name)) for name, f in result.files.items() if f]
     return [Links(files)] if files else []

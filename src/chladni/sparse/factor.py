@@ -58,7 +58,7 @@ class SuperLUFactor:
 
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B."""
-        return np.asarray(self._lu.solve(np.asarray(B)))
+        return self._lu.solve(np.asarray(B))
 
 
 class CholmodFactor:
@@ -79,7 +79,7 @@ class CholmodFactor:
 
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B."""
-        return np.asarray(self._factor(np.asarray(B)))
+        return self._factor(np.asarray(B))
 
 
 def factorise(

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect
-from .reduced_model import Reduced, State, evaluate, log_fields, slices
+from .reduced_model import Reduced, State, evaluate, log_fields, mass_log, slices, stiffness_log
 from .reduced_problem import Workbench
 
 LIMIT = 5e-4  # relative frequency error of a basis that still serves
@@ -92,7 +92,7 @@ def _improved(
         np.block([[own, modes.T @ AZ], [(modes.T @ AZ).T, Z.T @ AZ]])
         for own, AZ in ((K, KZ), (B, MZ))
     )
-    return np.asarray(sl.eigh((K + K.T) / 2, (B + B.T) / 2, eigvals_only=True))
+    return sl.eigh((K + K.T) / 2, (B + B.T) / 2, eigvals_only=True)
 
 
 def products(
@@ -104,12 +104,12 @@ def products(
     logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces().items():
-        own = logs["E"] + (logs[name] if name else 0.0)
         change = change + sum(
-            np.expm1(own + power * logs["t"]) * A for A, power in zip(pair, (1, 3), strict=True)
+            np.expm1(stiffness_log(logs, name, power)) * A
+            for A, power in zip(pair, (1, 3), strict=True)
         )
     K = K + _spread(model, np.asarray(change), q)
-    M = M + _spread(model, np.expm1(logs["rho"] + logs["t"]) * groups.mass, q)
+    M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, q)
     for effect, at in slices(effects):
         for term in effect.terms(x[at]):
             added = term.rows.T @ (term.coefficient[:, None] * (term.rows @ q))
@@ -128,4 +128,4 @@ def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:
     gather = sp.csr_array(
         (np.ones(dofs.size), (dofs.ravel(), np.arange(dofs.size))), shape=(T.shape[0], dofs.size)
     )
-    return np.asarray(T.T @ (gather @ force.reshape(dofs.size, -1)))
+    return T.T @ (gather @ force.reshape(dofs.size, -1))

@@ -24,7 +24,7 @@ class Data(Protocol):
     """Residuals of a state, whitened so that their expected square is one."""
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """R (n,) and ∂r/∂x (n, n_p)."""
+        """r (n,) and ∂r/∂x (n, n_p)."""
 
     def over(self, model: Reduced) -> Self:
         """The same data seen through another basis."""

@@ -18,13 +18,13 @@ SEEN = 1.5  # decades of visibility over which that price falls to one
 def price_alone(strength: np.ndarray) -> np.ndarray:
     """Price of leaving test poles alone, by peak height relative to the highest (n,)."""
     share = np.clip(1 - STRONG + np.log10(np.maximum(strength, 1e-9)), 0, 1)
-    return np.asarray(FAINT + (STRANGER - FAINT) * share)
+    return FAINT + (STRANGER - FAINT) * share
 
 
 def price_missed(visibility: np.ndarray) -> np.ndarray:
     """Price of leaving model modes alone, by visibility relative to the strongest (m,)."""
     share = np.clip(1 + np.log10(np.maximum(visibility, 1e-9)) / SEEN, 0, 1)
-    return np.asarray(1 + (MISSED - 1) * share)
+    return 1 + (MISSED - 1) * share
 
 
 def paired(

@@ -16,8 +16,9 @@ from ..effects.effect import Effect
 from ..effects.ordinary import PartScale, defaults, gain, ordinary, scatter
 from ..effects.surroundings import Setup
 from ..ema.identification import equalised, identify
-from ..fem.assemble import Structure, structure
+from ..ema.recording_noise import equalised_noise
 from ..fem.energy import mass_properties
+from ..fem.modelled import Modelled, modelled
 from .hypothesis_fit import Search
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
@@ -29,6 +30,7 @@ ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough 
 ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
+SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
 
 
 def prepare(question: Question) -> Prepared:
@@ -51,11 +53,10 @@ def _by_responses(question: Question) -> Prepared:
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
-    built = structure(question.assembly)
+    nominal = modelled(question.assembly, SOLVED * top)
+    built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    bench = workbench(
-        question.assembly, top, sp.csr_array(sp.vstack([rows_o, rows_i])), built=built
-    )
+    bench = workbench(nominal, top, sp.csr_array(sp.vstack([rows_o, rows_i])))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     data = []
@@ -65,7 +66,7 @@ def _by_responses(question: Question) -> Prepared:
         data.append(
             Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
         )
-    nuisance = nuisances(bench, built, top)
+    nuisance = nuisances(bench, nominal, top)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, top)
@@ -94,7 +95,8 @@ def _by_responses(question: Question) -> Prepared:
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     notes += _mass_note(question)
-    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), found)
+    noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
+    return Prepared(search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
@@ -156,8 +158,10 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
-    built = structure(question.assembly)
-    bench = workbench(question.assembly, top, built=built, groups=48)
+    highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
+    nominal = modelled(question.assembly, SOLVED * highest)
+    built = nominal.structure
+    bench = workbench(nominal, top, groups=48)
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -169,21 +173,21 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
     ).over(bench.model)
-    nuisance = nuisances(bench, built, top)
+    nuisance = nuisances(bench, nominal, top)
     search = searched(question, bench, data, nuisance, top)
     what = f"the {int(held.sum())} highest of {len(held)} frequencies"
     notes = (*notes, *_mass_note(question))
-    return Prepared(search, data, held, what, notes, found, ~held)
+    return Prepared(search, data, held, what, notes, nominal, None, found, ~held)
 
 
-def nuisances(bench: Workbench, built: Structure, top: float) -> list[Effect]:
+def nuisances(bench: Workbench, model: Modelled, top: float) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
     out: list[Effect] = [
         scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
-    if (mesh := mesh_error(built, top)) is not None:
+    if (mesh := mesh_error(model, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(built, top, mesh)]
+    return [*out, jitter(model, top, mesh)]
 
 
 def searched(

@@ -7,6 +7,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
 from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
 from .hypothesis_fit import Search
 from .likelihood import Poles, Responses
@@ -47,6 +48,8 @@ class Prepared:
     held : samples held out, in the shape of ``score.use``
     what : the held-out data in words
     notes : how the recording was read, and why
+    nominal : the structure of the deck, its modes solved as far as anyone here asks
+    noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
     """
 
     search: Search
@@ -54,5 +57,7 @@ class Prepared:
     held: np.ndarray
     what: str
     notes: tuple[str, ...]
+    nominal: Modelled
+    noise: np.ndarray | None = None
     identified: Identified | None = None
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes

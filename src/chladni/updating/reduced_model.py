@@ -113,7 +113,7 @@ def _bordered(old: np.ndarray, side: np.ndarray, corner: np.ndarray) -> np.ndarr
     """[[old, side], [sideᵀ, corner]] over the last two axes."""
     top = np.concatenate([old, side], axis=-1)
     low = np.concatenate([side.swapaxes(-1, -2), corner], axis=-1)
-    return np.asarray(np.concatenate([top, low], axis=-2))
+    return np.concatenate([top, low], axis=-2)
 
 
 def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
@@ -239,6 +239,20 @@ def log_fields(
     return logs, slopes
 
 
+def stiffness_log(fields: dict[str, np.ndarray], component: str, power: int) -> np.ndarray:
+    """E + p t + Q: the logarithm of what multiplies stiffness that grows with t^p.
+
+    It is linear in the fields, so it stands for their gradients as well; (g, ...) as they are.
+    """
+    plain = fields["E"] + power * fields["t"]
+    return plain + fields[component] if component else plain
+
+
+def mass_log(fields: dict[str, np.ndarray]) -> np.ndarray:
+    """ρ + t: the logarithm of what multiplies the shells' mass, or its gradient."""
+    return fields["rho"] + fields["t"]
+
+
 def _shells(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -249,18 +263,14 @@ def _shells(
     dK, dM = np.zeros((n_p, r * r)), np.zeros((n_p, r * r))
     for stacks, power in ((model.linear, 1), (model.cubic, 3)):
         for name, stack in stacks.items():
-            component = logs[name] if name else 0.0
-            w = np.exp(logs["E"] + power * logs["t"] + component)
-            flat = stack.reshape(len(w), -1)
+            w, flat = np.exp(stiffness_log(logs, name, power)), stack.reshape(len(stack), -1)
             K += w @ flat
             if gradient:
-                slope = slopes["E"] + power * slopes["t"] + (slopes[name] if name else 0.0)
-                dK += _weighted(w[:, None] * slope, flat)
-    w = np.exp(logs["rho"] + logs["t"])
-    flat = model.mass.reshape(len(w), -1)
+                dK += _weighted(w[:, None] * stiffness_log(slopes, name, power), flat)
+    w, flat = np.exp(mass_log(logs)), model.mass.reshape(len(model.mass), -1)
     M += w @ flat
     if gradient:
-        dM += _weighted(w[:, None] * (slopes["rho"] + slopes["t"]), flat)
+        dM += _weighted(w[:, None] * mass_log(slopes), flat)
     shape = (n_p, r, r)
     return K.reshape(r, r), M.reshape(r, r), dK.reshape(shape), dM.reshape(shape)
 
@@ -277,8 +287,8 @@ def _weighted(weights: np.ndarray, flat: np.ndarray) -> np.ndarray:
 def _weight(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
 ) -> tuple[float, np.ndarray]:
-    w = model.groups.weight * np.exp(logs["rho"] + logs["t"])
-    return float(model.weight0 + w.sum()), np.asarray(w @ (slopes["rho"] + slopes["t"]))
+    w = model.groups.weight * np.exp(mass_log(logs))
+    return float(model.weight0 + w.sum()), np.asarray(w @ mass_log(slopes))
 
 
 def _symmetric(A: np.ndarray) -> np.ndarray:

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import Effect
 from ..effects.shell_groups import ShellGroups, shell_groups
 from ..effects.surroundings import ShellGrids, shell_grids
-from ..fem.assemble import Structure, structure
+from ..fem.assemble import Structure
+from ..fem.modelled import Modelled, modelled
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
@@ -49,7 +49,7 @@ class Workbench:
         K = self.model.basis.T @ (self.structure.system.K.real @ self.model.basis)
         shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
         inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
-        return np.asarray(np.maximum(exact - inside, 0.0))
+        return np.maximum(exact - inside, 0.0)
 
     def with_attachments(self, rows: sp.csr_array) -> Reduced:
         """The reduced model over a basis that can carry these rows."""
@@ -64,20 +64,22 @@ class Workbench:
 
 
 def workbench(
-    assembly: Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
-    groups: int = 64, extra: np.ndarray | None = None, built: Structure | None = None,
+    model: Modelled | Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
+    groups: int = 64, extra: np.ndarray | None = None,
 ) -> Workbench:  # fmt: skip
     """Make a structure ready.
 
     Parameters
     ----------
+    model : its modes are solved to REACH times ``top``; an assembly is solved here
     top : highest frequency of interest [Hz]
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
     extra : (n, m) further vectors for the basis
     most : candidate places
     """
-    built = structure(assembly) if built is None else built
-    modes = normal_modes(built.system, band=REACH * top)
+    if isinstance(model, Assembly):
+        model = modelled(model, REACH * top)
+    built, modes = model.structure, model.up_to(REACH * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
     factor = shifted(built.system, hertz)

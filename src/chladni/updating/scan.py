@@ -107,7 +107,7 @@ class _Probe(Effect):
     """Thickness of every group by itself."""
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Ln t of each group is one parameter."""
+        """ln t of each group is one parameter."""
         return (FieldChange("t", x, np.eye(len(x))),)
 
 

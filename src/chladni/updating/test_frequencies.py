@@ -52,7 +52,7 @@ FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
 
 def _peaks(found: Identified) -> np.ndarray:
     """Height of each resonance in the accelerance, |R| ω / ζ ... up to a constant (r,)."""
-    return np.asarray(
+    return (
         np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
     )
 

@@ -93,12 +93,12 @@ def visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 120) 
     def cell(points: np.ndarray) -> np.ndarray:
         ij = (camera.project(points) - [u0, v0]) / [u1 - u0, v1 - v0] * cells
         i, j = np.clip(ij.astype(int), 0, cells - 1).T
-        return np.asarray(i * cells + j)
+        return i * cells + j
 
     nearest = np.full(cells**2, -np.inf)
     np.maximum.at(nearest, cell(sheet), camera.depth(sheet))
     hidden = nearest[cell(focus)] - camera.depth(focus)
-    return np.asarray(hidden < 0.006 * seen.size)
+    return hidden < 0.006 * seen.size
 
 
 def _samples(seen: Surface, step: float) -> np.ndarray:
@@ -139,7 +139,7 @@ def _outward(d: np.ndarray) -> np.ndarray:
 
 
 def _upright(d: np.ndarray, seen: Surface) -> np.ndarray:
-    """Z is up unless one looks along it; then the shorter side is, so that pictures are wide."""
+    """z is up unless one looks along it; then the shorter side is, so that pictures are wide."""
     up = np.array([0.0, 0.0, 1.0])
     if abs(d[2]) > 0.8:
         span = np.ptp(seen.points[seen.used], axis=0)

@@ -147,7 +147,7 @@ def _segments(ends: np.ndarray) -> Any:
 def _lamp(camera: Camera) -> np.ndarray:
     """Direction of the light: over the left shoulder."""
     lamp = camera.toward + 0.45 * camera.up - 0.35 * camera.right
-    return np.asarray(lamp / np.linalg.norm(lamp))
+    return lamp / np.linalg.norm(lamp)
 
 
 def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
@@ -188,7 +188,7 @@ def _shade(seen: Surface, camera: Camera) -> np.ndarray:
     """Brightness of each face (m,), from both sides alike."""
     n = seen.normals()
     lit = _KEY * np.abs(n @ _lamp(camera)) + (1 - _KEY) * np.abs(n @ camera.toward)
-    return np.asarray(_AMBIENT + _DIFFUSE * lit)
+    return _AMBIENT + _DIFFUSE * lit
 
 
 def _cuts(seen: Surface, paint: Paint) -> int:
@@ -206,7 +206,7 @@ def _bilinear(corners: np.ndarray, k: int) -> np.ndarray:
     grid = np.tensordot(corners, N, axes=(1, 1))  # (m, ..., (k+1)²)
     at = np.arange((k + 1) ** 2).reshape(k + 1, k + 1)
     quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], -1).reshape(-1, 4)
-    return np.asarray(np.moveaxis(grid, -1, 1)[:, quads])
+    return np.moveaxis(grid, -1, 1)[:, quads]
 
 
 def _stroked(
@@ -238,4 +238,4 @@ def _colours(seen: Surface, paint: Paint, k: int = 1) -> np.ndarray:
     low, high = paint.limits
     rgba = colormaps[paint.cmap]((tiles - low) / max(high - low, 1e-300))
     rgba[~np.isfinite(tiles)] = (*GREY, 1.0)
-    return np.asarray(rgba[:, :, :3])
+    return rgba[:, :, :3]

@@ -305,7 +305,7 @@ def _real(shape: np.ndarray) -> np.ndarray:
     """The real shape at the phase where Σ φ² is real and largest."""
     if not np.iscomplexobj(shape):
         return np.asarray(shape, dtype=float)
-    return np.asarray(np.real(shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))))
+    return np.real(shape * np.exp(-0.5j * np.angle(np.sum(shape**2))))
 
 
 def _fitting(seen: Surface, values: np.ndarray) -> np.ndarray:

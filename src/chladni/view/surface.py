@@ -119,7 +119,7 @@ class Surface:
             if np.linalg.norm(np.ptp(self.points[edges[line == k]].reshape(-1, 3), axis=0))
             >= least * self.size
         ]
-        return np.asarray(edges[np.isin(line, long)])
+        return edges[np.isin(line, long)]
 
 
 def _carried(assembly: Assembly) -> np.ndarray:

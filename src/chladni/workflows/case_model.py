@@ -8,25 +8,29 @@ import scipy.sparse as sp
 from ..case import Case
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility
-from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import Modelled, node_points
 from ..fem.solve import inertia_load
-from .loaded_model import Model
 
 if TYPE_CHECKING:
     from ..view.scene import Marker
 
 DAMPING = 0.01  # where neither case nor test says
+REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
 
 
-def model_frf(case: Case, model: Model, modal: ModalModel, test: FRF) -> FRF:
-    """The model's responses on the lines, labels and quantity of a recording."""
+def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
+    """The model's responses on the lines, labels and quantity of a recording.
+
+    Modes up to ``REACH`` times the highest line, the static rest of the others.
+    """
     s, f = model.structure, test.frequency
+    modal = model.modes.with_damping(damping)
     pick = case.outputs.rows(s).T.toarray()
     load, carried = _drives(case, s)
-    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, f, V=s.system.V, loss=loss, residual=rest)

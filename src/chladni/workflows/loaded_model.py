@@ -14,6 +14,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import FileError
 from ..fem.assemble import Structure, structure
+from ..fem.modelled import Modelled, node_points, solved
 from ..geometry.grid_normals import normals_at
 from ..model.analysis import Analysis
 from ..model.assembly import Assembly
@@ -22,6 +23,7 @@ from ..units import units as unit_system
 from ..view.surface import Surface, surface
 
 if TYPE_CHECKING:
+    from ..case import Case
     from ..io.nastran import Deck
 
 
@@ -33,6 +35,7 @@ class Model:
     assembly: Assembly
     unit: str = "m"  # of length; "" where a bare deck came without its unit system
     notes: tuple[str, ...] = ()  # what of the deck was left out
+    length: float = 1.0  # the deck's own unit of length [m]
 
     @cached_property
     def structure(self) -> Structure:
@@ -42,8 +45,11 @@ class Model:
     @cached_property
     def places(self) -> np.ndarray:
         """Place of the node of each row of the system (n, 3) [m]."""
-        dofs = self.structure.system.dofs
-        return np.asarray(self.assembly.points[self.assembly.rows(dofs[:, 0])])
+        return node_points(self.structure)
+
+    def solved(self, band: float) -> Modelled:
+        """Its modes up to a frequency [Hz]."""
+        return solved(self.structure, band)
 
     @cached_property
     def seen(self) -> Surface:
@@ -90,7 +96,8 @@ def load_model(
     if is_case(source):
         from ..case import load_case
 
-        return Model(source, load_case(source).assembly)
+        case = load_case(source)
+        return Model(source, case.assembly, length=case.units.length)
     return load_deck(source, units, allow).model(subcase)
 
 
@@ -115,7 +122,17 @@ class DeckModels:
         from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
 
         made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
-        return Model(self.source, made, "" if self.units is None else "m", tuple(notes))
+        unit, length = ("", 1.0) if self.units is None else ("m", self.units.length)
+        return Model(self.source, made, unit, tuple(notes), length)
+
+
+def as_model(source: "Case | Model | DeckModels") -> Model:
+    """The model of a case or of a deck; a model as it is."""
+    if isinstance(source, Model):
+        return source
+    if isinstance(source, DeckModels):
+        return source.model()
+    return Model(source.path, source.assembly)
 
 
 def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:

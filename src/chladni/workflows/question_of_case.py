@@ -7,7 +7,9 @@ import numpy as np
 from ..case import Case
 from ..errors import FileError
 from ..updating.map_fit import Weighing
-from ..updating.question import Question
+from ..updating.preparation import prepare
+from ..updating.question import Prepared, Question
+from .unit_check import refuse_other_units
 
 
 def question(case: Case) -> Question:
@@ -16,8 +18,10 @@ def question(case: Case) -> Question:
     Raises
     ------
     FileError
-        If the recordings hold neither FRFs nor poles, or the base was moved.
+        If the recordings hold neither FRFs nor poles, the base was moved, or the deck's unit
+        system cannot be right.
     """
+    refuse_other_units(case)
     frfs = case.frfs
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
@@ -50,3 +54,8 @@ def question(case: Case) -> Question:
         return replace(asked, frf=frfs[0])
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+
+
+def prepared(case: Case) -> Prepared:
+    """A case made ready for updating: identified, reduced, what is held out chosen."""
+    return prepare(question(case))

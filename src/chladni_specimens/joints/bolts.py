@@ -268,7 +268,7 @@ def hem(
     edge : (k, 3)          the inner sheet's edge; the string runs `inset` inboard of it [m]
     sheets : the inner and the outer sheet
     grip_stiffness : stiffness against sliding along the edge per length [N/m²]; 0: the soft
-        string alone, as the thesis models it
+        string alone, as Echaniz Granado (2015), section 2.3.2, models it
     """
     inner = ShellSurface.of(assembly, sheets[0])
     edge = followed(np.asarray(edge, dtype=float), pitch)

@@ -1,8 +1,9 @@
 """Joint builders: spot welds, adhesive beads, hems, screws, masses, on any assembly.
 
 Welds and adhesive are solids whose corners follow the nearest shells (RBE3), screws are bars
-between rigid spiders (RBE2), as in the thesis, chapter 2.3. Every builder finds its faces itself,
-refuses what it cannot connect with the place and the distance, and reports what it connected.
+between rigid spiders (RBE2), as in Echaniz Granado (2015), section 2.3. Every builder finds its
+faces itself, refuses what it cannot connect with the place and the distance, and reports what it
+connected.
 """
 
 from collections.abc import Sequence
@@ -119,7 +120,7 @@ def tied(
 
 
 def cell_carriers(surface: ShellSurface, feet: Feet) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The nodes of the nearest shell, all of weight one (thesis Fig. 1)."""
+    """The nodes of the nearest shell, all of weight one (Echaniz Granado 2015, figure 1)."""
     return [(nodes, np.ones(len(nodes))) for nodes in surface.cells(feet)]
 
 
@@ -351,4 +352,4 @@ def _tangent(line: np.ndarray) -> np.ndarray:
     t = np.gradient(line, axis=0) if len(line) > 2 else np.repeat(np.diff(line, axis=0), 2, axis=0)
     if len(line) > 2 and np.allclose(line[0], line[-1]):
         t[0] = t[-1] = line[1] - line[-2]
-    return np.asarray(t / np.linalg.norm(t, axis=1, keepdims=True))
+    return t / np.linalg.norm(t, axis=1, keepdims=True)

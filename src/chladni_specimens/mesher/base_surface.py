@@ -52,7 +52,7 @@ class CrownedSurface:
         y, s = plan[:, 0], plan[:, 1]
         phi = np.interp(s, self.line[0], self.line[3])
         n = np.column_stack([np.cos(phi), 2 * self._crown(s) * y, np.sin(phi)])
-        return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
+        return n / np.linalg.norm(n, axis=1, keepdims=True)
 
     def at(self, plan: np.ndarray) -> np.ndarray:
         """Places (n, 3) of the planform points (y, s, depth)."""

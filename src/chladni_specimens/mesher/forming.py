@@ -42,7 +42,7 @@ class Field:
     def at(self, plan: np.ndarray) -> np.ndarray:
         """Bilinear interpolation at planform points (k, 2); the rim's value beyond it."""
         at = (plan[:, :2] - self.low).T / STEP
-        return np.asarray(map_coordinates(self.values, at, order=1, mode="nearest"))
+        return map_coordinates(self.values, at, order=1, mode="nearest")
 
 
 def pressed(places: Places, depth: Depth, low: np.ndarray, high: np.ndarray) -> tuple[Field, Field]:
@@ -111,7 +111,7 @@ class Forming:
     def thickness(self, plan: np.ndarray) -> np.ndarray:
         """t(y, s) = t₀ (1 - min(a i, 0.38)) [m] at planform points (n, 2 or 3)."""
         thinning = self.strength * self.indicator.at(self._stored(plan))
-        return np.asarray(self.gauge * (1 - np.minimum(thinning, MOST)))
+        return self.gauge * (1 - np.minimum(thinning, MOST))
 
     def size(self, plan: np.ndarray, finest: float) -> np.ndarray:
         """Size of the forming mesh [m]: 22 mm where flat, down to `finest` where κ > 30 1/m."""

@@ -141,7 +141,7 @@ class Loop:
         here, n = self.points[at], len(self.points)
         feet = np.stack([_foot(points, here, self.points[(at + k) % n]) for k in (-1, 1)])
         side = np.linalg.norm(feet - points, axis=-1).argmin(axis=0)
-        return np.asarray(feet[side, np.arange(len(here))])
+        return feet[side, np.arange(len(here))]
 
     def between(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """The open line along the loop, counter-clockwise from one place to another."""
@@ -162,7 +162,7 @@ def _foot(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Nearest point of the segment a-b to p, all (..., 2)."""
     along = b - a
     t = ((p - a) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-30)
-    return np.asarray(a + np.clip(t, 0, 1)[..., None] * along)
+    return a + np.clip(t, 0, 1)[..., None] * along
 
 
 def in_step(

@@ -1,8 +1,8 @@
 """Every number of the open tailgate: dimensions, gauges, joints and variants (SI).
 
-Materials, gauges and kinds of joint are the thesis' Table 1; it gives no dimensions, so the shape
-is ours, chosen such that mass and modes come out like the thesis' nominal model. Planform
-coordinates are y (left-right) and s (up along the centre line of the outer skin).
+Materials, gauges and kinds of joint are those of Echaniz Granado (2015), table 1; it gives no
+dimensions, so the shape is ours, chosen such that mass and modes come out like those of its nominal
+model. Planform coordinates are y (left-right) and s (up along the centre line of the outer skin).
 """
 
 from dataclasses import dataclass, fields
@@ -18,7 +18,7 @@ ADHESIVE = Isotropic(6e6, 0.4, 1000.0, id=2)
 WELD = Isotropic(210e9, 0.3, 0.0, id=3)
 SCREW = Isotropic(210e9, 0.3, 7850.0, id=4)
 SEALANT = Isotropic(6e6, 0.499, 1000.0, id=5)
-STIFF = Isotropic(210e9, 0.49, 1000.0, id=2)  # the thesis' stand-in for a real hem (Table 9)
+STIFF = Isotropic(210e9, 0.49, 1000.0, id=2)  # Echaniz Granado 2015, table 9: a real hem
 
 HEMS = ("modelled", "sealed", "real")
 STRETCHES = ("all", "left", "right", "above", "below")
@@ -33,9 +33,9 @@ def _mirrored(bars: tuple[Bar, ...]) -> tuple[Bar, ...]:
 class TailgateDesign:
     """The open tailgate's numbers [m, rad where not said otherwise]; see the comments.
 
-    ``hem``: "modelled" is the one-sided soft string of the thesis' model, "sealed" adds sealant
-    on the folded side and round the inner edge, "real" also stops the inner sheet's sliding along
-    the hem (``hem_grip`` per length) over ``hem_stretch``.
+    ``hem``: "modelled" is the one-sided soft string of Echaniz Granado (2015), "sealed" adds
+    sealant on the folded side and round the inner edge, "real" also stops the inner sheet's sliding
+    along the hem (``hem_grip`` per length) over ``hem_stretch``.
     """
 
     size: float = 0.016  # mesh size

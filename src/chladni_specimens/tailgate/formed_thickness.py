@@ -1,8 +1,8 @@
 """Thickness of the tailgate's parts after forming, on their own mesh and on that of the model.
 
-The strengths are such that the parts' mean thickness and the loss of mass come out like the
-thesis' (Table 11, chapter 5.3.1); the two can only agree if its means are over the *nodes* of a
-forming mesh that is finest where the sheet is thin.
+The strengths are such that the parts' mean thickness and the loss of mass come out like those of
+Echaniz Granado (2015), table 11 and section 5.3.1; the two can only agree if its means are over the
+*nodes* of a forming mesh that is finest where the sheet is thin.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,7 @@
 """The open tailgate: nine pressings, their welds, adhesive and screws, as one assembly.
 
-Its parts and their values are the thesis' Table 1; the shape is ours (see ``tailgate_design``).
+Its parts and their values are those of Echaniz Granado (2015), table 1; the shape is ours (see
+``design``).
 """
 
 from collections.abc import Callable

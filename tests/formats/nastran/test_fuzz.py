@@ -1,7 +1,8 @@
 """Damaged decks: a sentence or a successful read, never another exception, never a hang."""
 
 import random
-import time
+import signal
+from contextlib import contextmanager
 
 import pytest
 
@@ -67,24 +68,42 @@ def survives(path, data, folder):
     return ""
 
 
+HANGS = 60.0  # of the processor's own time [s]; a deck of this size takes a thousandth of it
+
+
+@contextmanager
+def watched():
+    """An error in what hangs, in time that busy neighbours do not count towards."""
+
+    def hangs(signum, frame):
+        raise TimeoutError(f"hangs for {HANGS:g} s")
+
+    before = signal.signal(signal.SIGVTALRM, hangs)
+    signal.setitimer(signal.ITIMER_VIRTUAL, HANGS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
 def run(count, seed, folder):
-    """(refusals, slowest [s]) of so many damaged decks."""
+    """How many of so many damaged decks are refused; one that hangs is stopped and named."""
     rng = random.Random(seed)
     files = [p for p in real_files() if p.stat().st_size < 60_000]
-    refused, slowest = 0, 0.0
+    refused = 0
     for k in range(count):
         path = rng.choice(files)
         data = damaged(path.read_bytes(), rng)
-        start = time.process_time()
         try:
-            sentence = survives(path, data, folder)
+            with watched():
+                sentence = survives(path, data, folder)
         except Exception as error:
             (folder / f"broke_{k}.bdf").write_bytes(data)
             raise AssertionError(f"seed {seed}, deck {k} ({path.name}): {error!r}") from error
-        slowest = max(slowest, time.process_time() - start)
         assert "\n" not in sentence
         refused += bool(sentence)
-    return refused, slowest
+    return refused
 
 
 needs_decks = pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks are not at hand")
@@ -93,14 +112,12 @@ needs_decks = pytest.mark.skipif(not ANCHORS.exists(), reason="reference decks a
 @needs_decks
 @pytest.mark.filterwarnings("error")
 def test_two_hundred_damaged_decks(tmp_path):
-    refused, slowest = run(200, 20, tmp_path)
+    refused = run(200, 20, tmp_path)
     assert 40 < refused < 200  # the injuries are neither harmless nor always deadly
-    assert slowest < 5
 
 
 @needs_decks
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(9))
 def test_two_thousand_damaged_decks(tmp_path, seed):
-    _, slowest = run(200, 1000 + seed, tmp_path)
-    assert slowest < 5
+    run(200, 1000 + seed, tmp_path)

@@ -138,7 +138,7 @@ def _independence(Q: np.ndarray) -> np.ndarray:
     """E (d, n) of whitened rows (d, n, k, p)."""
     if Q.shape[2] == 1:
         return np.einsum("dikp,dikp->di", Q, Q)
-    return np.asarray(1 - np.linalg.det(np.eye(Q.shape[2]) - Q @ Q.mT))
+    return 1 - np.linalg.det(np.eye(Q.shape[2]) - Q @ Q.mT)
 
 
 def _delete(
@@ -212,7 +212,7 @@ def qr_ranking(phi: np.ndarray, positions: np.ndarray | None = None) -> np.ndarr
         order = np.argsort(-np.linalg.norm(rows, axis=(1, 2)), kind="stable")
     else:
         order = qr(rows[:, 0].T, mode="r", pivoting=True)[1]
-    return np.asarray(order if positions is None else positions[order])
+    return order if positions is None else positions[order]
 
 
 def greedy(
@@ -262,4 +262,4 @@ def faint(c: Candidates) -> np.ndarray:
     if c.informed:
         return np.zeros((c.unknowns, c.unknowns))
     size = np.einsum("dikp,dikp->p", c.rows, c.rows) / len(c.rows) / len(c)
-    return np.asarray(np.diag(1e-8 * np.maximum(size, 1e-12 * size.max())))
+    return np.diag(1e-8 * np.maximum(size, 1e-12 * size.max()))

@@ -23,13 +23,13 @@ def likeness(F: np.ndarray) -> np.ndarray:
     size = np.einsum("...rr->...r", F)
     out = F**2 / np.maximum(size[..., :, None] * size[..., None, :], 1e-300)
     out[..., np.arange(F.shape[-1]), np.arange(F.shape[-1])] = 0.0
-    return np.asarray(out)
+    return out
 
 
 def excess(F: np.ndarray, ceiling: float) -> np.ndarray:
     """Σ_{r<s} max(0, AutoMAC_rs - ceiling), mean over the draws of F (d, ..., p, p)."""
     over = np.maximum(likeness(F) - ceiling, 0.0).mean(axis=0)
-    return np.asarray(over.sum(axis=(-2, -1)) / 2)
+    return over.sum(axis=(-2, -1)) / 2
 
 
 def distinct(
@@ -82,7 +82,7 @@ def _open(c: Candidates, rules: Rules, kept: np.ndarray, i: int) -> np.ndarray:
 
 
 def _joined(c: Candidates, rest: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Log det F of the rest with each of the others (m,)."""
+    """log det F of the rest with each of the others (m,)."""
     U = c.joining(rest, others)
     return changed("D", _regular(c, rest), U, np.ones(U.shape[2]))
 
@@ -116,4 +116,4 @@ class _Pairs:
         on = self.on[:, rest].sum(axis=1)[:, None] + self.on[:, others]
         size = np.maximum(on[..., self.first] * on[..., self.second], 1e-300)
         over = np.maximum(off**2 / size - ceiling, 0.0)
-        return np.asarray(over.sum(axis=-1).mean(axis=0))
+        return over.sum(axis=-1).mean(axis=0)

@@ -134,7 +134,7 @@ def _swapped(
         ratio = (1 - d_i) * (1 + d_j) + d_ij**2  # Fedorov's determinant ratio
         with np.errstate(divide="ignore", invalid="ignore"):
             log_ratio = np.where(ratio > 0, np.log(ratio), -np.inf).mean(axis=0)
-        return np.asarray(value("D", F) + log_ratio)
+        return value("D", F) + log_ratio
     U = np.concatenate([np.broadcast_to(leaving[:, None], (d, m, k, p)), join], axis=2)
     return changed(criterion, F, U, np.r_[-np.ones(k), np.ones(k)])
 
@@ -194,13 +194,13 @@ def _given(c: Candidates, rest: np.ndarray, others: np.ndarray) -> tuple[np.ndar
 
 
 def _pair_gain(gamma: np.ndarray, E: np.ndarray) -> np.ndarray:
-    """Log det(Γ_JJ + E_JJ) - log det Γ_JJ of every pair J, mean over draws (m, m)."""
+    """log det(Γ_JJ + E_JJ) - log det Γ_JJ of every pair J, mean over draws (m, m)."""
 
     def det(A: np.ndarray) -> np.ndarray:
         diagonal = np.diagonal(A, axis1=-2, axis2=-1)
-        return np.asarray(diagonal[..., :, None] * diagonal[..., None, :] - A**2)
+        return diagonal[..., :, None] * diagonal[..., None, :] - A**2
 
     with np.errstate(divide="ignore", invalid="ignore"):
         gain = np.log(det(gamma + E)) - np.log(det(gamma))
     gain[:, np.arange(len(gamma)), np.arange(len(gamma))] = -np.inf
-    return np.asarray(gain.mean(axis=0))
+    return gain.mean(axis=0)

@@ -203,7 +203,7 @@ def changed(criterion: Criterion, F: np.ndarray, U: np.ndarray, sign: np.ndarray
     """
     if criterion == "E":
         change = np.einsum("dmqi,q,dmqj->dmij", U, sign, U, optimize=True)
-        return np.asarray(np.linalg.eigvalsh(F[:, None] + change)[..., 0].mean(axis=0))
+        return np.linalg.eigvalsh(F[:, None] + change)[..., 0].mean(axis=0)
     C = np.linalg.inv(F)
     UC = U @ C[:, None]
     K = UC @ U.mT  # (d, m, q, q)
@@ -211,17 +211,17 @@ def changed(criterion: Criterion, F: np.ndarray, U: np.ndarray, sign: np.ndarray
     alive = (signs > 0) & (log_det > -25)
     if criterion == "D":
         gain = np.where(alive, log_det, -np.inf)
-        return np.asarray((np.linalg.slogdet(F)[1][:, None] + gain).mean(axis=0))
+        return (np.linalg.slogdet(F)[1][:, None] + gain).mean(axis=0)
     K = np.where(alive[..., None, None], np.diag(sign) + K, np.eye(len(sign)))
     less = np.trace(np.linalg.solve(K, UC @ UC.mT), axis1=-2, axis2=-1)
     trace = np.trace(C, axis1=-2, axis2=-1)[:, None] - less
-    return np.asarray(np.where(alive, -trace, -np.inf).mean(axis=0))
+    return np.where(alive, -trace, -np.inf).mean(axis=0)
 
 
 def log_det_fisher(
     phi: np.ndarray, noise: np.ndarray | None = None, prior: np.ndarray | None = None
 ) -> float:
-    """Log det(ΦᵀΣ⁻¹Φ): the information all rows (sensors) carry about the columns (modes)."""
+    """log det(ΦᵀΣ⁻¹Φ): the information all rows (sensors) carry about the columns (modes)."""
     c = candidates(phi, noise, prior)
     return value("D", c.fisher(np.arange(len(c))))
 
@@ -288,9 +288,9 @@ def _regular(F: np.ndarray) -> np.ndarray:
 def combined(E: np.ndarray) -> np.ndarray:
     """One independence for all draws: 1 - geometric mean of 1 - E over the first axis."""
     if len(E) == 1:
-        return np.asarray(E[0])
+        return E[0]
     with np.errstate(divide="ignore"):
-        return np.asarray(-np.expm1(np.log1p(-np.minimum(E, 1.0)).mean(axis=0)))
+        return -np.expm1(np.log1p(-np.minimum(E, 1.0)).mean(axis=0))
 
 
 def information_entropy(F: np.ndarray) -> float:
@@ -305,7 +305,7 @@ def information_entropy(F: np.ndarray) -> float:
 def expected_posterior(c: Candidates, kept: np.ndarray) -> np.ndarray:
     """Standard deviation √diag(F⁻¹) the unknowns will have after the test, worst draw (p,)."""
     C = np.linalg.inv(_regular(c.fisher(positions_of(kept, len(c)))))
-    return np.asarray(np.sqrt(np.diagonal(C, axis1=1, axis2=2)).max(axis=0))
+    return np.sqrt(np.diagonal(C, axis1=1, axis2=2)).max(axis=0)
 
 
 def sensitivity_rows(jacobian: np.ndarray, noise: np.ndarray | float = 1.0) -> np.ndarray:

@@ -12,7 +12,7 @@ from .layout_rules import Rules
 def kinetic_energy(phi: np.ndarray, mass_times_phi: np.ndarray) -> np.ndarray:
     """Share φ_ir (Mφ)_ir of each mode's kinetic energy at each dof (n, r); columns sum to 1."""
     energy = np.asarray(phi) * np.asarray(mass_times_phi)
-    return np.asarray(energy / energy.sum(axis=0))
+    return energy / energy.sum(axis=0)
 
 
 def visibility(seen: np.ndarray, largest: np.ndarray) -> np.ndarray:
@@ -25,12 +25,12 @@ def visibility(seen: np.ndarray, largest: np.ndarray) -> np.ndarray:
     """
     if len(seen) == 0:
         return np.zeros(len(largest))
-    return np.asarray(np.clip(np.abs(seen).max(axis=0) / largest, 0.0, 1.0))
+    return np.clip(np.abs(seen).max(axis=0) / largest, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Move:
-    """A sensor that was given up so that a mode is seen (thesis 4.2.4.6)."""
+    """A sensor that was given up so that a mode is seen (Echaniz Granado 2015, section 4.2.4.6)."""
 
     mode: int
     out: int
@@ -111,7 +111,7 @@ def loaded_frequency(
     M = np.eye(len(frequency)) + np.einsum("n,nkr,nks->rs", m, phi, phi)
     inverse_root = np.linalg.inv(np.linalg.cholesky(M))
     squares = inverse_root * (np.asarray(frequency) ** 2) @ inverse_root.T
-    return np.asarray(np.sqrt(np.clip(np.linalg.eigvalsh(squares), 0, None)))
+    return np.sqrt(np.clip(np.linalg.eigvalsh(squares), 0, None))
 
 
 def overlap(layout: np.ndarray, other: np.ndarray) -> float:

@@ -152,7 +152,7 @@ class Rules:
         """
         may = kept & ~self.fixed
         if self.region is None:
-            return np.asarray(may)
+            return may
         count = self._count(kept)
         for r, low in self.least.items():
             if count[r] <= low:
@@ -160,7 +160,7 @@ class Rules:
         excess = self._excess(kept)
         if excess and sum(excess.values()) >= kept.sum() - n_sensors:
             may = may & np.isin(self.region, list(excess))
-        return np.asarray(may)
+        return may
 
     def addable(self, kept: np.ndarray, n_sensors: int) -> np.ndarray:
         """Which candidates may join the kept on the way to ``n_sensors`` (n,) bool."""
@@ -172,7 +172,7 @@ class Rules:
         if len(waiting) >= n_sensors - kept.sum():
             may &= self.fixed
         if self.region is None:
-            return np.asarray(may)
+            return may
         count = self._count(kept)
         for r, high in self.most.items():
             if count[r] >= high:
@@ -180,7 +180,7 @@ class Rules:
         lack = self._lack(kept)
         if lack and sum(lack.values()) >= n_sensors - kept.sum():
             may &= np.isin(self.region, list(lack))
-        return np.asarray(may)
+        return may
 
     def pairs(self, kept: np.ndarray, joining: np.ndarray) -> np.ndarray:
         """Which two of ``joining`` may join the kept together (m, m) bool, to complete a layout."""
@@ -207,7 +207,7 @@ def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:
     """
     allowed = ~rules.forbidden
     if rules.near is None:
-        return np.asarray(allowed)
+        return allowed
     crowd = rules.near[:, allowed].sum(axis=1)
     for worth_now in (worth, -crowd.astype(float)):
         kept = _packed(rules, worth_now)

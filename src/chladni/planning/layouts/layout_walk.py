@@ -48,7 +48,7 @@ class Walk:
         self._anew()
 
     def exact(self) -> float:
-        """Log det F of the kept, from scratch."""
+        """log det F of the kept, from scratch."""
         F = self.c.fisher(np.flatnonzero(self.kept)) + (self.prior - self.c.prior)
         return value("D", F)
 
@@ -57,7 +57,7 @@ class Walk:
         if self.grow:
             return self.rules.addable(self.kept, self.n_sensors)
         may = self.kept if self.rules.free else self.rules.deletable(self.kept, self.n_sensors)
-        return np.asarray(may & (self.worth < INDISPENSABLE))
+        return may & (self.worth < INDISPENSABLE)
 
     def done(self) -> bool:
         """True where the layout is complete."""

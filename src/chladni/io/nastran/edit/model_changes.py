@@ -14,12 +14,13 @@ from ....units import UNITS, Units
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
 from .laminate_changes import laminate_changes, laminated
+from .split_properties import bending_changes, split_changes, with_new_properties
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
 def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
-    """Edits of the deck: materials, laminates, thickness, masses, springs to ground that differ.
+    """Edits of the deck: materials, properties, thickness, masses, springs to ground that differ.
 
     Raises
     ------
@@ -28,10 +29,12 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     """
     units = units or UNITS["SI"]
     out: list[Change] = []
+    before, after, split = with_new_properties(deck, before, after)
     free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
     out += _materials(deck, before, after, units, free)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
+    out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
     cards = [*_masses(before, after, units), *_springs(before, after, units)]
     if cards:
         out.append(Add(cards, "put in by the diagnosis"))
@@ -73,8 +76,8 @@ def _materials(
             new = next(free)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
             out += [SetField("PSHELL", after.parts[k].id, _MID[name], new) for k, name in at]
-    grain = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
-    return out + (_axes(deck, before, after) if grain else [])
+    oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
+    return out + (_axes(deck, before, after) if oriented else [])
 
 
 def _equal(a: Material, b: Material) -> bool:
@@ -136,7 +139,7 @@ def _card(m: Material, units: Units) -> list[float | int | str | None]:
 
 
 def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
-    """A coordinate system whose x is the grain, named by the shells it turned."""
+    """A coordinate system whose x is the material axis, named by the shells it turned."""
     moved = np.flatnonzero(np.any(before.shells.axis != after.shells.axis, axis=1))
     if not len(moved):
         return []
@@ -148,7 +151,9 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     cid = 1 + max(
         (i for kind in deck.cards if kind[:4] == "CORD" for i in _cids(deck, kind)), default=900
     )
-    out: list[Change] = [Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "grain of the sheet")]
+    out: list[Change] = [
+        Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
+    ]
     for kind, chosen in _by_kind(after.shells, moved):
         if len(chosen):
             out += [SetField(kind, int(i), "THETA", cid) for i in after.shells.ids[chosen]]

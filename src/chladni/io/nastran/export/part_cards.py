@@ -160,4 +160,4 @@ def _laid(v: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Unit vectors along the projections of v on the elements; zero where v is normal."""
     flat = v - np.einsum("ni,ni->n", v, normal)[:, None] * normal
     size = np.linalg.norm(flat, axis=1)
-    return np.asarray(flat / np.where(size > 1e-9, size, np.inf)[:, None])
+    return flat / np.where(size > 1e-9, size, np.inf)[:, None]

@@ -41,7 +41,7 @@ def bushes(assembly: Assembly, units: Units, ids: Ids, systems: Systems) -> Iter
 def _middle(assembly: Assembly, nodes: np.ndarray) -> np.ndarray:
     """Where a bush sits unless told otherwise."""
     a, b = nodes if nodes[1] >= 0 else (nodes[0], nodes[0])
-    return np.asarray(assembly.points[a] + 0.5 * (assembly.points[b] - assembly.points[a]))
+    return assembly.points[a] + 0.5 * (assembly.points[b] - assembly.points[a])
 
 
 def _pbush(pid: int, rows: tuple[np.ndarray, ...]) -> Iterator[str]:

@@ -42,7 +42,7 @@ def _check_length(ctx: Context, cards: Cards, made: Beams) -> np.ndarray:
     if np.any(bad := ~(size > 1e-12 * np.maximum(scale, 1e-300)) | ~np.isfinite(size)):
         i = int(np.argmax(bad))
         raise cards.refuse(i, f"its length is zero; grids {ctx.ids[made.nodes[i]].tolist()}")
-    return np.asarray(along)
+    return along
 
 
 def _rods(ctx: Context, parts: Parts, cards: Cards) -> Beams:

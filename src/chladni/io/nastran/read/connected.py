@@ -21,7 +21,7 @@ def components(model: Assembly) -> np.ndarray:
     graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     order = np.argsort(-np.bincount(label), kind="stable")
-    return np.asarray(np.argsort(order)[label])
+    return np.argsort(order)[label]
 
 
 def _pairs(model: Assembly) -> Iterator[np.ndarray]:

@@ -106,12 +106,12 @@ class Context:
         """Vectors (n, 3) given in the displacement frames of points, in the basic frame."""
         if self.axes is None:
             return vectors
-        return np.asarray(np.einsum("ni,nij->nj", vectors, self.axes[rows]))
+        return np.einsum("ni,nij->nj", vectors, self.axes[rows])
 
     def system_at(self, cards: Cards, i: int, cid: int, place: np.ndarray) -> np.ndarray:
         """Unit vectors (3, 3) of coordinate system ``cid`` at a basic place."""
         frame = self.frames.get(cid, cards, i)
-        return np.asarray(frame.at(place[None])[0])
+        return frame.at(place[None])[0]
 
 
 def parameter(deck: Deck, name: str) -> str:

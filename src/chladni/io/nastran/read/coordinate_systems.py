@@ -18,7 +18,7 @@ class Frame:
 
     def place(self, x: np.ndarray) -> np.ndarray:
         """Basic coordinates (n, 3) of coordinates (n, 3) in this system, angles in degrees."""
-        return np.asarray(self.origin + _cartesian(self.kind, x) @ self.axes)
+        return self.origin + _cartesian(self.kind, x) @ self.axes
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Unit vectors (n, 3, 3), as rows, of the system at basic points (n, 3)."""
@@ -110,7 +110,7 @@ class Frames:
             raise asker.refuse(at, f"grid {grid} does not exist")
         one = self._grid.single(self._row[grid])
         frame = self.get(int(one.integers(2, self._default_cp)[0]), asker, at)
-        return np.asarray(frame.place(one.block(3, 3, 0.0))[0])
+        return frame.place(one.block(3, 3, 0.0))[0]
 
 
 def _systems(deck: Deck) -> dict[int, tuple[Cards, int]]:

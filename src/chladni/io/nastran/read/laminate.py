@@ -46,7 +46,7 @@ def _turned(Q: np.ndarray, angle: float) -> np.ndarray:
     T = np.array(
         [[c * c, s * s, -2 * c * s], [s * s, c * c, 2 * c * s], [c * s, -c * s, c * c - s * s]]
     )
-    return np.asarray(T @ Q @ T.T)
+    return T @ Q @ T.T
 
 
 def _transverse(ply: Ply, k: int) -> float:

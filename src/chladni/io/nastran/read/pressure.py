@@ -62,7 +62,7 @@ def on_faces(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.
     """
     if X.shape[1] == 3:
         area = np.cross(X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]) / 2
-        return np.asarray((p + p.sum(axis=1)[:, None])[:, :, None] / 12 * _along(area, way))
+        return (p + p.sum(axis=1)[:, None])[:, :, None] / 12 * _along(area, way)
     f = np.zeros(X.shape)
     a = 1 / np.sqrt(3)
     s, t = np.array([-1, 1, 1, -1]), np.array([-1, -1, 1, 1])
@@ -76,12 +76,12 @@ def on_faces(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.
 def _along(area: np.ndarray, way: np.ndarray | None) -> np.ndarray:
     """Area vectors (m, 1, 3), or as much area along other ways."""
     turned = area if way is None else np.linalg.norm(area, axis=1)[:, None] * way
-    return np.asarray(turned[:, None])
+    return turned[:, None]
 
 
 def on_face(X: np.ndarray, p: np.ndarray, way: np.ndarray | None = None) -> np.ndarray:
     """The same of one face (c, 3)."""
-    return np.asarray(on_faces(X[None], p[None], None if way is None else way[None])[0])
+    return on_faces(X[None], p[None], None if way is None else way[None])[0]
 
 
 def _on_shells(ctx: Context, cards: Cards, unit: float) -> tuple[np.ndarray, list[Nodal]]:

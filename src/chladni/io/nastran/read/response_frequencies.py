@@ -18,7 +18,7 @@ def _freq(card: Cards) -> np.ndarray:
 def _freq1(card: Cards) -> np.ndarray:
     """FREQ1: f_1 + k Δf, k = 0 ... n."""
     count = _count(card, card.integer(0, 4, 1))
-    return np.asarray(card.real(0, 2) + card.real(0, 3) * np.arange(count + 1))
+    return card.real(0, 2) + card.real(0, 3) * np.arange(count + 1)
 
 
 def _freq2(card: Cards) -> np.ndarray:

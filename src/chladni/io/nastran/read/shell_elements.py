@@ -83,7 +83,7 @@ def _normals(ctx: Context, cards: Cards, corners: np.ndarray) -> np.ndarray:
     if np.any(flat):
         i = int(np.argmax(flat))
         raise cards.refuse(i, f"its area is zero; grids {ctx.ids[corners[i]].tolist()}")
-    return np.asarray(normal / size[:, None])
+    return normal / size[:, None]
 
 
 def _thickness(
@@ -131,7 +131,7 @@ def _axis(ctx: Context, cards: Cards, X: np.ndarray, normal: np.ndarray, k: int)
     if np.any(system):
         axis = axis.copy()
         axis[system] = _from_systems(ctx, cards.take(system), X[system], normal[system], k)
-    return np.asarray(axis)
+    return axis
 
 
 def _by_system(cards: Cards, k: int) -> np.ndarray:
@@ -149,7 +149,7 @@ def _from_systems(
     flat, size = _laid(ctx, cards, X, normal, k)
     first = np.where(size[:, 0] < NORMAL, 1, 0)
     at = np.arange(len(cards))
-    return np.asarray(flat[at, first] / size[at, first, None])
+    return flat[at, first] / size[at, first, None]
 
 
 def _laid(

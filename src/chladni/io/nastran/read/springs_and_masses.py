@@ -276,7 +276,7 @@ def _bush_frame(
     if not np.linalg.norm(z) > 1e-9 * np.linalg.norm(along) * np.linalg.norm(v):
         raise cards.refuse(i, "its orientation vector is along its axis or zero")
     frame = np.array([along, np.cross(z, along), z])
-    return np.asarray(frame / np.linalg.norm(frame, axis=1)[:, None])
+    return frame / np.linalg.norm(frame, axis=1)[:, None]
 
 
 def _direction(
@@ -286,8 +286,8 @@ def _direction(
     if not any(words[:3]):
         return None
     if words[0].isdigit() and not words[1] and not words[2]:
-        return np.asarray(ctx.places[ctx.row(cards, i, int(words[0]))] - ctx.places[node])
-    return np.asarray(cards.single(i).block(5, 3, 0.0)[0] @ ctx.frame_at(node))
+        return ctx.places[ctx.row(cards, i, int(words[0]))] - ctx.places[node]
+    return cards.single(i).block(5, 3, 0.0)[0] @ ctx.frame_at(node)
 
 
 def _bush_place(ctx: Context, cards: Cards, nodes: np.ndarray) -> np.ndarray:

@@ -181,4 +181,4 @@ def _complex(block: _PunchBlock, values: np.ndarray) -> np.ndarray:
         return values[:6].astype(complex)
     half = len(values) // 2
     a, b = values[:half][:6], values[half : 2 * half][:6]
-    return np.asarray(a * np.exp(1j * np.radians(b)) if block.polar else a + 1j * b)
+    return a * np.exp(1j * np.radians(b)) if block.polar else a + 1j * b

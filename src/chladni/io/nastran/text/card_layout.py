@@ -86,9 +86,8 @@ def _skipped(text: np.ndarray) -> np.ndarray:
     """Lines (m,) from a SKIPON to its SKIPOFF, both included."""
     names = np.ascontiguousarray(text[:, :8]).view("S8").ravel()
     names = np.strings.rstrip(names) if len(names) else names
-    return np.asarray(
-        (np.cumsum(names == b"SKIPON") > np.cumsum(names == b"SKIPOFF"))
-        | np.isin(names, (b"SKIPON", b"SKIPOFF"))
+    return (np.cumsum(names == b"SKIPON") > np.cumsum(names == b"SKIPOFF")) | np.isin(
+        names, (b"SKIPON", b"SKIPOFF")
     )
 
 

@@ -1,0 +1,93 @@
+"""What the noise of a recording leaves in the damping-equalised response identified from it.
+
+The identified model is the weighted least-squares estimate of poles, which all channels share, and
+of each channel's residues and residual terms. With F = Q R the weighted columns of a channel's
+linear unknowns and G those of the poles, S = Σ_c Gᵀ(I - QQᵀ)G is the information on the poles, and
+a prediction with slopes g_c, g_p has the variance |R⁻ᵀ g_c|² + hᴴ S⁻¹ h, h = g_p - GᵀQ R⁻ᵀ g_c
+(Seber and Wild 1989, Nonlinear Regression, section 5.1; the linear unknowns are eliminated).
+"""
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from ..dynamics.frf import FRF
+from .identification import DERIVATIVES, Identified, spread
+from .pole_fitting import basis, linear, residual_terms, stacked
+
+LN10 = np.log(10.0)
+
+
+def equalised_noise(
+    identified: Identified, frf: FRF, s: np.ndarray, use: np.ndarray, averages: int = 1
+) -> np.ndarray:
+    """E|Δ log10 H|² of the equalised response (n_s, n_out, n_in), to first order.
+
+    Parameters
+    ----------
+    identified : from ``frf``; its ``chi`` scales the noise that the recording states
+    s : (n_s,) complex     where the equalised response is evaluated [rad/s]
+    use : (n_f,) bool      lines of the recording that it was identified from
+    averages : of the estimate, where the noise comes from the coherence
+    """
+    low, high = identified.band
+    keep = use & (frf.frequency >= low) & (frf.frequency <= high) & (frf.frequency > 0)
+    top, q = 2 * np.pi * high, DERIVATIVES[identified.quantity]
+    sigma = identified.chi * np.sqrt(spread(frf, averages)[keep] / 2)
+    w = top**q / sigma.reshape(len(sigma), -1)
+    p, R = identified.poles / top, identified.residues.reshape(len(identified.poles), -1) / top
+    line = 2j * np.pi * frf.frequency[keep] / top
+    F, second = linear(line, p, q), basis(line, p, q, 2)
+    known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]
+    S = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)
+    H, out = np.zeros((len(s), w.shape[1]), complex), np.empty((len(s), w.shape[1]))
+    columns = _equalised_columns(s / top, p, q)
+    for c, (root, tied, _) in enumerate(known):
+        x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / top**2,
+                            identified.upper.ravel()[c : c + 1]])  # fmt: skip
+        H[:, c] = columns @ x
+        own = solve_triangular(root, columns.T, trans="T")
+        shared = _equalised_slopes(s / top, p, R[:, c], q).T - tied.T @ own
+        variance = (np.abs(own) ** 2).sum(axis=0)
+        out[:, c] = variance + np.einsum("ks,kl,ls->s", shared.conj(), S, shared).real
+    return (out / (np.abs(H) * LN10) ** 2).reshape(len(s), *identified.lower.shape)
+
+
+def _channel(
+    w: np.ndarray, F: np.ndarray, G: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """R of the weighted F, QᵀG, and what G says beyond F: Gᵀ(I - QQᵀ)G."""
+    Q, root = np.linalg.qr(stacked(w * F))
+    G = stacked(w * G)
+    tied = Q.T @ G
+    rest = G - Q @ tied
+    return root, tied, rest.T @ rest
+
+
+def _pairs(z: np.ndarray) -> np.ndarray:
+    """Real coefficients (2 r,) of complex z (r,) in the columns of :func:`basis`."""
+    return np.stack([z.real, z.imag], axis=-1).ravel()
+
+
+def _taken(columns: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """z_r times each pole's term and its conjugate, from the columns of :func:`basis` (n, r)."""
+    return np.asarray(columns[:, 0::2] * z.real + columns[:, 1::2] * z.imag)
+
+
+def _moved(second: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """∂H/∂(Re p, Im p) of every pole (n_f, 2 r), R/(s-p)² and iR/(s-p)²."""
+    return np.stack([_taken(second, R), _taken(second, 1j * R)], -1).reshape(len(second), -1)
+
+
+def _equalised_columns(s: np.ndarray, p: np.ndarray, q: int) -> np.ndarray:
+    """The linear columns with every pole at i|p|, its residue times Im p/|p| (n_s, 2 r + 2)."""
+    first = basis(s, 1j * np.abs(p), q) * np.repeat(p.imag / np.abs(p), 2)
+    return np.concatenate([first, residual_terms(s, q)], axis=1)
+
+
+def _equalised_slopes(s: np.ndarray, p: np.ndarray, R: np.ndarray, q: int) -> np.ndarray:
+    """∂H_X/∂(Re p, Im p) of every pole (n_s, 2 r): through m = |p| and through f = Im p/m."""
+    m, a, b = np.abs(p), p.real, p.imag
+    by_f = _taken(basis(s, 1j * m, q), R)
+    by_m = _taken(basis(s, 1j * m, q, 2), 1j * R * b / m)
+    slopes = [by_m * (a / m) - by_f * (a * b / m**3), by_m * (b / m) + by_f * (a**2 / m**3)]
+    return np.stack(slopes, -1).reshape(len(s), -1)

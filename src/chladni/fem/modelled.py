@@ -1,0 +1,68 @@
+"""A structure and its normal modes, solved once and shared by all who ask."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import ModalModel
+from ..errors import ModelError
+from ..model.assembly import Assembly
+from .assemble import Structure, structure
+
+_ROUNDING = 1e-9  # a band may be asked for again as another product of the same numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Modelled:
+    """The matrices of an assembly and all its normal modes up to ``band``, at least the first.
+
+    Attributes
+    ----------
+    structure : Structure
+    modes : ModalModel     undamped, rigid ones included
+    band : float           [Hz]
+    """
+
+    structure: Structure
+    modes: ModalModel
+    band: float
+
+    @property
+    def assembly(self) -> Assembly:
+        """What was modelled."""
+        return self.structure.assembly
+
+    def up_to(self, frequency: float) -> ModalModel:
+        """The modes up to a frequency [Hz].
+
+        Raises
+        ------
+        ModelError
+            If the modes were not solved that far.
+        """
+        if frequency > self.band * (1 + _ROUNDING):
+            raise ModelError(
+                f"modes up to {frequency:g} Hz are asked for; they were solved to {self.band:g} Hz"
+            )
+        return self.modes.sel(self.modes.frequency <= frequency * (1 + _ROUNDING))
+
+
+def modelled(assembly: Assembly, band: float) -> Modelled:
+    """Assemble a structure and solve its modes up to ``band`` [Hz], the first whatever it is."""
+    return solved(structure(assembly), band)
+
+
+def solved(built: Structure, band: float) -> Modelled:
+    """The modes of a structure up to ``band`` [Hz], the first whatever it is."""
+    points = node_points(built)
+    modes = normal_modes(built.system, band=band, points=points)
+    if not len(modes):
+        modes = normal_modes(built.system, 1, points=points)
+    return Modelled(built, modes, band)
+
+
+def node_points(built: Structure) -> np.ndarray:
+    """Place of the node of each free dof (n, 3) [m]."""
+    assembly = built.assembly
+    return np.asarray(assembly.points[assembly.rows(built.system.dofs[:, 0])])

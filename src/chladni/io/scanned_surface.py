@@ -1,0 +1,84 @@
+"""Scans of real parts: triangulated surfaces in STL, PLY or OBJ files, looked over as they come."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from ..geometry.cells import edges_of
+from ..geometry.facets import cell_areas
+from ..geometry.mesh_quality import edge_faults, free_edges
+
+SUFFIXES = (".stl", ".ply", ".obj")
+
+
+@dataclass(frozen=True, eq=False)
+class ScannedSurface:
+    """A triangulated surface.
+
+    Attributes
+    ----------
+    points : (n, 3)       [m]
+    cells : (m, 4) int    triangles as rows of points, the third repeated
+    volume : float        inside, nan unless the surface is closed and wound one way [m³]
+    notes : tuple of str  what is remarkable about it
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    volume: float
+    notes: tuple[str, ...]
+
+
+def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
+    """A scan whose coordinates are in units of ``length`` [m].
+
+    Raises
+    ------
+    FileError
+        If the file is of another kind, cannot be read or holds no triangle with an area.
+    """
+    from trimesh import Trimesh, load_mesh
+
+    if path.suffix.lower() not in SUFFIXES:
+        raise FileError(f"{path}: a scan is one of {', '.join(SUFFIXES)}, not {path.suffix or '?'}")
+    if not path.is_file():
+        raise FileError(f"no file {path}")
+    try:
+        mesh = load_mesh(path)
+    except (ValueError, KeyError, IndexError, NotImplementedError) as error:
+        raise FileError(f"{path} cannot be read as a triangulated surface: {error}") from error
+    if not isinstance(mesh, Trimesh) or not len(mesh.faces):
+        raise FileError(f"{path} holds no triangles; save the scan as a triangulated surface")
+    points, faces = length * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64)
+    if not np.isfinite(points).all():
+        raise FileError(f"{path} has coordinates that are no numbers")
+    cells = faces[:, [0, 1, 2, 2]]
+    real = cell_areas(points, cells) > 1e-12 * np.ptp(points, axis=0).max() ** 2
+    if not real.any():
+        raise FileError(f"{path}: none of its {len(cells)} triangles has an area")
+    closed = mesh.is_watertight and mesh.is_winding_consistent
+    volume = abs(float(mesh.volume)) * length**3 if closed else np.nan
+    return ScannedSurface(points, cells[real], volume, tuple(_remarks(points, cells[real], ~real)))
+
+
+def _remarks(points: np.ndarray, cells: np.ndarray, flat: np.ndarray) -> list[str]:
+    """Triangles without area, open edges, branches, neighbours wound against each other."""
+    out = []
+    if flat.any():
+        out.append(f"{flat.sum()} triangles of the scan have no area and were left out.")
+    open_ = free_edges(cells)
+    if len(open_):
+        length = np.linalg.norm(np.diff(points[open_], axis=1), axis=2).sum()
+        share = len(open_) / len(np.unique(edges_of(cells), axis=0))
+        out.append(
+            f"The scan is open: {len(open_)} free edges ({100 * share:.2g} %), "
+            f"{length:.3g} m long together; it has no volume to weigh."
+        )
+    turned, branched = edge_faults(cells)
+    if turned:
+        out.append(f"Across {turned} edges of the scan the triangles are wound against each other.")
+    if branched:
+        out.append(f"{branched} edges of the scan are shared by more than two triangles.")
+    return out

@@ -1,0 +1,68 @@
+"""The folder of a diagnosis: the updated deck, ``diagnosis.json``, pictures, the page."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..case import Case
+from ..io.nastran import write_deck
+from ..output import write_json
+from ..progress import Progress, silent
+from ..view.surface import surface
+from ..workflows.case_model import markers
+from ..workflows.diagnosis_result import DiagnosisResult
+from .diagnosis_json import diagnosis_json
+from .figures import Shown, figures
+from .page import write_page
+
+
+def write_diagnosis(
+    folder: Path,
+    case: Case,
+    result: DiagnosisResult,
+    command: str = "",
+    progress: Progress = silent,
+) -> DiagnosisResult:
+    """Write all of it; the result with the names of the files.
+
+    Parameters
+    ----------
+    command : the line that makes this run again
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {
+        "deck": _deck(folder, case, result),
+        "report": "report.html",
+        "diagnosis": "diagnosis.json",
+    }
+    result = replace(result, files=files)
+    write_json(folder / "diagnosis.json", diagnosis_json(result))
+    progress("pictures", 0.0)
+    drawn = figures(folder, result, shown(case, result))
+    title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
+    write_page(folder, result, drawn, result.notes, command=command, title=title)
+    return result
+
+
+def _deck(folder: Path, case: Case, result: DiagnosisResult) -> str | None:
+    """Name of the updated deck; None where no card can hold the change."""
+    if result.models is None or result.models.changes is None:
+        return None
+    path = folder / case.deck.path.with_name("updated.bdf").name
+    return write_deck(case.deck, path, result.models.changes).name
+
+
+def shown(case: Case, result: DiagnosisResult) -> Shown:
+    """What the pictures need: the mesh, the sensors, test and model responses."""
+    models, compared = result.models, result.compared == "responses"
+    return Shown(
+        surface(case.assembly),
+        [p.name for p in case.assembly.parts],
+        case.assembly.ids,
+        {} if models is None else models.curves,
+        () if models is None else models.held_out,
+        compared,
+        [case.band] if case.band and compared else [],
+        list(case.exclude),
+        markers(case.outputs),
+        markers(case.inputs),
+    )

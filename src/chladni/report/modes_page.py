@@ -1,0 +1,51 @@
+"""Normal modes as a page: frequencies, mass, energy of each part, shapes."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..workflows.loaded_model import Model
+from ..workflows.modes import NormalModes
+from .blocks import Facts, PageParts, Picture, Section, Table
+from .words import number
+
+_SHOWN = 12  # modes in the picture
+
+
+def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
+    """Sections of the page; the picture and the shapes for ParaView are written into the folder."""
+    from ..io.vtu import write_vtu
+    from ..view.scene import montage
+
+    modal = found.modal
+    motion, f = model.motion(modal.shapes), modal.frequency
+    write_vtu(folder / "modes.vtu", model.assembly, motion, f)
+    elastic = np.flatnonzero(~found.rigid)
+    shown = elastic[:_SHOWN] if len(elastic) else np.arange(min(_SHOWN, len(modal)))
+    numbers = [int(k) + 1 for k in shown]
+    montage(folder / "modes.png", model.seen, motion[:, :, shown], f[shown], numbers=numbers)
+    shapes = Picture(folder / "modes.png", "Colour: displacement, 0 to its largest.")
+    kg = "kg" if found.in_si else "deck units"
+    lead = (
+        f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
+        f"its mass is {number(found.mass)} {kg}."
+    )
+    files = [("modes.vtu", "shapes for ParaView"), ("modes.png", "the first elastic modes")]
+    sections = [Section("Mode shapes", [shapes]), Section("Modes", _tables(found, kg))]
+    return PageParts(lead, sections, found.notes, files)
+
+
+def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:
+    m, f = "m" if found.in_si else "deck units", found.modal.frequency
+    centre = ", ".join(number(x) for x in found.centre_of_gravity)
+    facts = [("Mass", f"{number(found.mass, 6)} {kg}"), ("Centre of gravity", f"({centre}) {m}")]
+    rows = [
+        (str(k + 1), number(f[k], 6), *(_share(e) for e in found.strain_energy[:, k]))
+        for k in range(len(f))
+    ]
+    heads = ("mode", "Hz", *(name for name, _ in found.parts))
+    return [Facts(facts), Table(heads, rows, caption="Share of each part in the strain energy.")]
+
+
+def _share(value: float) -> str:
+    return "–" if not np.isfinite(value) else f"{100 * value:.1f} %"

@@ -1,0 +1,53 @@
+"""Frequency responses as a page: the outputs that move most."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..dynamics.frf import FRF, UNIT
+from .blocks import PageParts, Picture, Section, Table
+from .words import number
+
+_MOTION = {"receptance": "m", "mobility": "m/s", "accelerance": "m/s²"}  # under a deck's own loads
+_SHOWN = 12  # pictures
+
+
+def response_page(folder: Path, found: FRF) -> PageParts:
+    """Sections of the page; its pictures are written into the folder."""
+    from ..view import plots
+
+    unit = (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
+    peak = np.abs(found.values).max(axis=0)
+    at = found.frequency[np.abs(found.values).argmax(axis=0)]
+    count = max(1, _SHOWN // len(found.inputs))
+    shown = sorted(np.argsort(-peak.max(axis=1), kind="stable")[:count].tolist())
+    pictures, files = [], []
+    for j, drive in enumerate(found.inputs):
+        for i in (i for i in shown if peak[i, j] > 0):
+            title = f"{found.outputs[i]} from {drive}"
+            path = folder / _name(found.outputs[i], drive)
+            plots.frf(path, {"model": (found.frequency, found.values[:, i, j])}, title, unit)
+            pictures.append(Picture(path))
+            files.append((path.name, title))
+    rows = [
+        (found.outputs[i], drive, number(peak[i, j]), number(at[i, j]))
+        for i in shown
+        for j, drive in enumerate(found.inputs)
+    ]
+    notes = []
+    if len(found.outputs) > len(shown):
+        notes.append(
+            f"The {len(shown)} outputs that move most are shown; all {len(found.outputs)} are in "
+            "the arrays."
+        )
+    heads = ("output", "input", f"largest [{unit}]" if unit else "largest", "at [Hz]")
+    f, count = found.frequency, len(found.outputs) * len(found.inputs)
+    lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
+    table = Table(heads, rows, ("output", "input"))
+    return PageParts(lead, [Section("Responses", [*pictures, table])], notes, files)
+
+
+def _name(output: str, drive: str) -> str:
+    text = f"frf_{output}_from_{drive}".replace("-", "m")
+    return f"{re.sub(r'[^A-Za-z0-9]+', '_', text)}.png"

@@ -1,0 +1,90 @@
+"""Results as plain data: what every command writes beside its page."""
+
+from functools import singledispatch
+from typing import Any
+
+from ..planning import Plan, summary
+from ..workflows.correlate import Correlation
+from ..workflows.diagnosis_result import DiagnosisResult
+from ..workflows.identify import Identification, RecordingModes, firm
+from ..workflows.modes import NormalModes
+from .diagnosis_json import diagnosis_json
+
+
+@singledispatch
+def to_json(result: Any) -> dict[str, Any]:
+    """A result of :mod:`chladni.workflows` as the JSON that its command writes."""
+    raise TypeError(f"{type(result).__name__} is no result of a workflow")
+
+
+@to_json.register
+def _(result: DiagnosisResult) -> dict[str, Any]:
+    return diagnosis_json(result)
+
+
+@to_json.register
+def _(result: Plan) -> dict[str, Any]:
+    return summary(result)
+
+
+@to_json.register
+def _(result: NormalModes) -> dict[str, Any]:
+    """``modes.json``; without a unit system mass and centre are under names that claim none."""
+    mass, centre = (
+        ("mass_kg", "centre_of_gravity_m") if result.in_si else ("mass", "centre_of_gravity")
+    )
+    return {
+        "frequency_hz": result.modal.frequency,
+        "generalized_mass": result.generalized_mass,
+        mass: result.mass,
+        centre: result.centre_of_gravity,
+        "rigid": result.rigid,
+        "parts": {
+            name: {"id": id, "strain_energy": share}
+            for (name, id), share in zip(result.parts, result.strain_energy, strict=True)
+        },
+    }
+
+
+@to_json.register
+def _(result: Identification) -> dict[str, Any]:
+    return {"recordings": [_recording(r) for r in result.recordings]}
+
+
+def _recording(r: RecordingModes) -> dict[str, Any]:
+    m = r.modes
+    return {
+        "name": r.recording.name,
+        "band_hz": m.band,
+        "frequency_hz": m.frequency,
+        "frequency_sd_hz": m.frequency_sd,
+        "damping": m.damping,
+        "damping_sd": m.damping_sd,
+        "firm": firm(m),
+        "chi": m.chi,
+        "outputs": m.outputs,
+        "inputs": m.inputs,
+    }
+
+
+@to_json.register
+def _(result: Correlation) -> dict[str, Any]:
+    p, q, f, test = result.pairs, result.quality, result.f_model, result.f_test
+    held: dict[str, Any] = {
+        "modes": [
+            {"test_hz": test[j], "model_hz": f[i], "deviation": f[i] / test[j] - 1, "mac": value}
+            for i, j, value in zip(p.model, p.test, p.mac, strict=True)
+        ],
+        "alone_test_hz": test[p.alone_test],
+        "alone_model_hz": f[p.alone_model],
+    }
+    if result.comac is not None:
+        held["comac"] = dict(zip(result.sensors, result.comac, strict=True))
+    if q is not None:
+        held["Q"] = {
+            "mean": q.Q,
+            "total": q.total,
+            "channel": dict(zip(result.channels, q.channel.ravel(), strict=True)),
+            "band": [{"band_hz": b, "Q": x} for b, x in zip(q.bands, q.band, strict=True)],
+        }
+    return held

@@ -1,0 +1,176 @@
+"""The parts of a diagnosis as types: one a key of ``diagnosis.json`` (SI)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A physical value with its 95 % interval."""
+
+    name: str
+    value: float
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where an effect acts: in words, and as far as it is known in numbers."""
+
+    text: str = ""
+    parts: tuple[str, ...] = ()
+    grids: tuple[int, ...] = ()
+    point_m: tuple[float, ...] | None = None
+    radius_m: float | None = None
+    band_hz: tuple[float, float] | None = None
+    channels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """Physics that was found missing, or the fault of a channel."""
+
+    name: str
+    claim: str = ""
+    log_evidence: float | None = None
+    where: Location = Location()
+    parameters: tuple[Estimate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An explanation that was tried and is not the answer."""
+
+    name: str
+    log_evidence: float | None = None
+    why_not: str = ""
+    where: Location | None = None
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Q, mean |log10(H_model/H_test)|² over channels and lines, of one set of samples.
+
+    The first three are of decks as they are written, with nothing hidden beside them.
+
+    Attributes
+    ----------
+    nominal : the deck as it was given
+    calibrated : the deck with ordinary parameters fitted, no effect in it
+    with_effect : the updated deck
+    floor : what the noise of the recording alone leaves
+    calibrated_with_mesh_error, with_mesh_error : the same two decks on an infinitely fine mesh, as
+        far as the fit could tell; the held-out data judge an effect by these
+    with_scatter : what is left when scatter within the parts and each mode's own error are fitted
+    """
+
+    nominal: float | None = None
+    calibrated: float | None = None
+    with_effect: float | None = None
+    floor: float | None = None
+    calibrated_with_mesh_error: float | None = None
+    with_mesh_error: float | None = None
+    with_scatter: float | None = None
+
+    @property
+    def after(self) -> float | None:
+        """Of the updated deck; where nothing was sought, of the calibrated one."""
+        return self.calibrated if self.with_effect is None else self.with_effect
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the decks agree with the recording.
+
+    Attributes
+    ----------
+    fitted, held_out : Scores
+    what : the held-out data in words
+    gain : of the named effect over calibration, in -2 ln evidence; None: none is named
+    largest_gain : of any effect that was tried
+    threshold : the gain from which an effect is named
+    """
+
+    fitted: Scores = Scores()
+    held_out: Scores = Scores()
+    what: str = ""
+    gain: float | None = None
+    largest_gain: float | None = None
+    threshold: float | None = None
+
+
+@dataclass(frozen=True)
+class CalibratedParameter:
+    """An ordinary parameter that was fitted, beside the value of the deck."""
+
+    where: str
+    estimate: Estimate
+    deck_value: float | None = None
+
+
+@dataclass(frozen=True)
+class MassComparison:
+    """What the scales say and what the updated deck weighs [kg]."""
+
+    weighed_kg: float | None = None
+    model_kg: float | None = None
+
+
+@dataclass(frozen=True)
+class FrequencyRow:
+    """A frequency of the test and its partner in every deck [Hz]; None: it has none."""
+
+    test_hz: float
+    before_hz: float | None = None
+    mac_before: float | None = None
+    calibrated_hz: float | None = None
+    mac_calibrated: float | None = None
+    after_hz: float | None = None
+    mac_after: float | None = None
+
+
+@dataclass(frozen=True)
+class FrequencyError:
+    """Root mean square of ln(model/test) over the first paired frequencies [%]."""
+
+    before: float | None = None
+    calibrated: float | None = None
+    after: float | None = None
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Whether what calibration leaves is structured or noise."""
+
+    structured: bool
+    left: float
+    known: float
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Adequacy:
+    """The absolute test of the best explanation."""
+
+    passes: bool
+    p: float
+    what: str
+    where: tuple[dict[str, object], ...] = ()
+
+
+def estimate(row: dict[str, object]) -> Estimate:
+    """An effect's reported parameter as a type."""
+    name, value, unit, low, high = (row[k] for k in ("name", "value", "unit", "low", "high"))
+    return Estimate(str(name), _float(value), str(unit), _float(low), _float(high))
+
+
+def location(where: dict[str, object]) -> Location:
+    """An effect's place as a type."""
+    return Location(**{k: tuple(v) if isinstance(v, list) else v for k, v in where.items()})  # type: ignore[arg-type]
+
+
+def _float(value: object) -> float:
+    return float(np.asarray(value, float))

@@ -1,0 +1,90 @@
+"""Q of decks as they are written: no mesh error, no scatter, no gain beside them.
+
+The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and the static
+responses to its sensors' and shakers' unit loads, as the reduced model of a diagnosis does.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from ..dynamics.reduction import attachments, orthonormal, shifted
+from ..fem.modelled import Modelled, node_points
+from .hypothesis_fit import Trial
+from .likelihood import LN10, Poles, Responses
+from .question import Prepared, Question
+from .reduced_model import State
+from .reduced_problem import REACH
+
+
+def written_Q(
+    question: Question,
+    prepared: Prepared,
+    model: Modelled,
+    sets: tuple[np.ndarray, ...],
+    real: np.ndarray | None = None,
+    fault: Trial | None = None,
+) -> tuple[float, ...]:
+    """Q of a structure on each of these sets of samples.
+
+    Parameters
+    ----------
+    sets : of samples, in the shape of ``prepared.score.use``
+    real : (n,) bool       poles of the test that are modes
+    fault : the fault of a channel, taken out of the recording before it is compared
+
+    Where the gain is unknown, the mean level over the fitted samples is taken out as well.
+    """
+    data, state = seen(question, prepared.score, model, prepared.search.setup.top)
+    if isinstance(data, Poles):
+        return tuple(data.Q(state, use, real) for use in sets)
+    n = len(data.a)
+    offset = np.zeros(n, complex)
+    if fault is not None and (change := fault.effect.outputs(fault.fit.of(fault.effect))):
+        offset = offset + change.value
+    if not question.gain_known:
+        delta = data.deviation(replace(state, offset=offset))
+        offset = offset - delta[prepared.score.use].real.mean()
+    state = replace(state, offset=offset)
+    return tuple(data.Q(state, use) for use in sets)
+
+
+def seen(
+    question: Question, score: Responses | Poles, model: Modelled, top: float
+) -> tuple[Responses | Poles, State]:
+    """The data with this structure's rows in its own modes, and those modes."""
+    built, modes = model.structure, model.up_to(REACH * top)
+    basis = modes.shapes
+    if isinstance(score, Poles):
+        lam = (2 * np.pi * modes.frequency) ** 2
+        if score.outputs is not None:
+            a, b = (p.around(built) @ basis for p in (question.outputs, question.inputs))
+            score = replace(score, a=a, b=b)
+        return score, _state(lam, np.eye(len(lam)))
+    rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
+    flexible = modes.frequency[modes.frequency > 0.02 * top]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
+    still = attachments(
+        shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
+    )
+    basis = orthonormal(built.system.M, [basis, still], kept=basis.shape[1])
+    K, M = (basis.T @ (A @ basis) for A in (built.system.K.real, built.system.M))
+    lam, phi = sl.eigh((K + K.T) / 2, (M + M.T) / 2)
+    return replace(score, a=rows_o @ basis, b=rows_i @ basis), _state(lam, phi)
+
+
+def _state(lam: np.ndarray, phi: np.ndarray) -> State:
+    return State(lam, phi, np.zeros(0), np.zeros(0), 0.0, np.zeros(0), None, None)
+
+
+def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None) -> float | None:
+    """Q that the noise of the recording alone leaves; None where nothing is in use."""
+    if isinstance(prepared.score, Poles):
+        chosen = use if real is None else use & real
+        variance = (prepared.score.sd[chosen] / LN10) ** 2
+    else:
+        assert prepared.noise is not None
+        variance = prepared.noise[use]
+    return float(variance.mean()) if variance.size else None

@@ -1,0 +1,17 @@
+"""Fit the ordinary parameters of a deck alone."""
+
+from ..case import Case
+from ..progress import Progress, silent
+from .diagnosis_pipeline import answered
+from .diagnosis_result import DiagnosisResult
+
+
+def calibrate(case: Case, progress: Progress = silent) -> DiagnosisResult:
+    """E, rho and t of the parts (or what the case frees) at their most probable; no new physics.
+
+    Raises
+    ------
+    FileError
+        If the recordings hold nothing to compare, or the deck's unit system cannot be right.
+    """
+    return answered(case, False, progress)

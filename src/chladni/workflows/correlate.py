@@ -1,0 +1,137 @@
+"""Test and model side by side, nothing calibrated: paired modes, MAC, COMAC, Q."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..case import Case
+from ..dynamics.frf import FRF
+from ..dynamics.modes import ModalModel, rigid_modes
+from ..ema.correlation import Quality, comac, deviation, mac, quality
+from ..ema.identification import Identified
+from ..ema.identification import identify as identified
+from ..ema.mode_pairing import ModePairs, pair
+from ..errors import ChladniError, FileError
+from ..fem.modelled import Modelled, modelled
+from ..progress import Progress, silent
+from .case_model import DAMPING, REACH, model_frf
+from .identify import firm
+from .unit_check import refuse_other_units
+
+BANDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Test and model side by side: paired modes with shapes at the sensors, and Q.
+
+    Attributes
+    ----------
+    channels, sensors : names of the columns of Q and of COMAC
+    test : what was identified; None where only poles were given
+    f_test, f_model : (r_test,), (r_model,) [Hz]
+    mac : (r_model, r_test) or None
+    pairs : ModePairs
+    comac : (n_out,) or None
+    quality : Q by channel and band, or None
+    model : responses of the model on the lines of the recording, or None
+    """
+
+    channels: tuple[str, ...]
+    sensors: tuple[str, ...]
+    test: Identified | None
+    f_test: np.ndarray
+    f_model: np.ndarray
+    mac: np.ndarray | None
+    pairs: ModePairs
+    comac: np.ndarray | None = None
+    quality: Quality | None = None
+    model: FRF | None = None
+    notes: tuple[str, ...] = ()
+
+
+def correlate(case: Case, progress: Progress = silent) -> Correlation:
+    """Identify the first recording, pair its modes with the model's, score the responses.
+
+    Raises
+    ------
+    FileError
+        If the deck's unit system cannot be right, or there is nothing to compare with.
+    """
+    refuse_other_units(case)
+    with threadpool_limits(1):
+        return _correlated(case, progress)
+
+
+def _correlated(case: Case, progress: Progress) -> Correlation:
+    test = case.frfs[0] if case.frfs else None
+    top = _top(case, test)
+    progress("modes of the model", 0.1)
+    model = modelled(case.assembly, REACH * top)
+    inside = ~rigid_modes(model.modes) & (model.modes.frequency <= 1.3 * top)
+    near = model.modes.sel(np.flatnonzero(inside))
+    if test is None:
+        return _by_poles(case, near)
+    progress("modes of the test", 0.4)
+    found = identified(test, case.band, use=case.lines(test.frequency))
+    found = found.sel(firm(found) & (found.frequency >= found.band[0]))
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, _shapes(found)
+    M = mac(phi, psi) if len(test.outputs) > 2 else None
+    pairs = pair(near.frequency, found.frequency, M)
+    by_dof = None
+    if M is not None and len(pairs):
+        by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
+    progress("responses", 0.6)
+    responses, q, notes = _scored(case, model, test)
+    return Correlation(
+        tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
+        case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
+        responses, (*case.notes, *notes),
+    )  # fmt: skip
+
+
+def _top(case: Case, test: FRF | None) -> float:
+    """Highest frequency the test speaks of [Hz]."""
+    if case.band is not None:
+        return case.band[1]
+    if test is not None:
+        return float(test.frequency[-1])
+    poles = [float(r.poles.frequency.max()) for r in case.recordings if r.poles is not None]
+    if not poles:
+        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+    return max(poles)
+
+
+def _by_poles(case: Case, near: ModalModel) -> Correlation:
+    poles = next(r.poles for r in case.recordings if r.poles is not None)
+    f = poles.of(poles.states[0]).frequency
+    return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),
+                       notes=case.notes)  # fmt: skip
+
+
+def _shapes(found: Identified) -> np.ndarray:
+    """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
+    size = np.linalg.norm(found.residues, axis=1)
+    best = size.argmax(axis=1)
+    return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)
+
+
+def _scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
+    """Responses of the model, Q over the lines that count, and how it was taken."""
+    use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
+    low, high = test.frequency[use][[0, -1]]
+    seen = test.sel(band=(max(float(low), 1e-9), float(high)))
+    responses = model_frf(case, model, case.damping or DAMPING, seen)
+    ends = np.linspace(low, high, BANDS + 1)
+    bands = tuple(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+    weight = case.lines(seen.frequency)[:, None, None].astype(float)
+    try:
+        delta = deviation(responses, seen)
+    except ChladniError as error:
+        return responses, None, (f"No Q could be formed: {error}.",)
+    notes: tuple[str, ...] = ()
+    if not case.gain_known:
+        delta = delta - np.median(delta.real)
+        notes = ("The gain is unknown, so Q was taken after one common factor was removed.",)
+    return responses, quality(delta, seen.frequency, bands, weight), notes

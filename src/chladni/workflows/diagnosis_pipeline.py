@@ -1,0 +1,182 @@
+"""From a case to the result of a diagnosis or calibration: the one road all of them take.
+
+1. the recording is read, what is held out is chosen (``prepare``);
+2. hypotheses are fitted and compared by evidence (``updating.diagnosis``);
+3. the fit that is reported is repeated where the reduced model had left its ground (``renewed``);
+4. the held-out data are heard (``judged``);
+5. the result is written into the deck, and every number is taken from the decks as written.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..case import Case
+from ..dynamics.frf import FRF
+from ..errors import FileError, LabelError, ModelError
+from ..fem.energy import mass_properties
+from ..fem.modelled import modelled
+from ..io.nastran.edit.changes import Change
+from ..io.nastran.edit.model_changes import changes
+from ..io.nastran.edit.written_assembly import written_assembly
+from ..model.assembly import Assembly
+from ..progress import Progress, within
+from ..updating.diagnosis import Diagnosis
+from ..updating.diagnosis import diagnose as compared
+from ..updating.frequency_table import frequency_error, frequency_rows
+from ..updating.likelihood import Poles, Responses
+from ..updating.outcome import fitted_scores, held_out, judged, models, real_poles
+from ..updating.preparation import prepare
+from ..updating.question import Prepared, Question
+from ..updating.renewal import renewed
+from ..updating.result import MassComparison, Scores
+from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
+from ..updating.written_scores import noise_Q, written_Q
+from .case_model import DAMPING, model_frf
+from .diagnosis_result import DiagnosisResult, UpdatedModels
+from .question_of_case import question
+
+
+def answered(case: Case, search: bool, progress: Progress) -> DiagnosisResult:
+    """Diagnose (or, without ``search``, only calibrate) a case, on one BLAS thread."""
+    with threadpool_limits(1):
+        progress("identifying the recording", 0.0)
+        asked = question(case)
+        prepared = prepare(asked)
+        found = compared(prepared.search, within(progress, 0.1, 0.85), search)
+        found, distrust = _judged(asked, prepared, found)
+        progress("the updated deck", 0.85)
+        stages, lost = _updated(case, asked, prepared, found)
+        progress("scores", 0.95)
+        result = _result(asked, prepared, found, stages)
+        notes = (*result.notes, *lost, *case.notes)
+        return replace(result, notes=notes, distrust=distrust, searched=search)
+
+
+def _judged(
+    asked: Question, prepared: Prepared, found: Diagnosis
+) -> tuple[Diagnosis, tuple[str, ...]]:
+    """The verdict after renewal and the held-out data, and reasons not to trust it."""
+    distrust: tuple[str, ...] = ()
+    if found.found is not None:
+        lead = renewed(asked, prepared, found.found)
+        found = replace(
+            found, trials=(lead.trial, *found.trials[1:]), notes=(*found.notes, lead.note)
+        )
+        found, distrust = judged(prepared, found), lead.distrust
+    if found.found is None:
+        plain = renewed(asked, prepared, found.plain)
+        found = replace(found, plain=plain.trial, notes=(*found.notes, plain.note))
+        distrust = plain.distrust
+    return found, distrust
+
+
+def _updated(
+    case: Case, asked: Question, prepared: Prepared, found: Diagnosis
+) -> tuple[UpdatedModels, list[str]]:
+    """The structures before and after, each solved once, the last as its deck has it."""
+    stages, band = models(asked, found), prepared.nominal.band
+    known = {id(case.assembly): prepared.nominal}
+    edits, final, lost = _as_written(case, stages.final)
+    if stages.final is not case.assembly or edits:
+        known[id(stages.final)] = modelled(final, band)
+    for assembly in (stages.calibrated, stages.final):
+        if id(assembly) not in known:
+            known[id(assembly)] = modelled(assembly, band)
+    nominal, calibrated, last = (
+        known[id(a)] for a in (case.assembly, stages.calibrated, stages.final)
+    )
+    made = UpdatedModels(nominal, calibrated, last, edits, held_out=_unseen(prepared))
+    return replace(made, curves=_curves(case, made)), lost
+
+
+def _as_written(
+    case: Case, final: Assembly
+) -> tuple[tuple[Change, ...] | None, Assembly, list[str]]:
+    """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
+    try:
+        edits = tuple(changes(case.deck, case.assembly, final, case.units))
+        return edits, written_assembly(case.deck, edits, case.units), []
+    except (FileError, LabelError, ModelError) as error:
+        return None, final, [f"no updated deck was written: {error}"]
+
+
+def _unseen(prepared: Prepared) -> tuple[str, ...]:
+    """Labels of the outputs that no fit saw."""
+    data = prepared.search.data
+    if not isinstance(data, Responses):
+        return ()
+    labels = prepared.search.labels
+    return tuple(label for k, label in enumerate(labels) if not data.use[:, k].any())
+
+
+def _curves(case: Case, made: UpdatedModels) -> dict[str, FRF]:
+    """The recording and the responses of the deck before and after, over all that was compared."""
+    if not case.frfs:
+        return {}
+    low, high = case.band or (0.0, np.inf)
+    if case.held_band is not None:
+        high = max(high, case.held_band[1])
+    test = case.frfs[0].sel(band=(max(low, 1e-6), high))
+    zeta = case.damping or DAMPING
+    after = before = model_frf(case, made.nominal, zeta, test)
+    if made.final is not made.nominal:
+        after = model_frf(case, made.final, zeta, test)
+    return {"test": test, "before": before, "after": after}
+
+
+def _result(
+    asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
+) -> DiagnosisResult:
+    """All numbers and words, from the decks as written."""
+    last = found.found or found.null
+    real = real_poles(prepared, last)
+    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
+    rows = frequency_rows(asked, prepared, every, real)
+    fitted, held = _scores(asked, prepared, found, stages, real)
+    left = remainder(prepared, found)
+    weighed = None if asked.weighing is None else asked.weighing.mass
+    return DiagnosisResult(
+        verdict=found.verdict,
+        effects=() if found.found is None else (named_effect(found.found),),
+        alternatives=alternatives(found),
+        agreement=agreement(prepared, found, fitted, held),
+        calibrated=calibrated(found),
+        mass=MassComparison(weighed, mass_properties(stages.final.assembly)[0]),
+        frequencies=rows,
+        frequency_error=frequency_error(rows),
+        structured=left,
+        notes=(*prepared.notes, *found.notes, left.sentence),
+        compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
+        models=stages,
+    )
+
+
+def _scores(
+    asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
+    real: np.ndarray | None,
+) -> tuple[Scores, Scores]:  # fmt: skip
+    """Q of the three decks on fitted and held-out data, the noise, and what nuisances take."""
+    winner = found.found or found.null
+    sets = prepared.score.use, held_out(prepared, winner)
+    fault = found.found if found.verdict == "measurement fault" else None
+    nominal = written_Q(asked, prepared, stages.nominal, sets, real)
+    calibrated = final = nominal
+    if stages.calibrated is not stages.nominal:
+        calibrated = written_Q(asked, prepared, stages.calibrated, sets, real)
+    if stages.final is not stages.nominal:
+        final = written_Q(asked, prepared, stages.final, sets, real, fault)
+    fits = fitted_scores(prepared, found)
+    first, second = (
+        (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)
+        for q, use, fit in zip(
+            zip(nominal, calibrated, final, strict=True), sets, fits, strict=True
+        )
+    )
+    return Scores(*map(_finite, first)), Scores(*map(_finite, second))
+
+
+def _finite(value: float | None) -> float | None:
+    """The value; None where nothing was there to take a mean of."""
+    return value if value is not None and np.isfinite(value) else None

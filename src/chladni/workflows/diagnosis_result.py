@@ -1,0 +1,103 @@
+"""The result of a diagnosis or calibration, and the structures it speaks of (SI).
+
+:mod:`chladni.report.diagnosis_json` writes it as ``diagnosis.json`` and reads it back.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from ..dynamics.frf import FRF
+from ..errors import AccuracyError
+from ..fem.modelled import Modelled
+from ..io.nastran.edit.changes import Change
+from ..updating.result import (
+    Adequacy,
+    Agreement,
+    Alternative,
+    CalibratedParameter,
+    FrequencyError,
+    FrequencyRow,
+    MassComparison,
+    NamedEffect,
+    Remainder,
+)
+
+Compared = Literal["responses", "frequencies"]
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatedModels:
+    """The three structures a diagnosis speaks of, and their responses beside the recording's.
+
+    Attributes
+    ----------
+    nominal, calibrated, final : Modelled    the last as a reader of the updated deck has it
+    changes : of the cards, that make the updated deck; None where no card can hold them
+    curves : {"test", "before", "after": FRF}, empty where no FRF exists
+    held_out : labels of outputs that were not fitted
+    """
+
+    nominal: Modelled
+    calibrated: Modelled
+    final: Modelled
+    changes: tuple[Change, ...] | None = ()
+    curves: dict[str, FRF] = field(default_factory=dict)
+    held_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisResult:
+    """What was found, how sure it is, and how much it helps.
+
+    Attributes
+    ----------
+    verdict : a public verdict
+    effects, alternatives : what is named, and all else that was tried, best first
+    agreement : Q of every deck
+    calibrated : E, rho, t, ... that were fitted
+    frequencies : test and decks side by side
+    structured : whether calibration alone leaves more than noise
+    adequate, one_of : the absolute test, and explanations that the data cannot separate; not
+        made yet
+    notes : how the recording was read, what was done and why
+    distrust : reasons not to trust the result; the command then exits with 3
+    compared : whether responses or natural frequencies were compared
+    searched : False where only ordinary parameters were fitted
+    files : {what: name} of what was written beside it
+    models : the structures; None where the result was read from a file
+    """
+
+    verdict: str = ""
+    effects: tuple[NamedEffect, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    agreement: Agreement | None = None
+    calibrated: tuple[CalibratedParameter, ...] = ()
+    mass: MassComparison | None = None
+    frequencies: tuple[FrequencyRow, ...] = ()
+    frequency_error: FrequencyError | None = None
+    structured: Remainder | None = None
+    adequate: Adequacy | None = None
+    one_of: tuple[tuple[str, ...], ...] = ()
+    notes: tuple[str, ...] = ()
+    distrust: tuple[str, ...] = ()
+    compared: Compared = "responses"
+    searched: bool = True
+    files: dict[str, str | None] = field(default_factory=dict)
+    models: UpdatedModels | None = None
+
+    @property
+    def deck_changed(self) -> bool:
+        """Whether the updated deck has other values than the one that was given."""
+        return self.verdict not in ("", "nothing missing")
+
+    def trusted(self) -> "DiagnosisResult":
+        """The result itself.
+
+        Raises
+        ------
+        AccuracyError
+            If there is a reason not to trust it.
+        """
+        if self.distrust:
+            raise AccuracyError("; ".join(self.distrust))
+        return self

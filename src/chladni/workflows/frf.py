@@ -1,0 +1,223 @@
+"""Frequency responses: of a case's recording, of a deck's own loads, or between given dofs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..case import Case
+from ..dofs import label, parse
+from ..dynamics.coupled import coupled_receptance
+from ..dynamics.frf import FRF, residual_flexibility
+from ..errors import FileError
+from ..fem.modelled import Modelled, node_points
+from ..fem.solve import base_response, inertia_load
+from ..model.analysis import Analysis, Subcase
+from ..progress import Progress, silent
+from .case_model import REACH, model_frf
+from .loaded_model import DeckModels, Model, as_model
+
+MOST, NAMED = 1200, 12  # dofs a deck may ask for at once; loaded ones taken in their stead
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponses:
+    """Responses, those on other frequencies in an FRF of their own, and what was done."""
+
+    frfs: tuple[FRF, ...]
+    notes: tuple[str, ...] = ()
+
+
+def frf(
+    source: Case | Model | DeckModels,
+    outputs: Sequence[str] = (),
+    inputs: Sequence[str] = (),
+    frequency: np.ndarray | None = None,
+    damping: float = 0.01,
+    progress: Progress = silent,
+) -> FrequencyResponses:
+    """Responses of a model.
+
+    Parameters
+    ----------
+    source : a case (lines and places of its recording), a deck (its own loads), or a model
+    outputs, inputs : labels as 55:+Z, 12:n or base:+Z; without inputs those of the source
+    frequency : (n_f,) [Hz]     with inputs
+    damping : ratio of every mode, where the case gives none
+
+    Raises
+    ------
+    FileError
+        If there is nothing to tell where it is driven and where it answers.
+    """
+    if inputs:
+        if frequency is None or not outputs:
+            raise FileError("--input needs at least one --output, as --output 55:+Z")
+        model = as_model(source)
+        return _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
+    if isinstance(source, Case):
+        return _of_recording(source, damping, progress)
+    if isinstance(source, DeckModels):
+        return _of_deck(source, outputs, progress)
+    raise FileError(f"{source.source}: give --input and --output, as --input 12:+Z")
+
+
+def _of_recording(case: Case, damping: float, progress: Progress) -> FrequencyResponses:
+    """The model's responses on the lines, labels and quantity of a case's first recording."""
+    if not case.frfs:
+        raise FileError(f"{case.path} holds no FRF; give --input and --output, as --input 12:+Z")
+    test = case.frfs[0]
+    test = test.sel(band=(max(float(test.frequency[0]), 1e-6), float(test.frequency[-1])))
+    ratio = case.damping or damping
+    note = f"Lines and places are those of the recording; every mode has {ratio:.2g}."
+    progress("modes", 0.2)
+    model = as_model(case).solved(REACH * float(test.frequency[-1]))
+    return FrequencyResponses((model_frf(case, model, ratio, test),), (note,))
+
+
+def _between(
+    model: Model, outputs: Sequence[str], inputs: Sequence[str], frequency: np.ndarray,
+    damping: float, progress: Progress,
+) -> FrequencyResponses:  # fmt: skip
+    """Receptance by modes up to ``REACH`` times the band and the static rest of the others."""
+    bases = [text for text in inputs if text.startswith("base:")]
+    if bases and len(inputs) > 1:
+        raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
+    progress("modes", 0.2)
+    known = [] if bases else [model.directions(side) for side in (outputs, inputs)]
+    made = model.solved(REACH * float(frequency[-1]))
+    progress("residual of higher modes", 0.6)
+    note = (
+        f"{len(made.modes)} modes up to {made.band:.4g} Hz were superposed with damping ratio "
+        f"{damping:.4g}; what higher modes contribute was added as a static residual."
+    )
+    if bases:
+        found = _from_base(made, outputs, inputs, frequency, damping)
+        return FrequencyResponses((found,), (note,))
+    s, modal = made.structure, made.modes.with_damping(damping)
+    pick, load = (side.T.toarray() for side in known)
+    rest = residual_flexibility(s.system, modal, pick, load, points=model.places)
+    phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
+    loss = sp.csr_array(s.hysteretic().K.imag)
+    H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
+    return FrequencyResponses((FRF(H, frequency, tuple(outputs), tuple(inputs)),), (note,))
+
+
+def _from_base(
+    made: Modelled, outputs: Sequence[str], inputs: Sequence[str], frequency: np.ndarray,
+    damping: float,
+) -> FRF:  # fmt: skip
+    """Acceleration per acceleration of all supports (transmissibility)."""
+    _, axis, sign = parse(inputs[0].replace("base:", "0:"))
+    ends = [parse(text) for text in outputs]
+    dofs, s = np.array([(point, c) for point, c, _ in ends]), made.structure
+    load = s.T.T @ inertia_load(made.assembly, -np.eye(3)[:, axis - 1 : axis])
+    modal, pick = made.modes.with_damping(damping), s.rows(dofs).T.toarray()
+    rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s))
+    found = base_response(s, modal, axis, frequency, dofs, residual=rest)
+    signs = sign * np.array([c for _, _, c in ends])
+    return replace(
+        found,
+        values=found.values * signs[:, None],
+        outputs=tuple(outputs),
+        inputs=tuple(inputs),
+    )
+
+
+def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> FrequencyResponses:
+    """Displacements under the deck's own dynamic loads, one column a subcase.
+
+    Subcases at other frequencies stand in an FRF of their own.
+    """
+    asked = models.analysis
+    cases = [c for c in asked.subcases if c.dload and c.frequency]
+    if not cases:
+        raise FileError(
+            f"{models.source} asks for no frequency response; give --input and --output"
+        )
+    labels, notes = list(outputs), list(asked.notes)
+    if not labels:
+        labels, said = _wanted(models.model(cases[0].id), asked, cases)
+        notes = [*said, *notes]
+    notes.append(
+        "Each input is a subcase with all its loads, as the deck gives them: values are motion, "
+        "not motion per unit force."
+    )
+    if asked.solution == 111 and not any(c.residual for c in cases):
+        notes.append(
+            "Modes beyond those of METHOD are missing, as in Nastran without RESVEC; RESVEC = YES "
+            "in the case control adds residual vectors."
+        )
+    columns = _columns(models, cases, labels, progress)
+    return FrequencyResponses(tuple(_gathered(labels, cases, columns)), tuple(notes))
+
+
+def _columns(
+    models: DeckModels, cases: Sequence[Subcase], labels: Sequence[str], progress: Progress
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(frequencies, displacements) of every subcase, each under its own supports."""
+    from ..fem.deck_response import response
+
+    ends = [parse(text) for text in labels]
+    dofs, signs = np.array([(point, c) for point, c, _ in ends]), [sign for *_, sign in ends]
+    built: dict[tuple[int, int], Model] = {}
+    out = []
+    for k, case in enumerate(cases):
+        progress(f"subcase {case.id}", 0.2 + 0.6 * k / len(cases))
+        held = (case.spc, case.mpc)
+        if held not in built:
+            built[held] = models.model(case.id)
+        f, u = response(built[held].structure, models.analysis, case, dofs)
+        out.append((f, u * signs))
+    return out
+
+
+def _gathered(
+    labels: Sequence[str], cases: Sequence[Subcase], columns: list[tuple[np.ndarray, np.ndarray]]
+) -> list[FRF]:
+    """Subcases at the same frequencies side by side."""
+    groups: dict[bytes, list[int]] = {}
+    for k, (f, _) in enumerate(columns):
+        groups.setdefault(f.tobytes(), []).append(k)
+    return [
+        FRF(
+            np.stack([columns[k][1] for k in group], axis=2),
+            columns[group[0]][0],
+            tuple(labels),
+            tuple(f"subcase {cases[k].id}" for k in group),
+        )
+        for group in groups.values()
+    ]
+
+
+def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[list[str], list[str]]:
+    """Dofs whose motion the case control asks for (the loaded ones where it names none or all)."""
+    ids = model.assembly.ids
+    runs = [run for case in cases for run in case.outputs]
+    named = np.zeros(len(ids), bool)
+    for first, last in runs:
+        named |= (ids >= first) & (ids <= last)
+    if not named.any():
+        return _loaded(model, asked), []
+    if 6 * named.sum() > MOST:
+        note = (
+            f"The deck asks for the motion of {named.sum()} points; of so many only the "
+            "loaded ones were taken, others with --output."
+        )
+        return _loaded(model, asked), [note]
+    scalar = model.assembly.scalar_points
+    alone = np.zeros(len(ids), bool) if scalar is None else np.asarray(scalar, bool)
+    found = np.flatnonzero(named)
+    return [label(int(ids[k]), c) for k in found for c in range(1, 2 if alone[k] else 7)], []
+
+
+def _loaded(model: Model, asked: Analysis) -> list[str]:
+    """The loaded degrees of freedom, for want of a wish."""
+    ends = {
+        (int(model.assembly.ids[row]), int(c))
+        for loads in asked.dynamic.values()
+        for load in loads
+        for row, c in zip(load.rows, load.components, strict=True)
+    }
+    return [label(point, c) for point, c in sorted(ends)[:NAMED]]

@@ -1,0 +1,145 @@
+"""Modes of recordings: poles with their spread, damping, residues."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..case import Case
+from ..ema.identification import Identified
+from ..ema.identification import identify as identified
+from ..ema.setup import PoleTable, Recording
+from ..errors import AccuracyError, FileError
+from ..progress import Progress, silent
+
+TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingModes:
+    """What was identified from one recording.
+
+    Attributes
+    ----------
+    recording : Recording
+    whole : Identified      with the poles beside the band that shape it
+    """
+
+    recording: Recording
+    whole: Identified
+
+    @property
+    def modes(self) -> Identified:
+        """The poles within the band."""
+        return self.whole.sel(self.whole.inside)
+
+    @property
+    def poles(self) -> PoleTable:
+        """The modes that are known well enough, as a table of a report has them."""
+        m = self.modes.sel(firm(self.modes))
+        r = len(m.poles)
+        return PoleTable(m.frequency, m.frequency_sd, m.damping, np.arange(1, r + 1), ("",) * r)
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The modes of every recording, what was done, and reasons not to trust them."""
+
+    recordings: tuple[RecordingModes, ...]
+    notes: tuple[str, ...] = ()
+    distrust: tuple[str, ...] = ()
+
+    def trusted(self) -> "Identification":
+        """The result itself.
+
+        Raises
+        ------
+        AccuracyError
+            If there is a reason not to trust it.
+        """
+        if self.distrust:
+            raise AccuracyError("; ".join(self.distrust))
+        return self
+
+
+def identify(
+    source: Case | Sequence[Recording],
+    band: tuple[float, float] | None = None,
+    averages: int = 1,
+    progress: Progress = silent,
+) -> Identification:
+    """Poles of every recording that holds an FRF.
+
+    Parameters
+    ----------
+    source : a case, whose band and gaps are kept to, or recordings
+    band : [Hz]; default that of the case, else the whole
+    averages : of the estimate, where the noise comes from the coherence
+
+    Raises
+    ------
+    FileError
+        If no recording holds an FRF.
+    """
+    recordings = source.recordings if isinstance(source, Case) else tuple(source)
+    held = [r for r in recordings if r.frf is not None]
+    if not held:
+        where = f"{source.path} " if isinstance(source, Case) else "what was recorded "
+        raise FileError(f"{where}holds no frequency responses to identify from")
+    gaps: tuple[tuple[float, float], ...] = ()
+    if isinstance(source, Case):
+        band, gaps = band or source.band, source.exclude
+    found = []
+    with threadpool_limits(1):
+        for k, recording in enumerate(held):
+            progress(f"poles of {recording.name}", k / len(held))
+            found.append(_modes(recording, band, gaps, averages))
+    return Identification(tuple(found), _notes(held, gaps), _doubts(found))
+
+
+def _modes(
+    recording: Recording,
+    band: tuple[float, float] | None,
+    gaps: Sequence[tuple[float, float]],
+    averages: int,
+) -> RecordingModes:
+    frf = recording.frf
+    assert frf is not None
+    use = np.ones(len(frf.frequency), bool)
+    for low, high in gaps:
+        use &= (frf.frequency < low) | (frf.frequency > high)
+    return RecordingModes(recording, identified(frf, band, averages=averages, use=use))
+
+
+def firm(modal: Identified) -> np.ndarray:
+    """Poles known to 2 % in frequency and to half their damping: (r,) bool."""
+    known = modal.frequency_sd < 0.02 * modal.frequency
+    return np.asarray(known & (modal.damping_sd < 0.5 * modal.damping))
+
+
+def _notes(held: Sequence[Recording], gaps: Sequence[tuple[float, float]]) -> tuple[str, ...]:
+    notes: list[str] = []
+    for r in held:
+        notes += r.notes
+        if r.frf is not None and r.frf.variance is None and r.frf.coherence is None:
+            notes.append(
+                f"{r.name} holds neither variance nor coherence, so its noise was taken from "
+                "the residual; spreads are weaker for it."
+            )
+    if gaps:
+        said = ", ".join(f"{low:g} to {high:g} Hz" for low, high in gaps)
+        notes.append(f"Left out, as the case says: {said}.")
+    return tuple(notes)
+
+
+def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
+    """Poles that leave far more than noise are handed out, but said to be weak."""
+    weak = [r for r in found if not firm(r.modes).any() or r.modes.chi > TRUST]
+    if not weak:
+        return ()
+    names = ", ".join(r.recording.name for r in weak)
+    return (
+        f"{names}: the poles leave {max(r.modes.chi for r in found):.3g} times the "
+        "noise, so they are not to be trusted; narrow the band (--band) or give --averages",
+    )

@@ -1,0 +1,76 @@
+"""Normal modes of a model: frequencies, shapes, mass, the energy of each part."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import Case
+from ..dynamics.modes import ModalModel, rigid_modes
+from ..fem.energy import mass_properties, part_energies
+from ..progress import Progress, silent
+from .loaded_model import Model, as_model
+
+
+@dataclass(frozen=True, eq=False)
+class NormalModes:
+    """Modes and what they say of the structure.
+
+    Attributes
+    ----------
+    modal : ModalModel
+    generalized_mass : (r,)         φᵀMφ [kg m²], 1 by normalisation
+    mass : float                    [kg], or the deck's own unit where none was given
+    centre_of_gravity : (3,)        [m], or the deck's own
+    rigid : (r,) bool
+    strain_energy : (parts, r)      share of each part; nan for rigid modes
+    parts : ((name, id), ...)
+    in_si : False where a bare deck came without its unit system
+    """
+
+    modal: ModalModel
+    generalized_mass: np.ndarray
+    mass: float
+    centre_of_gravity: np.ndarray
+    rigid: np.ndarray
+    strain_energy: np.ndarray
+    parts: tuple[tuple[str, int], ...]
+    in_si: bool
+    notes: tuple[str, ...] = ()
+
+
+def modes(source: Case | Model, count: int = 20, progress: Progress = silent) -> NormalModes:
+    """The ``count`` lowest modes, fewer where the model has fewer."""
+    model = as_model(source)
+    progress("matrices", 0.1)
+    structure = model.structure
+    size = len(structure.system.dofs)
+    progress(f"modes of {size} degrees of freedom", 0.2)
+    modal = model.modes(count)
+    progress("energies", 0.8)
+    phi, rigid = modal.shapes, rigid_modes(modal)
+    mass, centre = mass_properties(model.assembly)
+    return NormalModes(
+        modal,
+        np.einsum("nr,nr->r", phi, structure.system.M @ phi),
+        mass,
+        centre,
+        rigid,
+        np.where(rigid, np.nan, part_energies(structure, phi)),
+        tuple((part.name, part.id) for part in model.assembly.parts),
+        bool(model.unit),
+        (*model.notes, *_notes(model, modal, count, size)),
+    )
+
+
+def _notes(model: Model, modal: ModalModel, count: int, size: int) -> list[str]:
+    notes = []
+    if len(modal) < count:
+        notes.append(f"The model has {len(modal)} modes, {count} were asked for.")
+    rigid = int(rigid_modes(modal).sum())
+    notes.append(f"{size} degrees of freedom are free; {rigid} modes are rigid motions.")
+    if not model.unit:
+        notes.append(
+            "No unit system was given (--units), so mass and lengths are in the deck's own "
+            "units; frequencies are Hz in any consistent system."
+        )
+    return notes

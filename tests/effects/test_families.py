@@ -1,0 +1,276 @@
+"""What every family promises, ours and those of packages: physics, candidates, bench and deck."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects import registry
+from chladni.effects.effect import Effect
+from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.family import Article
+from chladni.effects.ordinary import ordinary, scatter
+from chladni.effects.point_mass import PointMass
+from chladni.effects.surroundings import Setup
+from chladni.fem.assemble import structure
+from chladni.fem.energy import mass_properties
+from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
+from chladni.io.nastran.edit.model_changes import changes
+from chladni.units import UNITS
+from chladni.updating.candidates import UpdatingContext
+from chladni.updating.hypothesis_fit import Search, Trial, fitted
+from chladni.updating.likelihood import Poles, Responses
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import workbench
+from chladni_specimens.plates import plate
+
+TOP = 300.0  # Hz; six flexible modes of the plate lie below
+FLEXIBLE = slice(6, 12)
+SENSORS = [1, 7, 57, 63, 25, 39]
+NAMES = (*(family.name for family in registry.BUILT_IN), "crack")
+CONTRACT = {  # names that issue texts, cases and other programs may use
+    *("global-stiffness", "global-density", "part-stiffness", "stiffness-patch"),
+    *("thickness-scale", "thickness-distribution", "orthotropic-material", "membrane-prestress"),
+    *("adhesive-stiffness", "viscoelastic-joint", "hem-contact", "weld-missing"),
+    *("weld-compliance", "over-constraint", "contact-stiffness", "rattle", "joint-friction"),
+    *("point-mass", "mass-patch", "sensor-mass", "local-resonator", "suspension"),
+    *("shaker-restraint", "extra-support", "compliant-support", "sensor-fault"),
+}
+
+
+@pytest.fixture(scope="module")
+def deck():
+    return plate(0.4, 0.3, 8, 6, 1.5e-3)
+
+
+@pytest.fixture(scope="module")
+def bench(deck):
+    return workbench(deck, TOP)
+
+
+@pytest.fixture(scope="module")
+def setup(deck):
+    return Setup(tuple(SENSORS), (7, 63), mass_properties(deck)[0], TOP)
+
+
+def searched(bench, data, setup):
+    """A search with E free, and its null."""
+    base = (ordinary(bench.groups, "E", [0]), scatter(bench.groups, "t", 0.01))
+    labels = tuple(f"{g}:+Z" for g in SENSORS)
+    search = Search(bench, data, None, base, (), setup, labels)
+    fit = fitted(bench.model, base, data, None, search.mean())
+    return UpdatingContext(search, Trial(Effect(), fit, bench.model))
+
+
+@pytest.fixture(scope="module")
+def by_responses(bench, setup):
+    """A plate 4 % stiffer than the model, with one corner sensor at half its level."""
+    rows = bench.grids.rows[[bench.grids.position(g) for g in SENSORS]]
+    s = 2 * np.pi * np.linspace(30, TOP, 50) * (0.05 + 1j)
+    use = np.ones((50, len(SENSORS)), bool)
+    empty = Responses(np.ones((50, len(SENSORS), 1), complex), s, rows, rows[[4]], use)
+    data = empty.over(bench.model)
+    stiffer = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.04]))
+    gains = np.where(np.arange(len(SENSORS)) == 2, 0.5, 1.0)[:, None]
+    return searched(bench, replace(data, values=data.model(stiffer) * gains), setup)
+
+
+@pytest.fixture(scope="module")
+def by_poles(bench, setup):
+    f = bench.frequency[FLEXIBLE] * 1.02
+    every = np.ones(len(f), bool)
+    return searched(bench, Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP)), setup)
+
+
+@pytest.fixture(params=NAMES)
+def family(request, example_crack):
+    return registry.family(request.param)
+
+
+@pytest.fixture
+def proposed(family, by_responses):
+    return family.proposed(by_responses)
+
+
+def acting(candidate):
+    """X off every symmetry, near the candidate's start."""
+    step = np.array([0.1 * p.sd for p in candidate.effect.parameters])
+    return candidate.start + step * np.cos(1 + np.arange(len(step)))
+
+
+def lam(model, effect, x):
+    return evaluate(model, [effect], x, False).lam[FLEXIBLE]
+
+
+def test_names_are_unique_and_ours_are_in_the_contract(example_crack):
+    names = registry.names()
+    assert len(set(names)) == len(names)
+    assert {family.name for family in registry.BUILT_IN} <= CONTRACT
+
+
+def test_candidates_fit_the_search(family, proposed, by_responses, by_poles):
+    """Starts of the right length about either base; with poles all but faults of the test."""
+    assert proposed
+    frequencies = family.proposed(by_poles)
+    assert bool(frequencies) == (family.effect.kind != "test")
+    for c in (*proposed, *frequencies):
+        assert isinstance(c.effect, family.effect)
+        assert len(c.start) == len(c.effect.parameters)
+        assert len(c.base) == len(by_responses.null)
+        assert c.effect.trials_factor >= 1
+
+
+def test_one_channel_at_half_its_level_is_the_first_candidate(by_responses):
+    first = registry.family("sensor-fault").proposed(by_responses)[0]
+    assert first.effect.channel == 2
+    assert first.start[0] < np.log(0.5) / 2  # nearer to the truth than to no fault
+
+
+def test_candidates_begin_at_the_nominal_and_at_the_calibrated_model(by_responses):
+    """Scatter is idle in both: it would have taken what an effect is to explain."""
+    nominal, calibrated = by_responses.bases
+    assert not nominal.any()
+    assert calibrated[0] == by_responses.null[0] != 0
+    assert by_responses.null[1:].any()
+    assert not calibrated[1:].any()
+
+
+@pytest.mark.parametrize("kind", [PointMass, ExtraSupport])
+def test_begins_anew_where_it_moved_to(bench, by_responses, kind):
+    """Half a patch off its start it stays; a grid off, it begins at the grid it moved to."""
+    where = by_responses.where
+    effect = kind.near(where, where.grids.position(25))
+    assert effect.recentred(np.array([0.3, 0.5, -0.5]), where) is None
+    size = effect.patch.size
+    step = (
+        where.grids.point[where.grids.position(26)] - effect.patch.origin
+    ) @ effect.patch.plane.T
+    x = np.array([0.3, *(step / size)])
+    again, start = effect.recentred(x, where)
+    assert again.grids == (26,)
+    assert again.trials_factor == len(where.places)
+    model = bench.model_for(effect, x)
+    moved, anew, old = lam(model, effect, x), lam(model, again, start), np.array([0.3, 0.0, 0.0])
+    assert np.abs(anew - moved).max() < 0.5 * np.abs(lam(model, effect, old) - moved).max()
+
+
+def test_does_nothing_at_its_nominal_parameters(bench, proposed):
+    for c in proposed:
+        idle = np.array([p.nominal for p in c.effect.parameters])
+        model = bench.model_for(c.effect, c.start)
+        state = evaluate(model, [c.effect], idle, False)
+        without = evaluate(model, [], np.zeros(0), False)
+        assert_allclose(state.lam[FLEXIBLE], without.lam[FLEXIBLE], rtol=1e-6)
+        assert_allclose(state.weight, without.weight, rtol=1e-9)
+        sign = getattr(c.effect, "sign", 1)
+        if state.offset is not None and sign > 0:
+            assert_allclose(state.offset, 0, atol=1e-12)
+
+
+def test_acts_elsewhere(bench, proposed):
+    for c in proposed:
+        model, x = bench.model_for(c.effect, c.start), acting(c)
+        moved = np.abs(lam(model, c.effect, x) / lam(model, Effect(), x[:0]) - 1).max() > 1e-4
+        change = c.effect.outputs(x)
+        assert moved != (change is not None and bool(np.abs(change.value).max() > 0.01))
+
+
+def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(bench, proposed):
+    rng = np.random.default_rng(3)
+    c = proposed[0]
+    model = bench.model_for(c.effect, c.start)
+    mean, sd = (np.array([getattr(p, q) for p in c.effect.parameters]) for q in ("mean", "sd"))
+    for _ in range(20):
+        x = mean + sd * rng.uniform(-3, 3, len(sd))
+        state = evaluate(model, [c.effect], x, False)  # raises without positive M
+        assert state.lam[0] > -1e-6 * state.lam[FLEXIBLE][0]
+
+
+def test_slopes_leave_a_remainder_of_second_order(bench, proposed):
+    """|λ(x + hd) - λ(x) - h λ'd| falls as h²."""
+    for c in proposed:
+        model, x = bench.model_for(c.effect, c.start), acting(c)
+        d = np.cos(2 + np.arange(len(x)))
+        state = evaluate(model, [c.effect], x)
+        slope = np.einsum("prr,p->r", state.dK - state.lam * state.dM, d)[FLEXIBLE]
+        if not np.abs(slope).max() > 1e-9 * state.lam[FLEXIBLE].max():
+            continue
+        h = 0.02
+        left = [
+            np.abs(lam(model, c.effect, x + s * d) - state.lam[FLEXIBLE] - s * slope).max()
+            for s in (h, h / 2)
+        ]
+        assert left[0] / left[1] == pytest.approx(4, rel=0.15)
+
+
+def test_what_remakes_the_structure_is_idle_where_it_has_been_remade(bench, proposed):
+    for c in proposed:
+        if c.effect.remakes_structure:
+            x = acting(c)
+            model = bench.model_for(c.effect, x)
+            again = c.effect.with_reference_state(x)
+            assert_allclose(lam(model, again, x), lam(model, Effect(), x[:0]), rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def article(deck):
+    fine, n = plate(0.4, 0.3, 16, 12, 1.5e-3), len(SENSORS)
+    return Article(fine, deck, np.array(SENSORS), np.array([7, 63]), np.ones(n))
+
+
+def test_is_concealed_in_the_article_or_its_recording(family, article, proposed):
+    """The deck stays; the truth speaks of parameters the effect reports; a seed repeats it."""
+    one, two = (family.conceal(article, np.random.default_rng(5)) for _ in range(2))
+    assert one.deck is article.deck
+    assert one.truth == two.truth
+    c = proposed[0]
+    reported = {row["name"] for row in c.effect.reported(c.start, np.zeros(len(c.start)))}
+    assert one.truth["parameters"]
+    assert set(one.truth["parameters"]) <= reported
+    before, after = (normal_modes(structure(a.assembly).system, 12).frequency[6:]
+                     for a in (article, one))  # fmt: skip
+    moved = np.abs(after / before - 1).max() > 1e-5
+    assert moved != bool((one.gains != article.gains).any())
+    assert moved == (family.effect.kind == "physics")
+
+
+def cards_that_differ(path, other):
+    """Names of the cards that have a line the first deck has not."""
+    old, name, out = set(path.read_text().splitlines()), "", set()
+    for line in other.read_text().splitlines():
+        word = line[:8].strip(" *")
+        name = word if word.isalnum() else name
+        if line not in old and not line.startswith("$"):
+            out.add(name)
+    return out
+
+
+def test_goes_into_the_deck_by_its_cards_and_no_others(family, deck, proposed, tmp_path):
+    """What was written, read again, is the structure the effect makes; else it says why not."""
+    path = write_assembly(deck, tmp_path / "deck.bdf", UNITS["mm-t-s"])
+    read = read_deck(path)
+    before = assembly(read, UNITS["mm-t-s"])
+    after = proposed[0].effect.apply(before, acting(proposed[0]))
+    if family.no_cards:
+        assert after is before
+        return
+    write_deck(read, tmp_path / "new.bdf", changes(read, before, after, UNITS["mm-t-s"]))
+    touched = cards_that_differ(path, tmp_path / "new.bdf")
+    assert touched
+    assert touched <= set(family.cards)
+    again = assembly(read_deck(tmp_path / "new.bdf"), UNITS["mm-t-s"])
+    found, due, was = (normal_modes(structure(a).system, 12).frequency[6:]
+                       for a in (again, after, before))  # fmt: skip
+    assert_allclose(found, due, rtol=1e-6)
+    assert np.abs(due / was - 1).max() > 1e-5
+
+
+def test_pickles(family, proposed):
+    """Processes hand families and effects to one another."""
+    assert pickle.loads(pickle.dumps(family)).name == family.name
+    for c in proposed:
+        again = pickle.loads(pickle.dumps(c.effect))
+        assert again.location(c.start) == c.effect.location(c.start)

@@ -1,0 +1,65 @@
+"""The noise of an equalised response, foretold from the recording's own, against drawn noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.frf import FRF
+from chladni.ema.identification import equalised, identify
+from chladni.ema.recording_noise import equalised_noise
+
+F = np.arange(5, 120, 0.25)
+POLES = np.array([12.0, 31.0, 44.0, 80.0, 101.0])
+S = 2 * np.pi * np.geomspace(8, 115, 60) * (0.02 + 1j)
+DRAWS = 24
+
+
+def response(s, phi, damping=0.008):
+    w = 2 * np.pi * POLES
+    h = s[:, None] ** 2 / (w**2 + 2 * damping * w * s[:, None] + s[:, None] ** 2)
+    return np.einsum("or,fr,ir->foi", phi, h, phi[:1])
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """|Δ log10 H|² of many recordings of the same structure, and what is foretold of each."""
+    rng = np.random.default_rng(7)
+    phi = rng.normal(size=(3, len(POLES)))
+    H, true = response(2j * np.pi * F, phi), response(S, phi, 0.0)
+    sd = 0.01 * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
+    found, due = [], []
+    for _ in range(DRAWS):
+        noise = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) * sd / np.sqrt(2)
+        frf = FRF(H + noise, F, ("a", "b", "c"), ("a",), "accelerance", variance=sd**2)
+        modal = identify(frf)
+        found.append(np.abs(np.log10(equalised(modal, S) / true)) ** 2)
+        due.append(equalised_noise(modal, frf, S, np.ones(len(F), bool)))
+    return np.array(found), np.array(due)
+
+
+def test_is_the_mean_square_of_what_is_drawn(drawn):
+    """Complex errors: |Δ|² over its mean has sd 1 at most √2, so a mean of 24 has 0.29 at most.
+
+    All samples of a channel may be as one, so each channel's mean is held to three of these.
+    """
+    found, due = drawn
+    ratio = (found / due).mean(axis=(0, 1, 3))
+    np.testing.assert_allclose(ratio, 1.0, atol=3 * np.sqrt(2 / DRAWS))
+
+
+def test_is_in_proportion_to_the_variance_of_the_recording():
+    """First order: four times the variance, four times the mean square.
+
+    The 1e-4 of |H| that is added to any variance is 1e-4 of this one.
+    """
+    phi = np.random.default_rng(7).normal(size=(3, len(POLES)))
+    H = response(2j * np.pi * F, phi)
+    sd = 0.01 * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
+    frf = FRF(H, F, ("a", "b", "c"), ("a",), "accelerance", variance=sd**2)
+    modal, use = replace(identify(frf), chi=1.0), np.ones(len(F), bool)
+    twice = replace(frf, variance=4 * frf.variance)
+    one, four = (equalised_noise(modal, f, S, use) for f in (frf, twice))
+    np.testing.assert_allclose(four / one, 4.0, rtol=1e-3)
+    doubled = equalised_noise(replace(modal, chi=2.0), frf, S, use)
+    np.testing.assert_allclose(doubled / one, 4.0, rtol=1e-9)

@@ -1,0 +1,64 @@
+"""Evidence in every run of the suite: one concealed effect is found, nothing is found in one null.
+
+Through :func:`chladni.diagnose` alone, on the study's own plate; seeds nobody tuned anything on.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni_evidence.concealed import SPECIMENS, made, write
+from chladni_evidence.study import Blind
+
+SEED = 40
+
+
+def blind(effect, folder):
+    """The answer of :func:`chladni.diagnose` to a case folder, and then the truth."""
+    case = Blind("plate", effect, SEED, folder)
+    write(made(SPECIMENS["plate"], effect, SEED), case.folder, case.seal)
+    found = chladni.diagnose(chladni.load_case(case.folder))
+    return found, json.loads(case.seal.read_text(encoding="utf-8"))
+
+
+def test_a_concealed_mass_is_named_placed_and_weighed(tmp_path, evidence):
+    found, truth = blind("point-mass", tmp_path)
+    (effect,) = found.effects
+    assert found.verdict == "missing physics"
+    assert effect.name == "point-mass"
+    assert np.linalg.norm(np.subtract(effect.where.point_m, truth["point_m"])) < 0.06
+    (mass,) = effect.parameters
+    assert mass.low <= truth["value"] <= mass.high
+    held = found.agreement.held_out
+    assert held.with_effect < 0.5 * held.calibrated
+    assert held.with_effect < 0.5 * held.nominal
+    assert found.models.final.assembly.masses is not None
+    assert evidence(found, truth)["right"]
+
+
+def test_nothing_is_found_where_nothing_is_missing(tmp_path, evidence):
+    """Scatter, noise, and another element formulation are not missing physics."""
+    found, truth = blind("nothing", tmp_path)
+    assert found.verdict in ("nothing missing", "calibration only")
+    assert found.effects == ()
+    assert found.agreement.largest_gain < found.agreement.threshold
+    assert found.agreement.gain is None
+    assert all(a.why_not for a in found.alternatives)
+    assert evidence(found, truth)["right"]
+
+
+def test_the_study_asks_the_same_function(monkeypatch, tmp_path):
+    """What a study scores is what :func:`chladni.diagnose` answers."""
+    from chladni_evidence import study
+
+    asked = []
+    answer = chladni.workflows.diagnosis_result.DiagnosisResult(verdict="nothing missing")
+    assert study.diagnose is chladni.diagnose
+    monkeypatch.setattr(study, "diagnose", lambda case: asked.append(case) or answer)
+    rows = study.study(study.blinds(tmp_path, [SEED], ["nothing"], ["plate"]))
+    assert len(asked) == 1
+    assert [r["called"] for r in rows] == ["nothing missing"]
+    with pytest.raises(chladni.errors.LabelError, match="point-mass"):
+        study.blinds(tmp_path, [SEED], ["teapot"])

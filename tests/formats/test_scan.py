@@ -1,0 +1,69 @@
+"""Scans in STL, PLY and OBJ: what is read, what is said of them, what is refused."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from chladni.errors import FileError
+from chladni.io.scanned_surface import read_scan
+
+CORNERS = np.array([[0.0, 0, 0], [30, 0, 0], [30, 20, 0], [0, 20, 0]])
+SHEET = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def _saved(folder, points, faces, name="scan.stl"):
+    trimesh.Trimesh(points, faces, process=False).export(folder / name)
+    return folder / name
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_a_closed_body_has_a_volume_in_si(tmp_path, suffix):
+    trimesh.creation.box((300, 200, 100)).export(tmp_path / f"box.{suffix}")
+    scan = read_scan(tmp_path / f"box.{suffix}", 1e-3)
+    assert scan.volume == pytest.approx(0.3 * 0.2 * 0.1)
+    assert np.ptp(scan.points, axis=0) == pytest.approx([0.3, 0.2, 0.1])
+    assert len(scan.cells) == 12
+    assert scan.notes == ()
+
+
+def test_an_open_sheet_is_said_to_be_open(tmp_path):
+    scan = read_scan(_saved(tmp_path, CORNERS, SHEET), 1e-3)
+    assert np.isnan(scan.volume)
+    assert len(scan.notes) == 1
+    assert "4 free edges (80 %), 0.1 m long" in scan.notes[0]
+
+
+def test_triangles_wound_against_each_other_are_named(tmp_path):
+    scan = read_scan(_saved(tmp_path, CORNERS, np.array([[0, 1, 2], [0, 3, 2]])))
+    assert any("Across 1 edges" in note for note in scan.notes)
+
+
+def test_triangles_without_area_are_left_out_and_counted(tmp_path):
+    points = np.vstack([CORNERS, [[15.0, 0, 0]]])
+    path = _saved(tmp_path, points, np.vstack([SHEET, [[0, 4, 1]]]), "scan.ply")
+    scan = read_scan(path)
+    assert len(scan.cells) == 2
+    assert "1 triangles of the scan have no area" in scan.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("a.stl", b"", "holds no triangles"),
+        ("a.stl", bytes(200), "holds no triangles"),
+        ("a.ply", b"garbage", "cannot be read as a triangulated surface"),
+        ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "holds no triangles"),
+        ("a.step", b"ISO-10303-21;", "one of .stl, .ply, .obj"),
+    ],
+)
+def test_what_is_no_scan_is_refused_in_a_sentence(tmp_path, name, data, sentence):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(FileError, match=sentence):
+        read_scan(tmp_path / name)
+
+
+def test_a_missing_scan_and_flat_triangles_are_refused(tmp_path):
+    with pytest.raises(FileError, match="no file"):
+        read_scan(tmp_path / "none.stl")
+    with pytest.raises(FileError, match="none of its 1 triangles has an area"):
+        read_scan(_saved(tmp_path, CORNERS[:2], np.array([[0, 1, 1]]), "line.ply"))

@@ -1,0 +1,56 @@
+"""A small case: a plate with a mass in one corner, recorded on the model's own responses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.effects.points import with_masses
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
+from chladni_specimens.plates import plate
+
+SENSORS = (2, 4, 7, 18, 30, 43)
+CASE = """
+[model]
+deck = "plate.bdf"
+units = "SI"
+damping = 0.01
+[test]
+recordings = ["frf.npz"]
+mass = {mass}
+[band]
+fit = [20.0, 170.0]
+"""
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """No two modes of the plate are alike, and none has a node at the shaker."""
+    folder = tmp_path_factory.mktemp("case")
+    deck = plate(0.3, 0.22, 6, 6, 1e-3)
+    write_assembly(deck, folder / "plate.bdf")
+    write_assembly(with_masses(deck, (49,), 0.02), folder / "article.bdf")
+    article = chladni.load_model(folder / "article.bdf", "SI")
+    ends = [f"{g}:+Z" for g in SENSORS]
+    made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 200, 900)).frfs[0]
+    write_npz(folder / "frf.npz", made.to("accelerance"))
+    (folder / "case.toml").write_text(CASE.format(mass=round(chladni.modes(article, 7).mass, 5)))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def case(folder):
+    return chladni.load_case(folder)
+
+
+@pytest.fixture(scope="session")
+def diagnosed(case):
+    return chladni.diagnose(case)
+
+
+@pytest.fixture
+def without_mass(case):
+    """The case, nothing weighed."""
+    return replace(case, setup=replace(case.setup, mass=None))

@@ -1,0 +1,97 @@
+"""Every command is a workflow: what it writes is what the function returns to a notebook."""
+
+import json
+from importlib import import_module
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import COMMANDS, application
+from chladni.output import plain
+from chladni.planning import Wishes
+from chladni.report.result_json import to_json
+
+WORKFLOW = {  # command: the function it calls
+    "diagnose": "chladni.workflows.diagnose.diagnose",
+    "demo": "chladni.workflows.diagnose.diagnose",
+    "calibrate": "chladni.workflows.calibrate.calibrate",
+    "correlate": "chladni.workflows.correlate.correlate",
+    "identify": "chladni.workflows.identify.identify",
+    "modes": "chladni.workflows.modes.modes",
+    "frf": "chladni.workflows.frf.frf",
+    "plan": "chladni.workflows.plan.plan",
+    "render": "chladni.workflows.loaded_model.load_model",
+    "study": "chladni_evidence.study.study",
+    "specimen": "chladni_specimens.tailgate.tailgate.tailgate_specimen",
+    "report": "chladni.report.page.write_page",
+}
+
+
+def written(command, name, folder, out, *options):
+    done = CliRunner().invoke(application(), [command, str(folder), *options, "--out", str(out)])
+    assert done.exit_code == 0, (done.output, done.exception)
+    return json.loads((out / name).read_text())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_function_that_a_notebook_can_call(command):
+    module, _, name = WORKFLOW[command].rpartition(".")
+    function = getattr(import_module(module), name)
+    assert callable(function)
+    assert function.__doc__
+    if module == f"chladni.workflows.{command}":
+        assert getattr(chladni, command) is function
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "call", "options"),
+    [
+        ("correlate", "correlation.json", chladni.correlate, ()),
+        ("identify", "identified.json", chladni.identify, ()),
+        ("modes", "modes.json", lambda case: chladni.modes(case, 9), ("--count", "9")),
+        ("calibrate", "diagnosis.json", chladni.calibrate, ()),
+        (
+            "plan",
+            "plan.json",
+            lambda case: chladni.plan(case, Wishes(sensors=8, modes=5, draws=0)),
+            ("--sensors", "8", "--modes", "5", "--drawn", "0"),
+        ),
+    ],
+)
+def test_json_of_a_command_is_the_result_of_its_function(
+    case, folder, tmp_path, command, name, call, options
+):
+    due = plain(to_json(call(case)))
+    found = written(command, name, folder, tmp_path / "out", *options)
+    for d in (due, found):
+        d.pop("files", None)  # the command knows what it wrote
+    assert found == due
+
+
+def test_json_of_a_diagnosis_is_the_result_of_its_function(diagnosed, folder, tmp_path):
+    found = written("diagnose", "diagnosis.json", folder, tmp_path / "out")
+    assert found.pop("files") == {
+        "deck": "updated.bdf", "report": "report.html", "diagnosis": "diagnosis.json"
+    }  # fmt: skip
+    due = plain(to_json(diagnosed))
+    assert due.pop("files") == {}
+    assert found == due
+
+
+def test_arrays_of_frf_are_the_result_of_its_function(case, folder, tmp_path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), ["frf", str(folder), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    (due,) = chladni.frf(case).frfs
+    with np.load(out / "frf.npz", allow_pickle=False) as held:
+        np.testing.assert_array_equal(held["values"], due.to("accelerance").values)
+
+
+def test_progress_is_a_callback_that_only_rises(case):
+    told = []
+    chladni.correlate(case, lambda what, share: told.append((what, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert all(what and 0 <= share <= 1 for what, share in told)

@@ -1,0 +1,96 @@
+"""The page says what was done: what was calibrated, what was compared, and nothing else."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.report.diagnosis_folder import write_diagnosis
+from chladni.report.diagnosis_json import read_diagnosis
+
+
+@pytest.fixture(scope="module")
+def run_folder(case, diagnosed, tmp_path_factory):
+    out = tmp_path_factory.mktemp("run")
+    write_diagnosis(out, case, diagnosed)
+    return out
+
+
+def test_the_page_is_written_again_from_its_folder(run_folder, tmp_path):
+    """Word for word the same, but for what only the second page has."""
+    first = (run_folder / "report.html").read_text()
+    done = CliRunner().invoke(
+        application(), ["report", str(run_folder), "--out", str(tmp_path), "--title", "again"]
+    )
+    assert done.exit_code == 0, done.output
+    second = (tmp_path / "report.html").read_text()
+    for section in ("Scores", "What was calibrated", "Frequencies", "Why not something else"):
+        a, b = (t[t.index(f"<h2>{section}</h2>") :] for t in (first, second))
+        assert a[: a.index("<figure")] == b[: b.index("<figure")] if "<figure" in a else True
+
+
+def test_the_result_is_read_back(run_folder, diagnosed):
+    found = read_diagnosis(run_folder)
+    assert found.effects == diagnosed.effects
+    assert found.agreement == diagnosed.agreement
+    assert found.calibrated == diagnosed.calibrated
+    assert found.frequencies == diagnosed.frequencies
+    assert found.models is None
+
+
+def test_calibrated_values_stand_beside_those_of_the_deck(case, tmp_path):
+    """E, rho and t: deck, updated deck with its interval, and the change."""
+    result = write_diagnosis(tmp_path, case, chladni.calibrate(case))
+    assert {c.where: c.deck_value for c in result.calibrated}
+    page = (tmp_path / "report.html").read_text()
+    assert "What was calibrated" in page
+    assert page.count("<td") > 0
+    E = next(c for c in result.calibrated if c.estimate.name == "E")
+    assert E.deck_value == pytest.approx(2.1e11)
+    assert "210 GPa" in page
+    assert E.estimate.low < E.estimate.value < E.estimate.high
+
+
+def test_figures_of_the_page_are_named_for_what_they_are(run_folder):
+    d = json.loads((run_folder / "diagnosis.json").read_text())
+    for q in (d["fit"], d["fit"]["held_out"]):
+        assert q["Q_floor"] < 1e-3 * q["Q_with_effect"] or q["Q_floor"] < 1e-6
+        assert q["Q_with_mesh_error"] is not None
+    page = (run_folder / "report.html").read_text()
+    assert "floor: the recording&#39;s noise alone" in page
+    assert "what scatter could explain" in page
+    assert "noise, repeats" not in page
+
+
+def test_a_page_of_frequencies_claims_no_fitted_response(case, folder, tmp_path):
+    """Places known to 2 cm only: frequencies are compared, responses are shown and said to be."""
+    source = tmp_path / "case"
+    shutil.copytree(folder, source)
+    rows = [f"{o},{o.split(':')[0]},+Z,{role},0.02" for o, role in
+            [(o, "output") for o in case.frfs[0].outputs] + [("2:+Z", "input")]]  # fmt: skip
+    (source / "sensors.csv").write_text(
+        "\n".join(["label,grid,direction,role,position_sd", *rows, ""])
+    )
+    text = (source / "case.toml").read_text()
+    text = text.replace("[test]", '[test]\nsensors = "sensors.csv"')
+    (source / "case.toml").write_text(text)
+    made = chladni.load_case(source)
+    result = write_diagnosis(tmp_path / "out", made, chladni.calibrate(made))
+    assert result.compared == "frequencies"
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "frequencies were compared" in page
+    assert "that was fitted" not in page
+    assert "the fit never saw" not in page.split("</header>")[1]
+    assert not (tmp_path / "out" / "frf_fitted.png").exists()
+    assert (tmp_path / "out" / "frf.png").exists()
+
+
+def test_no_curve_no_picture(case, diagnosed, tmp_path):
+    """A result without responses still has its page."""
+    bare = replace(diagnosed, models=replace(diagnosed.models, curves={}))
+    write_diagnosis(tmp_path, case, bare)
+    assert not list(tmp_path.glob("frf*"))

@@ -1,0 +1,90 @@
+"""What cannot be right is said in one sentence; what is not to be trusted is written and exit 3."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.errors import AccuracyError, FileError
+from chladni.io.nastran import write_assembly
+from chladni.units import UNITS, units
+from chladni.updating import renewal
+from chladni.updating.accuracy import Accuracy
+from chladni.workflows.unit_check import refuse_other_units
+from chladni_specimens.plates import plate
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+@pytest.mark.parametrize("true", UNITS)
+@pytest.mark.parametrize("said", UNITS)
+def test_the_unit_system_that_fits_is_named(case, tmp_path, true, said):
+    """A deck written in one system and declared another: refused where its mass betrays it."""
+    text = (case.path).read_text().replace('"SI"', f'"{said}"')
+    (tmp_path / "case.toml").write_text(text)
+    shutil.copy(case.path.with_name("frf.npz"), tmp_path)
+    write_assembly(plate(0.3, 0.22, 6, 6, 1e-3), tmp_path / "plate.bdf", units(true))
+    made = chladni.load_case(tmp_path)
+    if units(true).mass == units(said).mass:
+        refuse_other_units(made)  # the scales cannot tell these apart
+        return
+    with pytest.raises(FileError, match=rf'weighs .* kg.*set units = "{true}"'):
+        refuse_other_units(made)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "calibrate", "correlate"])
+def test_commands_refuse_it_before_they_work(case, tmp_path, command):
+    source = tmp_path / "case"
+    shutil.copytree(case.path.parent, source)
+    write_assembly(plate(0.3, 0.22, 6, 6, 1e-3), source / "plate.bdf", units("mm-t-s"))
+    done = call(command, source, "--out", tmp_path / "out")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "\n" not in done.stderr.strip()
+    assert 'set units = "mm-t-s"' in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_deck_that_fits_in_no_system_says_so(case):
+    heavy = replace(case, setup=replace(case.setup, mass=60 * case.setup.mass))
+    with pytest.raises(FileError, match="in no unit system"):
+        refuse_other_units(heavy)
+
+
+@pytest.mark.parametrize("times", [0.21, 1.0, 4.9])
+def test_what_an_effect_may_weigh_is_not_refused(case, times):
+    deck = chladni.modes(case, 7).mass
+    refuse_other_units(replace(case, setup=replace(case.setup, mass=times * deck)))
+
+
+def test_nothing_weighed_nothing_refused(without_mass):
+    refuse_other_units(without_mass)
+
+
+@pytest.mark.parametrize("command", ["diagnose", "calibrate"])
+def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(
+    case, tmp_path, command, monkeypatch
+):
+    """Whatever is added to the basis, it stays 1 % off: all is on disk, and the exit says so."""
+    off = Accuracy(np.ones(1), np.array([0.01]), np.zeros((1, 0)))
+    monkeypatch.setattr(Accuracy, "renewed", lambda self, model: model)
+    monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: off)
+    done = call(command, case.path.parent, "--out", tmp_path / "out")
+    assert done.exit_code == 3, (done.output, done.exception)
+    assert "1.00% off" in done.stderr
+    d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert "not to be trusted" in d["distrust"][0]
+    assert "Not to be trusted" in (tmp_path / "out" / "report.html").read_text()
+    assert (tmp_path / "out" / "updated.bdf").exists()
+
+
+def test_a_result_that_is_trusted_hands_itself_out(diagnosed):
+    assert diagnosed.trusted() is diagnosed
+    with pytest.raises(AccuracyError, match="too narrow"):
+        replace(diagnosed, distrust=("the basis is too narrow",)).trusted()
