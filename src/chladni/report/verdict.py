@@ -209,7 +209,7 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         ("nominal deck", "nominal", False),
         ("calibrated deck, nothing added", "calibrated", True),
         *((("updated deck", "with_effect", True),) if result.effects else ()),
-        ("the last of these, its mesh infinitely fine", "with_mesh_error", False),
+        ("the last of these, with the mesh error the fit found", "with_mesh_error", False),
         ("and what scatter could explain taken out", "with_scatter", False),
         ("floor: the recording's noise alone", "floor", False),
     )

@@ -109,11 +109,22 @@ def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
     return real
 
 
+def _as_given(search: Search, null: Trial) -> np.ndarray:
+    """The deck's own values, mesh error and gain as the fit found them, no scatter."""
+    x, at = search.mean(), 0
+    for e in search.base:
+        n = len(e.parameters)
+        if e.kind == "nuisance" and e.writable:
+            x[at : at + n] = null.fit.of(e)
+        at += n
+    return x
+
+
 def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
     """The calibrated and the updated deck, and all that the last fit had beside them."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
-        nominal = evaluate(null.model, search.base, search.mean(), False)
+        nominal = evaluate(null.model, search.base, _as_given(search, null), False)
         return [(null, nominal), (null, nominal), (null, null.fit.state)]
     if diagnosis.found is None:
         state = plain.fit.state
