@@ -12,7 +12,7 @@ from .tube_frame import tube_frame
 
 
 @dataclass(frozen=True)
-class Form:
+class DrawnForm:
     """A kind of structure.
 
     Attributes
@@ -84,14 +84,14 @@ _FRAME = {
 FORMS = {
     form.name: form
     for form in (
-        Form("bolted bracket", _BRACKET, sheet_forms.bolted_bracket, 0.015, (0, 1, 0),
+        DrawnForm("bolted bracket", _BRACKET, sheet_forms.bolted_bracket, 0.015, (0, 1, 0),
              ("plate", "angle")),
-        Form("lidded box", _BOX, sheet_forms.lidded_box, 0.02, (1, 0, 0), ("lid",)),
-        Form("ribbed plate", _RIBBED, sheet_forms.ribbed_plate, 0.02, (1, 0, 0), ("plate",)),
-        Form("tube frame", _FRAME, tube_frame, 0.06),
-        Form("curved shell", _CURVED, sheet_forms.curved_shell, 0.02, (1, 0, 0),
+        DrawnForm("lidded box", _BOX, sheet_forms.lidded_box, 0.02, (1, 0, 0), ("lid",)),
+        DrawnForm("ribbed plate", _RIBBED, sheet_forms.ribbed_plate, 0.02, (1, 0, 0), ("plate",)),
+        DrawnForm("tube frame", _FRAME, tube_frame, 0.06),
+        DrawnForm("curved shell", _CURVED, sheet_forms.curved_shell, 0.02, (1, 0, 0),
              ("shell", "lips")),
-        Form("bonded plates", _BONDED, sheet_forms.bonded_plates, 0.014, (1, 0, 0),
+        DrawnForm("bonded plates", _BONDED, sheet_forms.bonded_plates, 0.014, (1, 0, 0),
              ("lower", "upper")),
     )
 }  # fmt: skip
