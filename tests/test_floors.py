@@ -52,6 +52,7 @@ LIBRARIES = {
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},
     "cli": {"typer", "rich"},
+    "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 WAITING_FOR = {  # module no command, environment or public name reaches: what will
@@ -156,10 +157,12 @@ def reached(roots):
 
 
 def entry_points():
-    """Modules that pyproject.toml names: scripts and entry points."""
+    """Modules that pyproject.toml names (scripts, entry points) or ``python -m`` runs."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = [project.get("scripts", {}), *project.get("entry-points", {}).values()]
-    return {tuple(text.split(":")[0].split(".")) for group in groups for text in group.values()}
+    mains = {m for m in MODULES if m[-1] == "__main__"}  # python -m PACKAGE
+    named = {tuple(text.split(":")[0].split(".")) for group in groups for text in group.values()}
+    return named | mains
 
 
 def test_nothing_is_out_of_reach():

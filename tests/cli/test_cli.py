@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from chladni.case import load_case
 from chladni.cli.app import COMMANDS, application, guarded
 from chladni.errors import AccuracyError, FileError
-from chladni.workflows.diagnosis_pipeline import _as_written
+from chladni.fem.modelled import modelled
+from chladni.workflows.diagnosis_pipeline import _deck
 
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
@@ -313,9 +314,9 @@ def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
     shells = opened.assembly.shells
     thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
     final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
-    edits, kept, notes = _as_written(opened, final)
-    assert edits is None
-    assert kept is final
+    deck, notes = _deck(opened, modelled(opened.assembly, 100.0), final)
+    assert deck.changes is None
+    assert deck.model.assembly is final
     assert len(notes) == 1
     assert notes[0].startswith("no updated deck was written: ")
     assert "changed in a way its layers cannot" in notes[0]

@@ -14,6 +14,7 @@ from chladni.effects import sensor_fault as sensors
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed
+from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import gain, ordinary, scatter
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
@@ -34,7 +35,7 @@ from chladni_specimens.plates import plate
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
 FLEXIBLE = slice(6, 12)
 CHANNELS = 4
-NAMES = (
+NAMES = ("family", 
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
     "freed",
@@ -88,6 +89,7 @@ def cases(bench):
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
+    found["family"] = (model_families(bench.structure)[0], [0.3], [0])
     number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
     found["freed"] = (freed(groups, number), [0.2], [0])
     return {
@@ -173,7 +175,8 @@ def full(assembly: Assembly) -> np.ndarray:
     return normal_modes(structure(assembly).system, band=2 * TOP).frequency[FLEXIBLE]
 
 
-WRITTEN = [n for n in NAMES if n not in {"scatter", "gain", "mesh-error", "jitter", "sensor-fault"}]
+IDLE = {"scatter", "gain", "mesh-error", "jitter", "family", "sensor-fault"}  # no deck holds them
+WRITTEN = [n for n in NAMES if n not in IDLE]
 
 
 @pytest.mark.parametrize("name", WRITTEN)

@@ -50,7 +50,7 @@ def test_what_the_held_out_data_refuse_is_not_written(monkeypatch, trial):
     monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, diagnosis: (refused, refused))
     null = Trial(Effect(), replace(trial.fit, S=trial.S + 1e6), trial.model)
     found = Diagnosis(null, null, null, (trial,), "missing physics")
-    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
+    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None, labels=()))
     judged = outcome.judged(prepared, found)
     assert judged.found is None
     assert judged.written is None

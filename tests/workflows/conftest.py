@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import chladni
+from chladni.dynamics.eigen import normal_modes
 from chladni.effects.points import with_masses
+from chladni.fem import modelled as fem_modelled
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni_specimens.plates import plate
@@ -46,8 +48,27 @@ def case(folder):
 
 
 @pytest.fixture(scope="session")
-def diagnosed(case):
-    return chladni.diagnose(case)
+def diagnosis(case):
+    """The result, and every system whose modes were solved on the way."""
+    solved = []
+
+    def counted(system, *given, **named):
+        solved.append(system)
+        return normal_modes(system, *given, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fem_modelled, "normal_modes", counted)
+        return chladni.diagnose(case), solved
+
+
+@pytest.fixture(scope="session")
+def diagnosed(diagnosis):
+    return diagnosis[0]
+
+
+@pytest.fixture(scope="session")
+def calibrated(case):
+    return chladni.calibrate(case)
 
 
 @pytest.fixture

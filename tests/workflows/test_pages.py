@@ -42,9 +42,9 @@ def test_the_result_is_read_back(run_folder, diagnosed):
     assert found.models is None
 
 
-def test_calibrated_values_stand_beside_those_of_the_deck(case, tmp_path):
+def test_calibrated_values_stand_beside_those_of_the_deck(case, calibrated, tmp_path):
     """E, rho and t: deck, updated deck with its interval, and the change."""
-    result = write_diagnosis(tmp_path, case, chladni.calibrate(case))
+    result = write_diagnosis(tmp_path, case, calibrated)
     assert {c.where: c.deck_value for c in result.calibrated}
     page = (tmp_path / "report.html").read_text()
     assert "What was calibrated" in page

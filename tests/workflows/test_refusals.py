@@ -67,15 +67,12 @@ def test_nothing_weighed_nothing_refused(without_mass):
     refuse_other_units(without_mass)
 
 
-@pytest.mark.parametrize("command", ["diagnose", "calibrate"])
-def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(
-    case, tmp_path, command, monkeypatch
-):
+def test_a_reduced_model_beyond_its_limit_is_written_and_exit_3(case, tmp_path, monkeypatch):
     """Whatever is added to the basis, it stays 1 % off: all is on disk, and the exit says so."""
     off = Accuracy(np.ones(1), np.array([0.01]), np.zeros((1, 0)))
     monkeypatch.setattr(Accuracy, "renewed", lambda self, model: model)
     monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: off)
-    done = call(command, case.path.parent, "--out", tmp_path / "out")
+    done = call("calibrate", case.path.parent, "--out", tmp_path / "out")
     assert done.exit_code == 3, (done.output, done.exception)
     assert "1.00% off" in done.stderr
     d = json.loads((tmp_path / "out" / "diagnosis.json").read_text())

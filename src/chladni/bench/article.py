@@ -39,6 +39,18 @@ def measured(
     """
     s = 2j * np.pi * frequency
     H = transfer(modal, phi_out, phi_in, s) * s[:, None, None] ** 2
+    return recorded(H, frequency, front, rng, outputs, inputs)
+
+
+def recorded(
+    H: np.ndarray,
+    frequency: np.ndarray,
+    front: Front,
+    rng: np.random.Generator,
+    outputs: tuple[str, ...],
+    inputs: tuple[str, ...],
+) -> FRF:
+    """Accelerance H (n_f, n_out, n_in) as the front end gives it, with noise and its variance."""
     rms = np.sqrt((np.abs(H) ** 2).mean(axis=0, keepdims=True))
     variance = (front.noise * np.abs(H)) ** 2 + (front.floor * rms) ** 2
     e = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2)

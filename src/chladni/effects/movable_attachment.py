@@ -16,7 +16,7 @@ from ..geometry.facets import tangents
 from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, Parameter, PointTerm
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import Surroundings
+from .surroundings import ShellGrids, Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
@@ -159,6 +159,7 @@ def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
     return Patch(spots.grids[near], d[near] @ plane.T, plane, spots.point[k], rows, size)
 
 
+CLOSER = 60  # grids tried round each of the best places
 TRIED = 40  # places that are evaluated one by one where only natural frequencies are known
 
 
@@ -185,8 +186,18 @@ def attachments(
         score = context.scan.point_scores(about, matrix, strengths)
         for k in distinct(score.min(axis=1), places.point, chosen, 2):
             chosen.append(k)
-            effect = near(where, grids.position(places.grids[k]))
-            c = strengths[int(np.argmin(score[k]))]
+            closer = around(grids, places, k)
+            finer = context.scan.point_scores(about, matrix, strengths, closer)
+            best, level = np.unravel_index(np.argmin(finer), finer.shape)
+            effect, c = near(where, grids.position(closer.grids[best])), strengths[level]
             start = np.array([np.log(c / effect.parameters[0].scale), 0.0, 0.0])
             out.append(Candidate(effect, start, base))
     return out
+
+
+def around(grids: ShellGrids, places: ShellGrids, k: int) -> ShellGrids:
+    """A closer sample of the grids round one of the places, as far as the next ones."""
+    d = np.linalg.norm(places.point - places.point[k], axis=1)
+    reach = np.sort(d)[min(4, len(d) - 1)]
+    near = np.flatnonzero(np.linalg.norm(grids.point - places.point[k], axis=1) <= reach)
+    return grids.only(near[farthest_point_sample(grids.point[near], CLOSER)])

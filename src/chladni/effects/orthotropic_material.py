@@ -9,6 +9,7 @@ from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
 from .family import Article, Family
+from .material_class import orthotropy
 from .shell_groups import ShellGroups
 from .surroundings import Surroundings
 
@@ -100,7 +101,9 @@ def _replaced(
     return out
 
 
-GRID = (-0.8, -0.3, 0.0, 0.3, 0.8)  # ln E1/E, ln E2/E where searches begin
+def _about(mean: float, sd: float) -> tuple[float, ...]:
+    """Where searches begin: at the prior's mean and a standard deviation to either side."""
+    return mean - sd, mean, mean + sd
 
 
 def orthotropic(
@@ -114,10 +117,14 @@ def orthotropic(
         raise TypeError(f"part {parts[positions[0]].name} is not isotropic")
     nu = min(max(material.nu, 0.02), 0.55)
     nu_mean = float(np.log(nu / (0.6 - nu)))
+    E, G, prior = material.E, material.shear_modulus, orthotropy(material)
     unknown = (
-        Parameter("E1", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
-        Parameter("E2", "Pa", 0.0, 1.0, material.E, step=0.3, starts=GRID),
-        Parameter("G12", "Pa", 0.0, 0.7, material.shear_modulus, step=0.3, starts=(-0.3, 0.0, 0.3)),
+        *(
+            Parameter(name, "Pa", mean, sd, scale, step=0.3, starts=_about(mean, sd))
+            for name, mean, sd, scale in zip(
+                ("E1", "E2", "G12"), prior.shift(E, G), prior.sd, (E, E, G), strict=True
+            )
+        ),
         Parameter("nu mean", "-", nu_mean, 1.0, kind="linear", step=0.5, nominal=nu_mean),
     )
     names = tuple(parts[k].name for k in positions)
@@ -144,9 +151,15 @@ def material_axes(where: Surroundings) -> list[OrthotropicMaterial]:
         if (material := isotropic(parts[k])) is not None:
             by_material.setdefault(material, []).append(k)
     return [
-        orthotropic(groups, tuple(positions), _longest(groups, np.isin(groups.part, positions)))
-        for positions in by_material.values()
+        orthotropic(groups, tuple(positions), axis)
+        for material, positions in by_material.items()
+        for axis in _extents(groups, np.isin(groups.part, positions))[: _ways(material)]
     ]
+
+
+def _ways(material: object) -> int:
+    """How many axes are tried: both where the class of the material tells them apart."""
+    return 2 if isinstance(material, Isotropic) and orthotropy(material).directed else 1
 
 
 def isotropic(part: Part) -> Isotropic | None:
@@ -157,13 +170,19 @@ def isotropic(part: Part) -> Isotropic | None:
     return material if isinstance(material, Isotropic) else None
 
 
-def _longest(groups: ShellGroups, inside: np.ndarray) -> np.ndarray:
-    """First principal direction of some groups (3,), or the coordinate axis it all but is."""
+def _extents(groups: ShellGroups, inside: np.ndarray) -> list[np.ndarray]:
+    """Principal directions of some groups, longest first, or the coordinate axes they all but are.
+
+    The third, if any, is across the sheet.
+    """
     centre, area = groups.centre[inside], groups.area[inside]
     if len(centre) < 3:
-        return np.eye(3)[0]
+        return list(np.eye(3))
     X = centre - np.average(centre, axis=0, weights=area)
-    direction = np.linalg.svd(X, full_matrices=False)[2][0]
+    return [_nearest_axis(direction) for direction in np.linalg.svd(X, full_matrices=False)[2]]
+
+
+def _nearest_axis(direction: np.ndarray) -> np.ndarray:
     k = int(np.argmax(np.abs(direction)))
     return np.eye(3)[k] if abs(direction[k]) > 0.98 else direction
 

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from .effect import Effect
-from .surroundings import Surroundings
+from .surroundings import ShellGrids, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,13 @@ class ResponseScan(Protocol):
     def deviation(self) -> np.ndarray:
         """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines."""
 
-    def point_scores(self, about: int, matrix: str, strengths: np.ndarray) -> np.ndarray:
-        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
+    def point_scores(
+        self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
+    ) -> np.ndarray:
+        """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths).
+
+        ``places`` are those of :class:`Surroundings` unless others are given.
+        """
 
     def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
@@ -69,25 +74,26 @@ class SearchContext(Protocol):
     def scores(self, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
         """Score of an effect at each start about the calibrated model (n_ways, n_starts)."""
 
+    def valleys(self, effect: Effect) -> list[np.ndarray]:
+        """Where poles alone are known: the lowest minima over the effect's whole prior."""
 
-DRAWS = 1024  # of the prior, where pairing of poles makes many valleys
-VALLEYS = 6  # of them that are followed
+
 APART = 1 / 6  # of the structure's size lie between places that are both followed
 
 
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
     """Effects whose place is known, each from the best of its starts.
 
-    With poles alone an effect of many parameters also begins at draws of its prior.
+    With poles alone an effect of many parameters begins in each of its lowest valleys.
     """
     out: list[Candidate] = []
     for effect in effects:
-        starts, several = effect.starts(), 1
         if context.scan is None and len(effect.parameters) > 2:
-            starts, several = [*starts, *_draws(effect, DRAWS)], VALLEYS
+            out += [Candidate(effect, x, context.bases[0]) for x in context.valleys(effect)]
+            continue
+        starts = effect.starts()
         for scores in context.scores(effect, starts):
-            best = np.argsort(scores)[:several]
-            out += [Candidate(effect, starts[k], context.bases[-1]) for k in best]
+            out.append(Candidate(effect, starts[int(np.argmin(scores))], context.bases[-1]))
     return out
 
 
@@ -130,12 +136,3 @@ def distinct(
         if len(out) == wanted:
             break
     return out
-
-
-def _draws(effect: Effect, n: int) -> list[np.ndarray]:
-    """Sobol points of an effect's prior."""
-    from scipy.stats import norm, qmc  # half a second that few need
-
-    u = qmc.Sobol(len(effect.parameters), seed=1).random(n)
-    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
-    return list(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))

@@ -29,11 +29,8 @@ def write_diagnosis(
     command : the line that makes this run again
     """
     folder.mkdir(parents=True, exist_ok=True)
-    files = {
-        "deck": _deck(folder, case, result),
-        "report": "report.html",
-        "diagnosis": "diagnosis.json",
-    }
+    files = _decks(folder, case, result)
+    files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
@@ -43,12 +40,20 @@ def write_diagnosis(
     return result
 
 
-def _deck(folder: Path, case: Case, result: DiagnosisResult) -> str | None:
-    """Name of the updated deck; None where no card can hold the change."""
-    if result.models is None or result.models.changes is None:
-        return None
-    path = folder / case.deck.path.with_name("updated.bdf").name
-    return write_deck(case.deck, path, result.models.changes).name
+def _decks(folder: Path, case: Case, result: DiagnosisResult) -> dict[str, str | None]:
+    """Names of the updated deck and, where an effect is named, of the one without it.
+
+    None where no card can hold the change.
+    """
+    found: dict[str, str | None] = {"deck": None}
+    if (models := result.models) is None:
+        return found
+    if models.final.changes is not None:
+        found["deck"] = write_deck(case.deck, folder / "updated.bdf", models.final.changes).name
+    if models.calibrated is not models.final and models.calibrated.changes is not None:
+        path = folder / "calibrated.bdf"
+        found["calibrated"] = write_deck(case.deck, path, models.calibrated.changes).name
+    return found
 
 
 def shown(case: Case, result: DiagnosisResult) -> Shown:

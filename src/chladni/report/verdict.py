@@ -46,6 +46,7 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
 _HALF = ("waterfall", "held_out")  # two of them stand side by side
 _FILES = {
     "deck": "the updated deck",
+    "calibrated": "the deck calibrated without the effect",
     "report": "this page",
     "diagnosis": "the result for other programs",
     "frf": "test and model as arrays",
@@ -208,7 +209,7 @@ def _scores(result: DiagnosisResult) -> list[Block]:
         ("nominal deck", "nominal", False),
         ("calibrated deck, nothing added", "calibrated", True),
         *((("updated deck", "with_effect", True),) if result.effects else ()),
-        ("the last of these, its mesh infinitely fine", "with_mesh_error", False),
+        ("the last of these, with the mesh error the fit found", "with_mesh_error", False),
         ("and what scatter could explain taken out", "with_scatter", False),
         ("floor: the recording's noise alone", "floor", False),
     )

@@ -9,10 +9,11 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..effects.search_context import Candidate
-from ..effects.surroundings import Surroundings
+from ..effects.surroundings import ShellGrids, Surroundings
 from ..errors import ModelError
 from .hypothesis_fit import Search, Trial
 from .likelihood import Poles, Responses
+from .pole_starts import global_starts
 from .reduced_model import evaluate
 from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
 
@@ -90,9 +91,13 @@ class UpdatingContext:
                     r, _ = replace(data, scale=scale).residual(state, False)
                     out[way, k] = r @ r + prior
             else:
-                r, _ = data.residual(state, False)
+                r, _ = data.scaled(state, False)
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
+
+    def valleys(self, effect: Effect) -> list[np.ndarray]:
+        """Lowest minima of an effect over its whole prior, where poles alone are known."""
+        return global_starts(self.search, effect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +117,15 @@ class Scan:
         """log10(H_model / H_test) of the best fit without any effect, on the lines in use."""
         return self.data.deviation(self.context.trial.fit.state)[self.data.use.any(axis=1)]
 
-    def point_scores(self, about: int, matrix: str, strengths: np.ndarray) -> np.ndarray:
+    def point_scores(
+        self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
+    ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
-        context = self.context
-        return point_scores(
-            context.baselines[about], context.search.bench.model, self.data, context.where.places,
-            matrix, strengths, self.flexibility,
-        )  # fmt: skip
+        bench = self.context.search.bench
+        rest = self.flexibility if places is None else bench.flexibility(places)
+        places = self.context.where.places if places is None else places
+        base = self.context.baselines[about]
+        return point_scores(base, bench.model, self.data, places, matrix, strengths, rest)
 
     def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""

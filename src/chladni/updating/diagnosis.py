@@ -9,19 +9,23 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.registry import families
 from ..errors import ModelError
+from .adequacy import FitTest, adequacy
 from .candidates import candidates
+from .discrepancy import MEDIAN
 from .hypothesis_fit import ROUGH, Search, Trial, fitted
 from .likelihood import Data, Poles, Responses
 from .map_fit import Status
+from .reduced_model import evaluate
 
-THRESHOLD = 40.0  # gain in -2 ln evidence below which nothing is named: own null simulations,
-THRESHOLD_POLES = 25.0  # whose largest gain was 29 on seeds that no result is reported on
+FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing
+THRESHOLD_POLES = 25.0  # gain in -2 ln evidence below which poles name nothing
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
@@ -41,6 +45,7 @@ class Diagnosis:
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
+    adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, where they are too few to name anything
     """
 
@@ -51,6 +56,7 @@ class Diagnosis:
     verdict: str
     notes: tuple[str, ...] = ()
     written: Trial | None = None
+    adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
 
     @property
@@ -73,8 +79,8 @@ def diagnose(
     bring starts of their own.
     """
     progress("calibration without new physics", 0.05)
+    search, null = _null(search)
     nominal = _base_trial(search, search.nuisance, _nominal_starts(search))
-    null = _base_trial(search, search.base, _null_starts(search))
     if not effects:
         return _calibrated(search, nominal, null)
     plain = _plain(search, null)
@@ -90,12 +96,49 @@ def diagnose(
     trials = _by_family([*trials, *(t for lead in trials[:RUNNING] for t in _closer(search, lead))])
     null = _restarted(search, null, trials)
     progress("verdict", 0.95)
-    return Diagnosis(nominal, null, plain, tuple(trials), verdict(nominal, null, trials))
+    called = verdict(nominal, null, trials)
+    found = Diagnosis(nominal, null, plain, tuple(trials), called)
+    return tested(found, search)
+
+
+def tested(diagnosis: Diagnosis, search: Search) -> Diagnosis:
+    """The diagnosis with its explanation held against what it predicts itself."""
+    winner = diagnosis.found or diagnosis.null
+    fits = adequacy(winner, search.weighing, search.labels)
+    if fits is None:
+        return diagnosis
+    name = winner.effect.name if diagnosis.found else "calibration alone"
+    note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
+    if fits.passes:
+        return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
+    note = f"{note}, {fits.where}; nothing in the catalogue explains the recording"
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None)
+
+
+def _null(search: Search) -> tuple[Search, Trial]:
+    """The null, and the search with errors of the model's form as they spread from its state."""
+    model, delta = search.bench.model, MEDIAN
+    state = evaluate(model, search.base, search.mean(), False)
+    starts = _null_starts(search)
+    for _ in range(2):
+        search = search.allowing_errors(state, delta)
+        null = _base_trial(search, search.base, starts)
+        if not isinstance(null.data, Responses) or null.data.error is None:
+            break
+        state, delta, starts = null.fit.state, null.data.error.delta, [null.fit.x]
+    return search, null
 
 
 def threshold(data: Data) -> float:
-    """The gain that is needed to name anything."""
-    return THRESHOLD_POLES if isinstance(data, Poles) else THRESHOLD
+    """The gain in -2 ln evidence that is needed to name anything.
+
+    Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
+    (Markov); the families share the chance of a false alarm.
+    """
+    if isinstance(data, Poles):
+        return THRESHOLD_POLES
+    return float(2 * np.log(len(families()) / FALSE_ALARM))
 
 
 def verdict(nominal: Trial, null: Trial, trials: Sequence[Trial]) -> str:
@@ -116,7 +159,7 @@ def _calibrated(search: Search, nominal: Trial, null: Trial) -> Diagnosis:
         "best -2 ln evidence"
     )
     plain = _plain(search, best)
-    return Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,))
+    return tested(Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,)), search)
 
 
 def _random_starts(search: Search, count: int = 4) -> list[np.ndarray]:
@@ -141,6 +184,7 @@ def _plain(search: Search, null: Trial) -> Trial:
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(search.base, kept, strict=True)]
     ).astype(bool)
+    search = search.exactly()
     return _base_trial(search, chosen, [x[inside] for x in (*_null_starts(search), null.fit.x)])
 
 

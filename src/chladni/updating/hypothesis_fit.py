@@ -7,8 +7,9 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
-from .likelihood import Data, Poles, Responses
-from .map_fit import Fit, Weighing, fit
+from .discrepancy import MEDIAN, learned
+from .likelihood import SCALE, Data, Poles, Responses
+from .map_fit import Fit, Weighing, beside, fit, unknowns
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import Workbench
 
@@ -58,6 +59,18 @@ class Search:
         bench = self.bench
         return Surroundings(bench.groups, bench.grids, bench.candidates, self.setup)
 
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> "Search":
+        """Responses with errors of the model's form as they spread from this state."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.allowing_errors(state, delta))
+
+    def exactly(self) -> "Search":
+        """The same search with a model that is taken to be right but for its parameters."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.exactly())
+
     def mean(self) -> np.ndarray:
         """Prior mean of the base parameters."""
         return np.array([p.mean for e in self.base for p in e.parameters])
@@ -87,11 +100,37 @@ def fitted(
     """A fit; for poles, the spread that no model reaches is found with it."""
     if isinstance(data, Poles):
         return _fit_poles(model, effects, data, weighing, x)
+    if isinstance(data, Responses) and data.error is not None:
+        return _fit_responses(model, effects, data, weighing, x, max_steps)
     return fit(model, effects, data, weighing, x, max_steps=max_steps)
 
 
+ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
+
+
+def _fit_responses(
+    model: Reduced, effects: Sequence[Effect], data: Responses, weighing: Weighing | None,
+    x: np.ndarray, max_steps: int,
+) -> Fit:  # fmt: skip
+    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
+    assert data.error is not None
+    constant = sum(2 * np.log(effect.trials_factor) for effect in effects)
+    constant += sum(2 * np.log(p.sd) for p in unknowns(effects))
+    for _ in range(ROUNDS):
+        found = fit(model, effects, data, weighing, x, max_steps=max_steps)
+        r0, J0 = beside(effects, weighing, found.x, found.state)
+        likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
+        change = abs(np.log(likely.delta / data.error.delta))
+        data = replace(data, error=data.error.with_delta(likely.delta))
+        found = replace(found, S=likely.S + float(constant), data=data)
+        if max_steps <= ROUGH or change < CLOSE:
+            break
+        x = found.x
+    return found
+
+
 SCALES = np.geomspace(0.003, 0.2, 25)
-SCALE_SD = 0.5  # of ln(scale) about its prior median
+SCALE_SD = 0.6  # of ln(scale) about its prior median
 
 
 def _fit_poles(
@@ -119,7 +158,7 @@ def _settled(
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), weighing, x)
         var = data.sd[data.use] ** 2 + scale**2
-        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale, data.scale))
+        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale))
         if best is not None and now.S > best.S - 0.05:
             break
         best, x = now, now.x
@@ -128,16 +167,17 @@ def _settled(
 
 def _likely_scale(data: Poles, state: State) -> float:
     """The scale at which the pairing as a whole is most probable."""
-
-    def cost(scale: float) -> float:
-        wider = replace(data, scale=scale)
-        r, _ = wider.residual(state, False)
-        return float(r @ r + 2 * np.log(wider.spread()[data.use]).sum()) + _scale_prior(scale)
-
-    return float(min(SCALES, key=cost))
+    return float(min(SCALES, key=lambda scale: neg2_log_mixture(replace(data, scale=scale), state)))
 
 
-def _scale_prior(scale: float, median: float = 0.006) -> float:
+def neg2_log_mixture(data: Poles, state: State) -> float:
+    """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
+    r, _ = data.residual(state, False)
+    widths = 2 * np.log(data.spread()[data.use]).sum()
+    return float(r @ r + widths) + _scale_prior(data.scale)
+
+
+def _scale_prior(scale: float, median: float = SCALE) -> float:
     return float((np.log(scale / median) / SCALE_SD) ** 2)
 
 
@@ -158,4 +198,7 @@ def as_written(trial: Trial, weighing: Weighing | None) -> Trial:
     kept = [e for e in trial.fit.effects if e.writable]
     start = np.concatenate([trial.fit.of(e) for e in kept])
     effects = [held if e is trial.effect else e for e in kept]
-    return Trial(held, fit(trial.model, effects, trial.data, weighing, start), trial.model)
+    data = trial.data
+    if isinstance(data, Responses):
+        data = data.exactly()
+    return Trial(held, fit(trial.model, effects, data, weighing, start), trial.model)

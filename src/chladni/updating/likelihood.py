@@ -13,7 +13,8 @@ from typing import Protocol, Self
 import numpy as np
 
 from ..ema.correlation import wrapped
-from .pole_assignment import paired, price_alone, price_missed
+from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
+from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
@@ -25,6 +26,9 @@ class Data(Protocol):
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """r (n,) and ∂r/∂x (n, n_p)."""
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The same over the spread of each sample alone, dependence not yet whitened out."""
 
     def over(self, model: Reduced) -> Self:
         """The same data seen through another basis."""
@@ -40,7 +44,7 @@ class Responses:
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
     use : (n_f, n_out) bool                lines and channels the fit may see
-    floor : float                          standard deviation of log10 H that no model reaches
+    floor : float                          sd of log10 H that neither noise nor δ explains
     """
 
     values: np.ndarray
@@ -49,10 +53,17 @@ class Responses:
     inputs: object
     use: np.ndarray
     quantity: str = "accelerance"
-    floor: float = 0.015
+    floor: float = 0.003
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
+    bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
+    error: Discrepancy | None = None  # covariance of the lines and channels in use
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+        return POWER[self.quantity]
 
     def over(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
@@ -60,11 +71,12 @@ class Responses:
 
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) (n_f, n_out, n_in)."""
-        phi_o, phi_i, d = self._modal(state)
+        phi_o, phi_i, d = self.modal(state)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
-        return np.asarray(self.s[:, None, None] ** POWER[self.quantity] * H)
+        return np.asarray(self.s[:, None, None] ** self.power * H)
 
-    def _modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r)."""
         d = 1 / (state.lam + self.s[:, None] ** 2)
         return self.a @ state.phi, self.b @ state.phi, d
 
@@ -79,9 +91,28 @@ class Responses:
         """Standard deviation of δ: the floor, inflated where the response itself is small."""
         rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
         out = self.floor**2 + (0.6 * self.floor * rms / np.abs(self.values)) ** 2
-        return np.sqrt(out + (0.0 if self.noise is None else self.noise**2))
+        for more in (self.noise, self.bent):
+            out = out + (0.0 if more is None else more**2)
+        return np.sqrt(out)
+
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
+        """The same responses of a model whose form is off by about δ, as seen from a state."""
+        plain = self.exactly()
+        data = replace(plain, bent=curvature(plain, state))
+        return replace(data, error=discrepancy(data, state).with_delta(delta))
+
+    def exactly(self) -> Self:
+        """The same responses of a model that is right but for its parameters."""
+        return replace(self, bent=None, error=None)
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
+        """δ over its spread, with the errors of the model's form whitened out."""
+        r, J = self.scaled(state, gradient)
+        if self.error is None:
+            return r, J
+        return self.error.whitened(r), self.error.whitened(J) if gradient else J
+
+    def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """Real and imaginary part of δ over its spread, on the lines and channels in use."""
         sd = self.spread()
         delta = (self.deviation(state) / sd)[self.use].ravel()
@@ -93,7 +124,7 @@ class Responses:
 
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D (dK + s² dM) D φ_i, over H ln 10."""
-        phi_o, phi_i, d = self._modal(state)
+        phi_o, phi_i, d = self.modal(state)
         n_p, r = len(state.dK), len(state.lam)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
         out = np.empty((n_p, *H.shape), complex)
@@ -111,7 +142,7 @@ class Responses:
 
     def only(self, use: np.ndarray) -> Self:
         """The same responses on other lines and channels."""
-        return replace(self, use=use)
+        return replace(self.exactly(), use=use)
 
     def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
         """Mean |δ|² over the lines and channels in use (``real`` is for poles)."""
@@ -125,6 +156,9 @@ def _real_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.asarray(A @ z.real + 1j * (A @ z.imag))
 
 
+SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
+
+
 @dataclass(frozen=True, eq=False)
 class Poles:
     """Natural frequencies, each with the standard deviation of its logarithm.
@@ -136,7 +170,8 @@ class Poles:
     use : (n,) bool           poles the fit may see
     strength : (n,)           peak height relative to the highest
     band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             spread of ln f that no model reaches; a hypothesis may raise it
+    scale : float             spread of ln f that no model reaches; learned with every hypothesis
+    spurious : float          share of poles that may belong to no mode of the structure
     outputs, inputs           rows at the likely places of sensors and shakers, or None
     """
 
@@ -145,9 +180,10 @@ class Poles:
     use: np.ndarray
     strength: np.ndarray
     band: tuple[float, float]
-    scale: float = 0.006
+    scale: float = SCALE
     outputs: object = None
     inputs: object = None
+    spurious: float = SPURIOUS
     a: np.ndarray | None = None
     b: np.ndarray | None = None
 
@@ -181,7 +217,7 @@ class Poles:
 
     def _alone(self) -> np.ndarray:
         """Price of a lonely pole, on the scale on which a pair costs δ²/σ²."""
-        price = np.where(np.isinf(self.strength), 1e4, price_alone(self.strength))
+        price = np.where(np.isinf(self.strength), 1e4, price_spurious(self.spurious))
         return price - 2 * np.log(self.spread())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
@@ -215,6 +251,8 @@ class Poles:
             J[test] = (dlam / (2 * lam) / sd[test]).T
         use = np.append(self.use, True)
         return r[use], J[use]
+
+    scaled = residual  # poles are independent
 
     def only(self, use: np.ndarray) -> Self:
         """The same poles, others in use."""

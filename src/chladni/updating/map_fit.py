@@ -79,6 +79,19 @@ def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
     return tuple(p for effect in effects for p in effect.parameters)
 
 
+def beside(
+    effects: Sequence[Effect], weighing: Weighing | None, x: np.ndarray, state: State
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened residuals and slopes of what is known beside the data: priors and the scales."""
+    priors = unknowns(effects)
+    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+    r, J = (x - mean) / sd, np.diag(1 / sd)
+    if weighing is None:
+        return r, J
+    row = state.dweight[None] / weighing.sd
+    return np.append(r, (state.weight - weighing.mass) / weighing.sd), np.concatenate([J, row])
+
+
 def fit(
     model: Reduced,
     effects: Sequence[Effect],
@@ -97,17 +110,14 @@ def fit(
     gain : float        stop when a step improves -2 ln posterior by less
     """
     priors = unknowns(effects)
-    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+    sd = np.array([p.sd for p in priors])
     limit = np.array([p.step for p in priors])
 
     def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
         state = evaluate(model, effects, x, gradient)
         r, J = data.residual(state, gradient)
-        rows, slopes = [r, (x - mean) / sd], [J, np.diag(1 / sd)]
-        if weighing is not None:
-            rows.append(np.array([(state.weight - weighing.mass) / weighing.sd]))
-            slopes.append(state.dweight[None] / weighing.sd)
-        return np.concatenate(rows), np.concatenate(slopes) if gradient else J, state
+        r0, J0 = beside(effects, weighing, x, state)
+        return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
 
     x, damping = start.copy(), 1e-2
     status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, verdict
+from .diagnosis import Diagnosis, tested, verdict
 from .hypothesis_fit import Search, Trial, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
@@ -93,7 +93,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         "named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
-    return replace(diagnosis, verdict=plainly, notes=(*diagnosis.notes, note), written=None)
+    notes = (*diagnosis.notes, note)
+    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.search)
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
@@ -108,11 +109,22 @@ def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
     return real
 
 
+def _as_given(search: Search, null: Trial) -> np.ndarray:
+    """The deck's own values, mesh error and gain as the fit found them, no scatter."""
+    x, at = search.mean(), 0
+    for e in search.base:
+        n = len(e.parameters)
+        if e.kind == "nuisance" and e.writable:
+            x[at : at + n] = null.fit.of(e)
+        at += n
+    return x
+
+
 def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
     """The calibrated and the updated deck, and all that the last fit had beside them."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
-        nominal = evaluate(null.model, search.base, search.mean(), False)
+        nominal = evaluate(null.model, search.base, _as_given(search, null), False)
         return [(null, nominal), (null, nominal), (null, null.fit.state)]
     if diagnosis.found is None:
         state = plain.fit.state

@@ -1,30 +1,35 @@
 """Which model mode belongs to which test pole, where no shapes were measured.
 
-Both lists are in order of frequency, so a pairing is a monotone path; a test pole or a model mode
-may be left alone at a price.  The prices are -2 ln of probabilities: that a resonance of the test
-is none of the structure's, that a mode the sensors see well was missed.
+Both lists are in order of frequency, so an assignment is a monotone path; a pole or a mode may stay
+unpaired at a price.  The model is a mixture: a pole is a mode of the structure, ln f = ln f_m + ε
+with ε ~ N(0, σ²), or a spurious one, its ln f anywhere in the range.  Prices are -2 ln of those
+probabilities: of a spurious pole whatever its height, of a missed mode by how well it shows.
 Needleman and Wunsch (1970), J. Mol. Biol. 48, 443-453 (the alignment).
 """
 
 import numpy as np
 
-STRANGER = 20.0  # -2 ln p of a strong pole that belongs to the rig, the room, the noise
-FAINT = 6.0  # the same of one that hardly stands out
-STRONG = -0.5  # log10 of the relative peak height from which a pole counts as strong
-MISSED = 12.0  # -2 ln p of overlooking a mode that shows as strongly as the strongest
-SEEN = 1.5  # decades of visibility over which that price falls to one
+SPURIOUS = 0.4  # share of poles of a recording that may be the rig's, the room's, the noise's
+SPURIOUS_LISTED = 0.05  # the same of poles somebody has listed as modes
+RANGE = 3.0  # ln f over which a spurious pole may lie anywhere: 20 to 400 Hz
+MISSED = 8.0  # -2 ln p of overlooking a mode that shows as strongly as the strongest
+HARDLY = 0.3  # the same of a mode that hardly shows
+SEEN = 1.5  # decades of visibility over which the one price falls to the other
 
 
-def price_alone(strength: np.ndarray) -> np.ndarray:
-    """Price of leaving test poles alone, by peak height relative to the highest (n,)."""
-    share = np.clip(1 - STRONG + np.log10(np.maximum(strength, 1e-9)), 0, 1)
-    return FAINT + (STRANGER - FAINT) * share
+def price_spurious(share: float) -> float:
+    """Price of an unpaired pole, -2 ln(p/(1-p)) + 2 ln L - ln 2π, where a pair costs δ²/σ² + ln σ².
+
+    >>> price_spurious(0.05) > price_spurious(0.4) > 0
+    True
+    """
+    return float(-2 * np.log(share / (1 - share)) + 2 * np.log(RANGE) - np.log(2 * np.pi))
 
 
 def price_missed(visibility: np.ndarray) -> np.ndarray:
-    """Price of leaving model modes alone, by visibility relative to the strongest (m,)."""
+    """Price of unpaired modes, by visibility relative to the strongest (m,)."""
     share = np.clip(1 + np.log10(np.maximum(visibility, 1e-9)) / SEEN, 0, 1)
-    return 1 + (MISSED - 1) * share
+    return np.asarray(HARDLY + MISSED * share)
 
 
 def paired(
@@ -32,7 +37,7 @@ def paired(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Positions (in test, in model) of the cheapest monotone pairing, and the modes' share of it.
 
-    Σ_pairs (ln f_m/f_t)²/σ² + Σ (alone of lonely poles) + Σ (missed of lonely modes)
+    Σ_pairs (ln f_m/f_t)²/σ² + Σ (alone of unpaired poles) + Σ (missed of unpaired modes)
 
     Parameters
     ----------
@@ -46,30 +51,34 @@ def paired(
     """
     n, m = len(test), len(model)
     pair = (np.log(model[None, :] / test[:, None]) / sd[:, None]) ** 2
-    cost = np.full((n + 1, m + 1), np.inf)
-    step = np.zeros((n + 1, m + 1), dtype=int)
-    cost[0], step[0] = np.concatenate([[0.0], np.cumsum(missed)]), 2
-    for i in range(1, n + 1):
-        cost[i, 0], step[i, 0] = cost[i - 1, 0] + alone[i - 1], 1
-        for j in range(1, m + 1):
-            options = (
-                cost[i - 1, j - 1] + pair[i - 1, j - 1],
-                cost[i - 1, j] + alone[i - 1],
-                cost[i, j - 1] + missed[j - 1],
-            )
-            step[i, j] = min(range(3), key=options.__getitem__)
-            cost[i, j] = options[step[i, j]]
-    at_test, at_model = _backtrack(step, n, m)
-    lonely = np.ones(m, bool)
-    lonely[at_model] = False
-    return at_test, at_model, float(missed[lonely].sum())
+    skip = np.concatenate([[0.0], np.cumsum(missed)])
+    cost = skip
+    matched = np.zeros((n + 1, m + 1), bool)  # the last pole, if any, is paired with the last mode
+    skipped = np.zeros((n + 1, m + 1), bool)  # the last mode is unpaired
+    skipped[0, 1:] = True
+    for i in range(n):
+        joined = np.append(np.inf, cost[:-1] + pair[i])
+        here = np.minimum(cost + alone[i], joined)
+        matched[i + 1] = joined < cost + alone[i]
+        ahead = here - skip
+        least = np.minimum.accumulate(ahead)
+        skipped[i + 1], cost = least < ahead, least + skip
+    at_test, at_model = _backtrack(matched, skipped)
+    unpaired = np.ones(m, bool)
+    unpaired[at_model] = False
+    return at_test, at_model, float(missed[unpaired].sum())
 
 
-def _backtrack(step: np.ndarray, n: int, m: int) -> tuple[np.ndarray, np.ndarray]:
+def _backtrack(matched: np.ndarray, skipped: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    n, m = np.array(matched.shape) - 1
     test, model = [], []
     while n > 0:
-        if step[n, m] == 0:
+        if skipped[n, m]:
+            m -= 1
+            continue
+        if matched[n, m]:
             test.append(n - 1)
             model.append(m - 1)
-        n, m = n - (step[n, m] != 2), m - (step[n, m] != 1)
+            m -= 1
+        n -= 1
     return np.array(test[::-1], dtype=int), np.array(model[::-1], dtype=int)

@@ -11,13 +11,15 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.frf import FRF
 from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
+from ..effects.model_families import model_families
 from ..effects.ordinary import defaults, gain, scatter
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
-from ..ema.identification import Identified, equalised, identify
+from ..ema.identification import Identified, equalised, identify, spread
 from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -27,6 +29,7 @@ from .hypothesis_fit import Search
 from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
+from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
 from .test_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
@@ -36,6 +39,7 @@ ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
+FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
 def prepare(question: Question) -> Prepared:
@@ -80,10 +84,10 @@ def _by_responses(question: Question) -> Prepared:
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_top, held_sensors)
-        data.append(
-            Responses(equalised(found, s), s, rows_o, rows_i, use, found.quantity).over(bench.model)
-        )
-    nuisance = nuisances(bench, nominal, top)
+        H = equalised(found, s)
+        read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
+        data.append(read.over(bench.model))
+    nuisance = nuisances(bench, nominal, top, jittered=False)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, top)
@@ -133,6 +137,19 @@ def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
     said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
     said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
     return ", ".join(said) or "nothing"
+
+
+def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
+    """Standard deviation of log10 H(s) from the noise of the recording (n_f, n_out, n_in).
+
+    The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
+    """
+    sd = np.sqrt(spread(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    f, own = s.imag / (2 * np.pi), frf.frequency
+    near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
+    lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))
+    per_line = np.minimum(sd[near], 1.0) * max(found.chi, 1.0)
+    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:
@@ -195,9 +212,9 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     top = float(frequency[-1]) * 1.15
     highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
-    nominal = modelled(question.tested(question.assembly), SOLVED * highest)
+    nominal = modelled(question.tested(question.assembly), max(FAR * top, SOLVED * highest))
     built = nominal.structure
-    bench = workbench(nominal, top, groups=48)
+    bench = workbench(nominal, top, groups=48, reach=FAR)
     bench = carrying(bench, freed_by(question, bench, top))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
@@ -208,8 +225,9 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
-        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i
-    ).over(bench.model)
+        frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
+        spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
+    ).over(bench.model)  # fmt: skip
     nuisance = nuisances(bench, nominal, top)
     search = searched(question, bench, data, nuisance, top)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
@@ -218,14 +236,20 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     return Prepared(search, data, held, what, notes, nominal, None, found, few, ~held)
 
 
-def nuisances(bench: Workbench, model: Modelled, top: float) -> list[Effect]:
-    """Scatter within parts, mesh error, jitter: what calibration cannot remove."""
+def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = True) -> list[Effect]:
+    """Scatter within parts, mesh error, jitter: what calibration cannot remove.
+
+    Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
+    What is structured in that error stands beside it, joints and shear of the shells by families.
+    """
     out: list[Effect] = [
         scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
     if (mesh := mesh_error(model, top)) is not None:
         out.append(mesh)
-    return [*out, jitter(model, top, mesh)]
+    if jittered:
+        return [*out, jitter(model, top, mesh)]
+    return [*out, *model_families(model.structure)]
 
 
 def searched(

@@ -67,7 +67,7 @@ class Workbench:
 
 def workbench(
     model: Modelled | Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
-    groups: int = 64, extra: np.ndarray | None = None,
+    groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
 ) -> Workbench:  # fmt: skip
     """Make a structure ready.
 
@@ -78,10 +78,11 @@ def workbench(
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
     extra : (n, m) further vectors for the basis
     most : candidate places
+    reach : the basis holds modes up to this many times ``top``
     """
     if isinstance(model, Assembly):
-        model = modelled(model, REACH * top)
-    built, modes = model.structure, model.up_to(REACH * top)
+        model = modelled(model, reach * top)
+    built, modes = model.structure, model.up_to(reach * top)
     flexible = modes.frequency[modes.frequency > 0.02 * top]
     if not len(flexible):  # stiffer than all that was measured
         modes = normal_modes(built.system, min(FEWEST, len(built.system.dofs)))

@@ -91,6 +91,10 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     )
     of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
     fresh = searched(
-        changed, bench, data.over(bench.model), [*nuisances(bench, model, top), *of_test], top
+        changed,
+        bench,
+        data.over(bench.model),
+        [*nuisances(bench, model, top, not rows), *of_test],
+        top,
     )
     return fresh, fresh.trial(effect.with_reference_state(x), x, fresh.mean())

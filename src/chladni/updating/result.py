@@ -62,8 +62,8 @@ class Scores:
     calibrated : the deck with ordinary parameters fitted, no effect in it
     with_effect : the updated deck
     floor : what the noise of the recording alone leaves
-    calibrated_with_mesh_error, with_mesh_error : the same two decks on an infinitely fine mesh, as
-        far as the fit could tell; the held-out data judge an effect by these
+    calibrated_with_mesh_error, with_mesh_error : the same two decks with the mesh error (and the
+        unknown gain) that the fit found; the held-out data judge an effect by these
     with_scatter : what is left when scatter within the parts and each mode's own error are fitted
     """
 

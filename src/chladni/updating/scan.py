@@ -1,8 +1,9 @@
 """Every place at once: exact low-rank re-analysis, ordinary parameters profiled out linearly.
 
 The receptance of the structure with a spring or mass D(s) at b is G_of - G_ob (1/D + G_bb)⁻¹ G_bf;
-G_bb carries the residual flexibility of what the basis leaves out.  Ordinary parameters and scatter
-are marginalised: C = I + W Wᵀ with W the slopes times the prior deviations (Woodbury).
+G_bb carries the residual flexibility of what the basis leaves out.  Ordinary parameters, scatter
+and the errors of the model's form are marginalised: C = I + W Wᵀ with W the slopes times the prior
+deviations (Woodbury).
 """
 
 from collections.abc import Sequence
@@ -52,11 +53,15 @@ def baseline(
 ) -> Baseline:
     """Linearise the base effects at x."""
     state = evaluate(model, effects, x)
-    r, J = data.residual(state, True)
+    r, J = data.scaled(state, True)
+    shapes = np.zeros((len(r), 0))
+    if isinstance(data, Responses) and (error := data.error) is not None:
+        shapes = error.U * (error.delta * np.sqrt(error.s))
     if weighing is not None:
         r = np.append(r, (state.weight - weighing.mass) / weighing.sd)
         J = np.concatenate([J, state.dweight[None] / weighing.sd])
-    W = J * np.array([p.sd for p in unknowns(effects)])
+        shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
+    W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
     L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
     return Baseline(tuple(effects), x, state, r, np.linalg.solve(L, W.T), weighing)
 
@@ -116,7 +121,7 @@ def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
     n = len(model.groups)
     probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
-    _, J = data.residual(state, True)
+    _, J = data.scaled(state, True)
     if base.weighing is not None:
         J = np.concatenate([J, state.dweight[None] / base.weighing.sd])
     return J[:, -n:]

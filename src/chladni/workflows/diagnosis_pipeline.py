@@ -16,8 +16,7 @@ from ..case import Case
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
-from ..fem.modelled import modelled
-from ..io.nastran.edit.changes import Change
+from ..fem.modelled import Modelled, modelled
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -32,11 +31,11 @@ from ..updating.outcome import fitted_scores, held_out, judged, models, real_pol
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from ..updating.result import MassComparison, Scores
+from ..updating.result import Adequacy, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
-from .diagnosis_result import DiagnosisResult, UpdatedModels
+from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
 
 
@@ -86,31 +85,29 @@ def _judged(
 def _updated(
     case: Case, asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[UpdatedModels, list[str]]:
-    """The structures before and after, each solved once, the last as its deck has it."""
-    stages, band = models(asked, found), prepared.nominal.band
-    known = {id(case.assembly): prepared.nominal}
-    edits, final, lost = _as_written(case, stages.final)
-    if stages.final is not case.assembly or edits:
-        known[id(stages.final)] = modelled(asked.tested(final), band)
-    for assembly in (stages.calibrated, stages.final):
-        if id(assembly) not in known:
-            known[id(assembly)] = modelled(asked.tested(assembly), band)
-    nominal, calibrated, last = (
-        known[id(a)] for a in (case.assembly, stages.calibrated, stages.final)
-    )
-    made = UpdatedModels(nominal, calibrated, last, edits, held_out=_unseen(prepared))
+    """The structures before and after, each solved once, changed ones as their decks have them."""
+    stages, nominal = models(asked, found), prepared.nominal
+    calibrated, lost = _deck(case, asked, nominal, stages.calibrated)
+    final = calibrated
+    if stages.final is not stages.calibrated:
+        final, lost = _deck(case, asked, nominal, stages.final)
+    made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
 
 
-def _as_written(
-    case: Case, final: Assembly
-) -> tuple[tuple[Change, ...] | None, Assembly, list[str]]:
+def _deck(
+    case: Case, asked: Question, nominal: Modelled, changed: Assembly
+) -> tuple[ChangedDeck, list[str]]:
     """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
+    if changed is case.assembly:
+        return ChangedDeck(nominal, ()), []
     try:
-        edits = tuple(changes(case.deck, case.assembly, final, case.units))
-        return edits, written_assembly(case.deck, edits, case.units), []
+        edits = tuple(changes(case.deck, case.assembly, changed, case.units))
+        written = written_assembly(case.deck, edits, case.units)
     except (FileError, LabelError, ModelError) as error:
-        return None, final, [f"no updated deck was written: {error}"]
+        known = modelled(asked.tested(changed), nominal.band)
+        return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
+    return ChangedDeck(modelled(asked.tested(written), nominal.band), edits), []
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
@@ -132,8 +129,8 @@ def _curves(case: Case, made: UpdatedModels) -> dict[str, FRF]:
     test = case.frfs[0].sel(band=(max(low, 1e-6), high))
     zeta = case.damping or DAMPING
     after = before = model_frf(case, made.nominal, zeta, test)
-    if made.final is not made.nominal:
-        after = model_frf(case, made.final, zeta, test)
+    if made.final.model is not made.nominal:
+        after = model_frf(case, made.final.model, zeta, test)
     return {"test": test, "before": before, "after": after}
 
 
@@ -143,7 +140,11 @@ def _result(
     """All numbers and words, from the decks as written."""
     last, deck = found.found or found.null, found.written or found.found or found.plain
     real = real_poles(prepared, last)
-    every = (("before", stages.nominal), ("calibrated", stages.calibrated), ("after", stages.final))
+    every = (
+        ("before", stages.nominal),
+        ("calibrated", stages.calibrated.model),
+        ("after", stages.final.model),
+    )
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
     left = remainder(prepared, found)
@@ -158,6 +159,7 @@ def _result(
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
+        adequate=_adequate(found),
         notes=(*prepared.notes, *found.notes, *leaning(deck.fit), left.sentence),
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
@@ -165,10 +167,19 @@ def _result(
     )
 
 
+def _adequate(found: Diagnosis) -> Adequacy | None:
+    """The absolute test as the page has it; None where natural frequencies were compared."""
+    test = found.adequacy
+    if test is None:
+        return None
+    place: dict[str, object] = {"text": test.where, "parts": [], "modes_hz": []}
+    return Adequacy(test.passes, test.p, test.what, () if test.passes else (place,))
+
+
 def _article_mass(asked: Question, stages: UpdatedModels) -> float:
     """What the updated deck weighs: the structure as tested less its sensors [kg]."""
     sensors = sum(m for _, m in asked.carried)
-    return mass_properties(stages.final.assembly)[0] - sensors
+    return mass_properties(stages.final.model.assembly)[0] - sensors
 
 
 def _scores(
@@ -181,10 +192,10 @@ def _scores(
     fault = found.found if found.verdict == "measurement fault" else None
     nominal = written_Q(asked, prepared, stages.nominal, sets, real)
     calibrated = final = nominal
-    if stages.calibrated is not stages.nominal:
-        calibrated = written_Q(asked, prepared, stages.calibrated, sets, real)
-    if stages.final is not stages.nominal:
-        final = written_Q(asked, prepared, stages.final, sets, real, fault)
+    if stages.calibrated.model is not stages.nominal:
+        final = calibrated = written_Q(asked, prepared, stages.calibrated.model, sets, real)
+    if fault is not None or stages.final is not stages.calibrated:
+        final = written_Q(asked, prepared, stages.final.model, sets, real, fault)
     fits = fitted_scores(prepared, found)
     first, second = (
         (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)

@@ -26,21 +26,31 @@ Compared = Literal["responses", "frequencies"]
 
 
 @dataclass(frozen=True, eq=False)
+class ChangedDeck:
+    """A deck with changes, and the structure that its reader will have.
+
+    ``changes`` are those of its cards; None where no card can hold them.
+    """
+
+    model: Modelled
+    changes: tuple[Change, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
 class UpdatedModels:
     """The three structures a diagnosis speaks of, and their responses beside the recording's.
 
     Attributes
     ----------
-    nominal, calibrated, final : Modelled    the last as a reader of the updated deck has it
-    changes : of the cards, that make the updated deck; None where no card can hold them
+    nominal : Modelled                 the deck as it was given
+    calibrated, final : ChangedDeck    without and with the effect; one where none is named
     curves : {"test", "before", "after": FRF}, empty where no FRF exists
     held_out : labels of outputs that were not fitted
     """
 
     nominal: Modelled
-    calibrated: Modelled
-    final: Modelled
-    changes: tuple[Change, ...] | None = ()
+    calibrated: ChangedDeck
+    final: ChangedDeck
     curves: dict[str, FRF] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
 

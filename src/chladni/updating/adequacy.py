@@ -1,0 +1,137 @@
+"""Does the best explanation fit at all: a test of the model against its own predictions.
+
+Under the model the residual is r = -J (x - x̂) + δ W g + e with x, ln δ, g and e drawn from their
+priors.  The same fit is made of each draw as of the recording, and the same statistics taken; the
+p value is the rank of the recording's least likely statistic among those of the draws (Gelman, Meng
+and Stern 1996, Statistica Sinica 6, 733-807, with the prior in place of the posterior, so that p is
+uniform where the model is true).
+
+A model that fits only with an error of form far beyond what formulations differ by does not fit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
+from .hypothesis_fit import Trial
+from .likelihood import Responses
+from .map_fit import Weighing, beside, unknowns
+
+LEAST = 0.01  # p below which an explanation does not fit
+DRAWS = 300
+ALIKE = (
+    0.88  # correlation of noise on neighbouring lines, which the same modes were identified from
+)
+
+
+@dataclass(frozen=True)
+class FitTest:
+    """Whether an explanation fits: p, and what stands out where if it does not."""
+
+    passes: bool
+    p: float
+    what: str
+    where: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A fit, linearised: residuals of data and of all that is known beside them."""
+
+    error: Discrepancy
+    J: np.ndarray
+    J0: np.ndarray
+    use: np.ndarray
+    inputs: int
+
+    def noise(self, rng: np.random.Generator) -> np.ndarray:
+        """Noise of unit variance (n,), alike on neighbouring lines: it came through the modes."""
+        fresh = np.sqrt(1 - ALIKE**2) * rng.normal(size=(*self.use.shape, self.inputs, 2))
+        fresh[0] /= np.sqrt(1 - ALIKE**2)
+        return np.moveaxis(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0)[self.use], -1, 0).ravel()
+
+    def statistics(self, r: np.ndarray, r0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Size of the error, misfit, worst line, worst channel (4,).
+
+        And the mean square of the whitened residual by line and channel (n_f, n_out).
+        """
+        error = self.error.with_delta(learned(self.error, r, self.J, r0, self.J0).delta)
+        J, z = error.whitened(self.J), error.whitened(r)
+        A, g = J.T @ J + self.J0.T @ self.J0, J.T @ z + self.J0.T @ r0
+        dx = np.linalg.solve(A, g)
+        z = z - J @ dx
+        square = np.zeros((*self.use.shape, self.inputs, 2))
+        square[self.use] = np.moveaxis(z.reshape(2, -1, self.inputs), 0, -1)
+        square = (square**2).mean(axis=(2, 3))
+        used = np.maximum(self.use.sum(axis=1), 1), np.maximum(self.use.sum(axis=0), 1)
+        line, channel = square.sum(axis=1) / used[0], square.sum(axis=0) / used[1]
+        values = (error.delta, float(z @ z) / len(z), line.max(), channel.max())
+        return np.array(values), square
+
+
+NAMES = (
+    "an error of the model's form of {0:.1%} is needed; formulations of one structure differ by "
+    "0.3 to 4 %",
+    "what is left is {0:.1f} times what noise leaves",
+    "one line leaves {0:.1f} times what noise leaves",
+    "one channel leaves {0:.1f} times what noise leaves",
+)
+
+
+def adequacy(
+    trial: Trial, weighing: Weighing | None, labels: tuple[str, ...], draws: int = DRAWS
+) -> FitTest | None:
+    """The test of one explanation; None where poles were compared or errors have no place.
+
+    Parameters
+    ----------
+    labels : of the outputs, to say where
+    """
+    data, fit = trial.data, trial.fit
+    if not isinstance(data, Responses) or data.error is None:
+        return None
+    r, J = data.scaled(fit.state, True)
+    r0, J0 = beside(fit.effects, weighing, fit.x, fit.state)
+    model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
+    seen, square = model.statistics(r, r0)
+    rng = np.random.default_rng(20250103)
+    sd = np.array([p.sd for p in unknowns(fit.effects)])
+    own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
+    p, least = ranked(seen, np.array(own))
+    where = _where(data, square, labels)
+    return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where)
+
+
+def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:
+    """Statistics of a recording drawn from the model: x at its prior mean, the truth beside it."""
+    dx = sd * rng.normal(size=len(sd))
+    delta = MEDIAN * np.exp(LOG_SD * rng.normal())
+    error = model.error
+    r = delta * error.U @ (np.sqrt(error.s) * rng.normal(size=len(error.s)))
+    r = r + model.noise(rng) - model.J @ dx
+    r0 = np.zeros(known)
+    r0[len(sd) :] = rng.normal(size=known - len(sd)) - model.J0[len(sd) :] @ dx
+    return model.statistics(r, r0)[0]
+
+
+def ranked(seen: np.ndarray, drawn: np.ndarray) -> tuple[float, int]:
+    """P of the least likely statistic of ``seen`` (k,) among ``drawn`` (n, k), and which it is.
+
+    Each statistic is ranked (large = unlikely); the smallest rank is ranked again among those that
+    the draws have, so that the p value is uniform however the statistics depend on each other.
+    """
+    every = np.vstack([seen, drawn])
+    share = (every[None] >= every[:, None]).mean(axis=1)
+    least = share.min(axis=1)
+    return float(np.mean(least <= least[0])), int(np.argmin(share[0]))
+
+
+def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> str:
+    """The line and the channel that leave most."""
+    f = data.s.imag / (2 * np.pi)
+    line = int(np.argmax(square.sum(axis=1) / np.maximum(data.use.sum(axis=1), 1)))
+    channel = int(np.argmax(square.sum(axis=0) / np.maximum(data.use.sum(axis=0), 1)))
+    name = labels[channel] if channel < len(labels) else f"channel {channel + 1}"
+    return f"most near {f[line]:.0f} Hz and on {name}"

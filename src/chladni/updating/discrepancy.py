@@ -1,0 +1,246 @@
+"""Model-form error as a part of the model: modal stiffness and mass are random about their values.
+
+K = Λ^½ (I + G) Λ^½ and M = I + G' in the modes of a state, G and G' symmetric with independent
+entries of mean zero and variance δ² (1 + [i=j])/2 (Soize 2000, Prob. Eng. Mech. 15, 277-294, to
+first order).  The responses depend on G linearly, log10 H = log10 H_0 + J vec(G), so the whitened
+residual has the covariance C = I + δ² W Wᵀ.  One decomposition W Wᵀ = U diag(s) Uᵀ serves every δ:
+
+ln det C = Σ ln(1 + δ² s),   C⁻¹ = I - U diag(δ² s / (1 + δ² s)) Uᵀ.
+
+Without such a term parameters go wrong with confidence (Brynjarsdottir and O'Hagan 2014, Inverse
+Problems 30, 114007).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import numpy as np
+import scipy.linalg as sl
+
+from .reduced_model import Reduced, State
+
+MEDIAN, LOG_SD = 0.01, 0.7  # prior of δ: two formulations of one sheet differ by 0.3 to 4 %
+GRID = np.geomspace(0.0008, 0.16, 16)  # values of δ over which an evidence is integrated
+REACH = 1.5  # modes up to this many times the highest line take part
+RIGID = 0.02  # of the highest line: below it a mode counts as rigid and is known
+MOST = 2000  # pairs of modes, or samples, that are decomposed
+CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
+USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
+WRAPS = 0.4  # relative deviation of H from which its phase may wrap
+
+
+class Lines(Protocol):
+    """Responses on lines s, as :class:`.likelihood.Responses`."""
+
+    @property
+    def values(self) -> np.ndarray:
+        """H (n_f, n_out, n_in)."""
+
+    @property
+    def s(self) -> np.ndarray:
+        """(n_f,) [rad/s]."""
+
+    @property
+    def use(self) -> np.ndarray:
+        """Lines and channels in use (n_f, n_out)."""
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o, φ_i and D."""
+
+    def model(self, state: State) -> np.ndarray:
+        """H of the model."""
+
+    def spread(self) -> np.ndarray:
+        """Standard deviation of log10 H."""
+
+    def only(self, use: np.ndarray) -> Self:
+        """Others in use."""
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """A change of the form of the model, held: G and G' in the modes of a reference state.
+
+    Attributes
+    ----------
+    rows : (k, r)      of Φ⁻¹, the reference modes that take part
+    lam : (k,)         their ω² [rad²/s²]
+    G : (2, k, k)      relative change of modal stiffness and mass
+    """
+
+    rows: np.ndarray
+    lam: np.ndarray
+    G: np.ndarray
+
+    def changed(self, model: Reduced) -> Reduced:
+        """The model with the change in it."""
+        root = np.sqrt(self.lam)
+        dK, dM = (
+            self.rows.T @ A @ self.rows for A in (root[:, None] * self.G[0] * root, self.G[1])
+        )
+        return replace(model, K0=model.K0 + dK, M0=model.M0 + dM)
+
+    def with_values(self, g: np.ndarray) -> Self:
+        """The same modes, entries g (2 pairs,) in units of their deviation at δ = 1."""
+        i, j = self.pairs.T
+        G = np.zeros_like(self.G)
+        for q, values in enumerate(g.reshape(2, -1)):
+            G[q, i, j] = G[q, j, i] = values * np.where(i == j, 1.0, np.sqrt(0.5))
+        return replace(self, G=G)
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Pairs i <= j of the modes that take part (n_pairs, 2)."""
+        return np.stack(np.triu_indices(len(self.lam)), axis=1)
+
+
+def form(state: State, top: float) -> Form:
+    """No change yet, in the flexible modes up to ``REACH`` times the highest line [rad/s]."""
+    omega = np.sqrt(np.maximum(state.lam, 0))
+    modes = np.flatnonzero((omega > RIGID * top) & (omega < REACH * top))
+    k = len(modes)
+    return Form(np.linalg.inv(state.phi)[modes], state.lam[modes], np.zeros((2, k, k)))
+
+
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
+    """Covariance C = I + δ² U diag(s) Uᵀ of whitened residuals.
+
+    Attributes
+    ----------
+    U : (n, k)       orthonormal
+    s : (k,)         variance along each column for δ = 1
+    delta : float    standard deviation of the diagonal of G
+    """
+
+    U: np.ndarray
+    s: np.ndarray
+    delta: float = MEDIAN
+
+    def with_delta(self, delta: float) -> Self:
+        """The same shapes of error, larger or smaller."""
+        return replace(self, delta=delta)
+
+    def whitened(self, r: np.ndarray) -> np.ndarray:
+        """C^-½ r of residuals or of columns of slopes (n, ...)."""
+        less = 1 - 1 / np.sqrt(1 + self.delta**2 * self.s)
+        return np.asarray(r - (self.U * less) @ (self.U.T @ r))
+
+    def log_det(self) -> float:
+        """Ln det C."""
+        return float(np.log1p(self.delta**2 * self.s).sum())
+
+
+def prior(delta: np.ndarray | float) -> np.ndarray:
+    """-2 ln of the prior density of ln δ."""
+    z = (np.log(delta) - np.log(MEDIAN)) / LOG_SD
+    return np.asarray(z**2 + np.log(2 * np.pi * LOG_SD**2))
+
+
+def discrepancy(data: Lines, state: State) -> Discrepancy:
+    """How errors of modal stiffness and mass at a state spread over the whitened residual.
+
+    The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs.
+    """
+    W = columns(data, state, form(state, float(data.s.imag.max())))
+    if len(W) <= MOST:
+        s, U = sl.eigh(W @ W.T, overwrite_a=True, check_finite=False, driver="evd")
+    else:
+        W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST]]
+        s, V = sl.eigh(W.T @ W, overwrite_a=True, check_finite=False, driver="evd")
+        U = W @ (V / np.sqrt(np.maximum(s, 1e-300)))
+    kept = s > CUT / GRID[-1] ** 2
+    return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
+
+
+def curvature(data: Lines, state: State) -> np.ndarray:
+    """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
+
+    For H = H_0 (1 + z), z of variance σ², ln(1 + z) = z - z²/2: near a zero of H, where σ is no
+    longer small, the logarithm is bent, and beyond σ = 0.4 its phase may wrap. What is left of the
+    exact response to G is alike along lines and counts ``BENT`` times.
+    """
+    every = data.only(np.ones(data.use.shape, bool))
+    var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
+    sd = every.spread() * np.log(10) * USUAL
+    sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
+    return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
+
+
+def columns(data: Lines, state: State, about: Form) -> np.ndarray:
+    """∂r/∂G and ∂r/∂G' of pairs of modes, times the standard deviation at δ = 1 (n, 2 pairs).
+
+    dH = -s^k a_oᵀ (Λ^½ dG Λ^½ + s² dG') a_i with a = T D φ, T the reference modes' share in those
+    of the state.
+    """
+    i, j = about.pairs.T
+    phi_o, phi_i, d = data.modal(state)
+    H, sd = data.model(state), data.spread()
+    T = about.rows @ state.phi
+    a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
+    a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)
+    a_o = a_o * (data.s**data.power)[:, None]
+    std = np.where(i == j, 0.5, np.sqrt(0.5))  # half, for i = j counts twice below
+    root = np.sqrt(about.lam[i] * about.lam[j])
+    out = np.empty((2, len(i), *H.shape), complex)
+    for p in range(len(phi_i)):
+        both = a_o[i] * a_i[j, :, p, None] + a_o[j] * a_i[i, :, p, None]
+        both *= -std[:, None, None]
+        out[0, ..., p] = root[:, None, None] * both
+        out[1, ..., p] = data.s[:, None] ** 2 * both
+    out /= H * sd * np.log(10)
+    z = out[:, :, data.use].reshape(2 * len(i), -1).T
+    return np.concatenate([z.real, z.imag])
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """Evidence over all δ, and which δ the data prefer.
+
+    Attributes
+    ----------
+    S : float                -2 ln evidence, δ integrated out
+    delta : float            its most probable value
+    """
+
+    S: float
+    delta: float
+
+
+def learned(
+    error: Discrepancy, r: np.ndarray, J: np.ndarray, r0: np.ndarray, J0: np.ndarray
+) -> Learned:
+    """Integrate δ out of the evidence of a model linearised at its fit.
+
+    Parameters
+    ----------
+    r, J : (n,), (n, n_p)      residuals of the data and slopes, not yet whitened by C
+    r0, J0 : (m,), (m, n_p)    those of the priors and the scales
+    """
+    u, V = error.U.T @ r, error.U.T @ J
+    A0, g0, c0 = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0, float(r @ r + r0 @ r0)
+    S = np.empty(len(GRID))
+    for k, delta in enumerate(GRID):
+        v = delta**2 * error.s
+        w = v / (1 + v)
+        A, g = A0 - (V.T * w) @ V, g0 - V.T @ (w * u)
+        L = np.linalg.cholesky(A)
+        cost = c0 - w @ u**2 - float((sl.solve_triangular(L, g, lower=True) ** 2).sum())
+        S[k] = cost + 2 * np.log(np.diag(L)).sum() + np.log1p(v).sum() + prior(delta)
+    width = np.log(GRID[1] / GRID[0])
+    best = int(np.argmin(S))
+    total = S[best] - 2 * np.log(np.exp(-(S - S[best]) / 2).sum() * width)
+    return Learned(float(total), _peak(S, best))
+
+
+def _peak(S: np.ndarray, best: int) -> float:
+    """Where the parabola through the best three values has its foot."""
+    if not 0 < best < len(S) - 1:
+        return float(GRID[best])
+    a, b, c = S[best - 1 : best + 2]
+    shift = 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
+    return float(GRID[best] * (GRID[1] / GRID[0]) ** np.clip(shift, -1, 1))

@@ -1,0 +1,81 @@
+"""Where to begin a fit of poles: the assignment makes many valleys, so all are looked into.
+
+Sobol points of the effect's prior, the best distinct ones walked downhill by a simplex (Nelder and
+Mead 1965, Comput. J. 7, 308-313): the assignment jumps, so no slope is used.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import norm, qmc
+
+from ..effects.effect import Effect
+from ..errors import ModelError
+from .hypothesis_fit import SCALES, Search, neg2_log_mixture
+from .likelihood import Poles
+from .reduced_model import evaluate
+
+DRAWS = 4096
+WALKED = 32  # distinct points that are walked downhill
+APART = 0.25  # of the prior sd, in one parameter at least: points that count as distinct
+WIDE = 0.03  # spread of ln f at which the points are compared before they are walked
+STEPS = 250  # evaluations of one walk
+
+
+def draws(effect: Effect, count: int) -> np.ndarray:
+    """Sobol points of an effect's prior (count, n_p); count is a power of two."""
+    u = qmc.Sobol(len(effect.parameters), seed=1).random(count)
+    mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
+    return np.asarray(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))
+
+
+def global_starts(search: Search, effect: Effect, most: int = 4) -> list[np.ndarray]:
+    """The lowest distinct valleys of -2 ln posterior over the effect's own parameters.
+
+    What the case may calibrate anyway stands at its prior mean; what the effect makes superfluous
+    is left out.
+    """
+    data = search.data
+    assert isinstance(data, Poles)
+    kept = search.without(effect)
+    idle = np.array([p.mean for e in kept for p in e.parameters])
+    sd = np.array([p.sd for p in effect.parameters])
+    mean = np.array([p.mean for p in effect.parameters])
+    model = search.bench.model.split_for(effect, mean)
+    seen = data.over(model)
+
+    def cost(x: np.ndarray, scales: np.ndarray) -> float:
+        try:
+            state = evaluate(model, [*kept, effect], np.concatenate([idle, x]), False)
+        except ModelError:
+            return np.inf
+        prior = float((((x - mean) / sd) ** 2).sum())
+        return prior + min(neg2_log_mixture(replace(seen, scale=s), state) for s in scales)
+
+    points = np.vstack([effect.starts(), draws(effect, DRAWS)])
+    rough = np.array([cost(x, np.array([WIDE])) for x in points])
+    chosen = _distinct(points / sd, rough, WALKED)
+    return _valleys(lambda x: cost(x, SCALES[::4]), points[chosen], sd, most)
+
+
+def _distinct(points: np.ndarray, cost: np.ndarray, most: int) -> list[int]:
+    """Rows of the cheapest points that lie apart."""
+    out: list[int] = []
+    for k in np.argsort(cost):
+        if not np.isfinite(cost[k]) or len(out) == most:
+            break
+        if all(np.abs(points[k] - points[j]).max() > APART for j in out):
+            out.append(int(k))
+    return out
+
+
+def _valleys(
+    cost: Callable[[np.ndarray], float], starts: np.ndarray, sd: np.ndarray, most: int
+) -> list[np.ndarray]:
+    """Ends of the walks, cheapest first, those that meet counted once."""
+    options = {"maxfev": STEPS, "xatol": 1e-3, "fatol": 1e-2}
+    ends = [minimize(cost, x, method="Nelder-Mead", options=options) for x in starts]
+    where = np.array([end.x for end in ends]).reshape(len(ends), -1)
+    return [where[k] for k in _distinct(where / sd, np.array([e.fun for e in ends]), most)]

@@ -1,0 +1,63 @@
+"""``python -m chladni_evidence run``: evidence that does not flatter, made, diagnosed, scored."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from chladni.errors import ChladniError, LabelError
+
+from .evidence_run import run
+from .evidence_sets import SETS, orders, purpose
+
+
+def main(words: list[str] | None = None) -> int:
+    """Entry point; 0 (done) or 2 (the input is at fault: one sentence)."""
+    asked = _parser().parse_args(words)
+    try:
+        seeds = _seeds(asked.seeds)
+        _say(purpose(seeds))
+        chosen = orders(asked.set, seeds)
+        for key in ("kinds", "structures"):
+            wanted, field = getattr(asked, key), key[:-1]
+            chosen = [o for o in chosen if not wanted or getattr(o, field) in wanted.split(",")]
+        if not chosen:
+            raise LabelError(f"no case of the set {asked.set} is left by --kinds and --structures")
+        run(chosen, asked.out, asked.workers, _say, asked.limit)
+    except ChladniError as error:
+        sys.stderr.write(f"chladni_evidence: {error}\n")
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
+    command = top.add_subparsers(required=True).add_parser("run", help="make, diagnose, score")
+    command.add_argument("--set", choices=SETS, required=True)
+    command.add_argument("--seeds", required=True, help="first and last, as 600-604")
+    command.add_argument("--workers", type=int, default=1)
+    command.add_argument("--kinds", default="", help="only these, with commas")
+    command.add_argument("--structures", default="", help="only these, with commas")
+    command.add_argument("--limit", type=float, default=3600.0, help="seconds a diagnosis may take")
+    command.add_argument("--out", type=Path, required=True)
+    return top
+
+
+def _seeds(text: str) -> list[int]:
+    """Seeds of '600-604' or '600'.
+
+    >>> _seeds("600-602")
+    [600, 601, 602]
+    """
+    first, _, last = text.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
+        raise LabelError(f"seeds {text!r} are no range; write 600-604")
+    return list(range(int(first), int(last or first) + 1))
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

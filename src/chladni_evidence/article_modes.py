@@ -1,0 +1,136 @@
+"""Modes of an article at the few points that matter, by our elements or by CalculiX."""
+
+import hashlib
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from scipy.linalg import eigh
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.reduction import attachments, orthonormal, shifted
+from chladni.fem.assemble import Structure, structure
+from chladni.model.assembly import Assembly
+from chladni.output import write_npz
+
+from .calculix import calculix_modes
+
+Solver = Literal["chladni", "calculix"]
+ABOVE = 1.6  # our modes reach up to this many times the highest recorded frequency
+BY_CALCULIX = 70  # modes CalculiX is asked for
+RIGID = 0.02  # below it a frequency of CalculiX is rounding [Hz]
+
+
+@dataclass(frozen=True, eq=False)
+class ArticleModes:
+    """Modes of an article, rigid ones first, those above the band as a static complement.
+
+    Attributes
+    ----------
+    frequency : (r,) Hz
+    rows : (k,) int          rows of the article's points, increasing
+    shapes : (k, 3, r)       motion of these points [1/√kg]
+    loss : (r, r)            Φᵀ K_loss Φ of materials with losses [rad²/s²]
+    """
+
+    frequency: np.ndarray
+    rows: np.ndarray
+    shapes: np.ndarray
+    loss: np.ndarray
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        """Motion (..., 3, r) of these points."""
+        return np.asarray(self.shapes[np.searchsorted(self.rows, rows)])
+
+
+def article_modes(
+    assembly: Assembly,
+    rows: np.ndarray,
+    loaded: np.ndarray,
+    top: float,
+    solver: Solver = "chladni",
+    cache: Path | None = None,
+    residual_bending: bool = True,
+) -> ArticleModes:
+    """Modes at some points.
+
+    Parameters
+    ----------
+    rows : points whose motion is wanted
+    loaded : points forces act on: ours are exact for static loads there
+    top : highest frequency recorded [Hz]
+    residual_bending : of our shells; False is another formulation
+    """
+    rows = np.unique(np.concatenate([rows.ravel(), loaded.ravel()]))
+    ours = _kept((assembly, rows, loaded, top, residual_bending), cache)
+    if solver == "chladni":
+        return ours
+    return _completed(*calculix_modes(assembly, BY_CALCULIX, rows, cache), ours, top)
+
+
+def _kept(
+    asked: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
+) -> ArticleModes:
+    """Modes by our elements, from the cache where they are."""
+    kept = None if cache is None else cache / f"{fingerprint(asked)}.npz"
+    if kept is not None and kept.exists():
+        with np.load(kept, allow_pickle=False) as held:
+            return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
+    assembly, rows, loaded, top, bending = asked
+    found = _ours(structure(assembly, residual_bending=bending), rows, loaded, top)
+    if kept is not None:
+        write_npz(kept, **{f.name: getattr(found, f.name) for f in fields(ArticleModes)})
+    return found
+
+
+def _completed(
+    frequency: np.ndarray, shapes: np.ndarray, ours: ArticleModes, top: float
+) -> ArticleModes:
+    """CalculiX' modes, and in place of those it was not asked for our own above them.
+
+    Without them the flexibility of the higher modes at the shaker would be missing.
+    """
+    n = min(len(frequency), int((ours.frequency <= ABOVE * top).sum()))
+    f = np.where(frequency < RIGID, 0.0, frequency)[:n]
+    f = np.concatenate([f, ours.frequency[n:]])
+    both = np.concatenate([shapes[..., :n], ours.shapes[..., n:]], axis=-1)
+    return ArticleModes(f, ours.rows, both, np.zeros((len(f), len(f))))
+
+
+def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, top: float) -> ArticleModes:
+    """Normal modes and static responses to forces at the loaded points, by Rayleigh and Ritz."""
+    system = built.system
+    X = built.assembly.points[built.assembly.rows(system.dofs[:, 0])]
+    modes = normal_modes(system, band=ABOVE * top, points=X)
+    translations = (6 * np.unique(loaded)[:, None] + np.arange(3)).ravel()
+    extra = attachments(shifted(system, top / 4, X), built.T[translations])
+    basis = orthonormal(system.M, [modes.shapes, extra], kept=len(modes))
+    lam, Q = eigh(basis.T @ (system.K @ basis))
+    shapes = basis @ Q
+    moving = (built.T @ shapes).reshape(len(built.assembly.points), 6, -1)[rows, :3]
+    f = np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi)
+    return ArticleModes(f, rows, moving, shapes.T @ (built.loss @ shapes))
+
+
+def fingerprint(value: Any) -> str:
+    """Hash of a value's content: dataclasses and tuples field by field, arrays by their bytes."""
+    digest = hashlib.sha256()
+    _fed(digest, value)
+    return digest.hexdigest()[:24]
+
+
+def _fed(digest: Any, value: Any) -> None:
+    if isinstance(value, np.ndarray):
+        digest.update(
+            f"{value.dtype}{value.shape}".encode() + np.ascontiguousarray(value).tobytes()
+        )
+    elif is_dataclass(value) and not isinstance(value, type):
+        digest.update(type(value).__name__.encode())
+        for field in fields(value):
+            _fed(digest, getattr(value, field.name))
+    elif isinstance(value, tuple | list):
+        for item in value:
+            _fed(digest, item)
+    else:
+        digest.update(repr(value).encode())

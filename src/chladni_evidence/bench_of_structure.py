@@ -1,0 +1,224 @@
+"""A structure on the test bench: deck, meshes of its articles, sensors, shaker, cords, bands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from chladni.dofs import label
+from chladni.dynamics.eigen import normal_modes
+from chladni.fem.assemble import structure
+from chladni.geometry.facets import cell_normals, point_normals
+from chladni.geometry.nearest import ShellSurface
+from chladni.geometry.sampling import farthest_point_sample
+from chladni.model.assembly import Assembly
+from chladni.model.properties import ShellSection
+from chladni.planning import Wishes, plan
+from chladni.planning.measurement_lines import TABLE_3, even_lines, stage_lines
+from chladni_specimens.forms import FORMS
+from chladni_specimens.holed_plate import holed_plate
+from chladni_specimens.plates import folded_panel
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.tailgate import tailgate
+
+from .concealed import SPECIMENS
+from .footing import Spots
+
+ZETA = 0.007  # median damping ratio of an article
+FLAT = 0.999  # length of the mean normal of a point's shells where a sensor can be glued
+FINER = {"fine": 1.7, "calculix": 1.3}  # meshes of a form's articles against the deck's
+TAILGATE = {"16 mm": 0.016, "12 mm": 0.012, "calculix": 0.022}  # CalculiX halves them by itself
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """How a structure is tested.
+
+    Attributes
+    ----------
+    name : str
+    deck : Assembly
+    meshes : {name: builder}   of articles; "calculix" is solved by the other code
+    outputs, drive : Spots     sensors, and the one shaker
+    hangers : tuple of int     grids of the deck
+    lines : (n_f,)             measured [Hz]
+    fit, held : (low, high)    bands to fit and to hold out [Hz]
+    first : float              first elastic mode of the deck [Hz]
+    sheets : tuple of str      parts an effect may sit on
+    grain, rolled              direction of rolling, parts that may be orthotropic
+    """
+
+    name: str
+    deck: Assembly
+    meshes: dict[str, Callable[[], Assembly]]
+    outputs: Spots
+    drive: Spots
+    hangers: tuple[int, ...]
+    lines: np.ndarray
+    fit: tuple[float, float]
+    held: tuple[float, float]
+    first: float
+    sheets: tuple[str, ...]
+    grain: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    rolled: tuple[str, ...] = ()
+
+    @property
+    def held_sensors(self) -> int:
+        """A sixth of them, two at least."""
+        return max(2, len(self.outputs) // 6)
+
+
+def form_bench(name: str, seed: int) -> Bench:
+    """A form of this seed: 8 to 30 sensors, a band of 10 to 15 elastic modes and four more."""
+    form = FORMS[name]
+    deck, rng = form.made(seed), np.random.default_rng([seed, 2, *name.encode()])
+    built = structure(deck)
+    modes = normal_modes(built.system, 27)
+    f = modes.frequency[6:]
+    n = int(rng.integers(10, 16))
+    ends = (0.75 * f[0], (f[n - 1] + f[n]) / 2, (f[n + 3] + f[n + 4]) / 2)
+    moving = (built.T @ modes.shapes[:, 6 : 6 + n]).reshape(len(deck.points), 6, -1)[:, :3]
+    every = _candidates(deck)
+    spots = every.only(_spread(every, int(rng.integers(8, 31)), rng))
+    return Bench(
+        name=name,
+        deck=deck,
+        meshes={k: partial(form.made, seed, finer) for k, finer in FINER.items()},
+        outputs=spots,
+        drive=every.only(_driven(deck, every, moving, rng)),
+        hangers=_hung(every),
+        lines=even_lines(0.6 * f[0], 1.03 * ends[2], ZETA, 3.0),
+        fit=(float(ends[0]), float(ends[1])),
+        held=(float(ends[1]), float(ends[2])),
+        first=float(f[0]),
+        sheets=tuple(p.name for p in deck.parts if p.name in every.parts),
+        grain=form.grain,
+        rolled=form.rolled,
+    )
+
+
+def panel_bench(name: str, seed: int) -> Bench:
+    """The small plate or panel, its sensors laid out by the seed."""
+    spec, rng = SPECIMENS[name], np.random.default_rng([seed, 3, *name.encode()])
+    deck = spec.build(1)
+    built = structure(deck)
+    modes = normal_modes(built.system, 20)
+    moving = (built.T @ modes.shapes[:, 6:]).reshape(len(deck.points), 6, -1)[:, :3]
+    every = _candidates(deck)
+    other: dict[str, Callable[[], Assembly]] = {
+        "plate": lambda: holed_plate(0.5, 0.4, (0.2, 0.22, 0.05), 0.021, 1.2e-3),
+        "panel": lambda: folded_panel(0.6, 0.3, 0.04, 0.01, 0.017, 1e-3),
+    }
+    return Bench(
+        name=name,
+        deck=deck,
+        meshes={"fine": lambda: spec.build(2), "calculix": other[name]},
+        outputs=every.only(_spread(every, spec.sensors, rng)),
+        drive=every.only(_driven(deck, every, moving, rng)),
+        hangers=_hung(every),
+        lines=np.arange(4.0, spec.top, 0.25),
+        fit=spec.fit,
+        held=(spec.fit[1], spec.top - 10),
+        first=float(modes.frequency[6]),
+        sheets=tuple(p.name for p in deck.parts),
+        rolled=tuple(p.name for p in deck.parts),
+    )
+
+
+@cache
+def tailgate_bench() -> Bench:
+    """The tailgate at 20 mm: sensors, shaker and cords as planned, the thesis' lines."""
+    deck = tailgate(TailgateDesign(size=0.020))
+    found = plan(deck, Wishes(sensors=30))
+    m = found.mounts
+    sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
+
+    def spots(at: np.ndarray) -> Spots:
+        shell = ShellSurface.whole(deck).feet(m.points[at]).shell
+        is_grid = np.isin(m.ids[at], deck.ids)
+        return Spots(
+            tuple(m.labels[int(k)] for k in at),
+            np.where(is_grid, m.ids[at], 0),
+            m.points[at],
+            m.directions[at],
+            tuple(deck.parts[int(p)].name for p in deck.shells.part[shell]),
+        )
+
+    return Bench(
+        name="tailgate",
+        deck=deck,
+        meshes={n: partial(tailgate, TailgateDesign(size=h)) for n, h in TAILGATE.items()},
+        outputs=spots(found.layout),
+        drive=spots(found.together),
+        hangers=tuple(int(i) for i in found.hangers),
+        lines=stage_lines(TABLE_3),
+        fit=(20.0, 200.0),
+        held=(200.0, 300.0),
+        first=float(found.modal.frequency[0]),
+        sheets=tuple(s for s in sheets if s in ("inner", "outer upper", "outer lower")),
+        grain=(0.0, 1.0, 0.0),
+        rolled=sheets,
+    )
+
+
+def _candidates(deck: Assembly) -> Spots:
+    """Grids where a sensor can be glued: flat on a sheet, or on a tube across it."""
+    n = point_normals(deck.points, deck.shells.nodes)
+    part, way = np.full(len(deck.points), -1), n.copy()
+    if len(deck.shells):
+        part[deck.shells.nodes.ravel()] = np.repeat(deck.shells.part, 4)
+        part[_mean_normal(deck) < FLAT] = -1
+    else:
+        along = deck.points[deck.beams.nodes[:, 1]] - deck.points[deck.beams.nodes[:, 0]]
+        part[deck.beams.nodes[:, 0]] = deck.beams.part
+        way[deck.beams.nodes[:, 0]] = np.eye(3)[np.abs(along).argmin(axis=1)]
+    at = np.flatnonzero(part >= 0)
+    return Spots(
+        tuple(_label(int(i), d) for i, d in zip(deck.ids[at], way[at], strict=True)),
+        deck.ids[at],
+        deck.points[at],
+        way[at],
+        tuple(deck.parts[p].name for p in part[at]),
+    )
+
+
+def _mean_normal(deck: Assembly) -> np.ndarray:
+    """Length of the mean of the unit normals of the shells round each point."""
+    n = cell_normals(deck.points, deck.shells.nodes)
+    total, count = np.zeros_like(deck.points), np.zeros(len(deck.points))
+    for corner in range(4):
+        np.add.at(total, deck.shells.nodes[:, corner], n)
+        np.add.at(count, deck.shells.nodes[:, corner], 1)
+    return np.asarray(np.linalg.norm(total, axis=1) / np.maximum(count, 1))
+
+
+def _label(grid: int, direction: np.ndarray) -> str:
+    axis = int(np.abs(direction).argmax())
+    if abs(direction[axis]) > 1 - 1e-9:
+        return label(grid, axis + 1, 1 if direction[axis] > 0 else -1)
+    return f"{grid}:n"
+
+
+def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Places far from each other, shaken a little by the seed."""
+    jitter = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
+    return farthest_point_sample(every.points + jitter, count)
+
+
+def _driven(
+    deck: Assembly, every: Spots, moving: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Of thirty places drawn the one that drives the modes most evenly (geometric mean)."""
+    drawn = rng.choice(len(every), min(30, len(every)), replace=False)
+    at = deck.rows(every.grids[drawn])
+    phi = np.abs(np.einsum("kir,ki->kr", moving[at], every.directions[drawn]))
+    even = np.log(phi / np.abs(phi).max(axis=0) + 0.02).mean(axis=1)
+    return np.asarray(drawn[[int(even.argmax())]])
+
+
+def _hung(every: Spots) -> tuple[int, ...]:
+    """Two grids, one near either end of the longest side."""
+    axis = int(np.ptp(every.points, axis=0).argmax())
+    ends = np.argsort(every.points[:, axis], kind="stable")
+    return int(every.grids[ends[0]]), int(every.grids[ends[-1]])

@@ -1,0 +1,70 @@
+"""The one door to the diagnosis: a case folder goes in, an answer comes out, blindly.
+
+It calls the command line in a process of its own, so that seconds and memory are the user's and a
+crash is an answer too. Whatever the diagnosis becomes, only this file has to follow.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+EVERY = 0.2  # how often the process is looked at [s]
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What came of a diagnosis.
+
+    Attributes
+    ----------
+    code : int         exit code of the command, negative where it was ended by a signal
+    seconds, gigabytes : float   by the clock; highest resident memory
+    said : str         its last words
+    result : dict      diagnosis.json; empty where none was written
+    """
+
+    code: int
+    seconds: float
+    gigabytes: float
+    said: str
+    result: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it ended otherwise than by an answer or a refusal in one sentence."""
+        return self.code not in (0, 2, 3) or (self.code == 0 and not self.result)
+
+
+def diagnosed(case: Path, out: Path, limit: float = 3600.0) -> Answer:
+    """Diagnose the case into ``out`` with nothing but its folder; its words go to ``out``.log."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    log, start = out.with_suffix(".log"), time.monotonic()
+    command = [sys.executable, "-m", "chladni", "diagnose", str(case), "--out", str(out)]
+    with log.open("wb") as words:
+        process = subprocess.Popen(
+            command, stdout=words, stderr=subprocess.STDOUT, env={**os.environ, **_ONE_THREAD}
+        )
+        code, kilobytes = _ended(process, start + limit)
+    answer = out / "diagnosis.json"
+    result = json.loads(answer.read_text(encoding="utf-8")) if answer.exists() else {}
+    said = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    last = f"ended after {limit:g} s" if code < 0 and not result else (said or [""])[-1]
+    return Answer(code, time.monotonic() - start, kilobytes / 2**20, last, result)
+
+
+def _ended(process: subprocess.Popen[bytes], deadline: float) -> tuple[int, int]:
+    """Exit code and highest resident memory [kB] of a process, which is ended at the deadline."""
+    while True:
+        pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return process.returncode, usage.ru_maxrss
+        if time.monotonic() > deadline:
+            process.kill()
+        time.sleep(EVERY)

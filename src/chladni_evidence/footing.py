@@ -1,0 +1,80 @@
+"""Places of one mesh on another: the nearest shell of the same part, or the nearest grid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.geometry.nearest import ShellSurface
+from chladni.model.assembly import Assembly
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """Where something is measured, driven or attached.
+
+    Attributes
+    ----------
+    labels : tuple of str
+    grids : (k,) int         of the deck, 0 where the place is no grid
+    points : (k, 3)          [m]
+    directions : (k, 3)      unit vectors
+    parts : tuple of str     the part each is on
+    """
+
+    labels: tuple[str, ...]
+    grids: np.ndarray
+    points: np.ndarray
+    directions: np.ndarray
+    parts: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def only(self, chosen: np.ndarray) -> "Spots":
+        """Some of them."""
+        pick = [int(k) for k in chosen]
+        return Spots(
+            tuple(self.labels[k] for k in pick),
+            self.grids[pick],
+            self.points[pick],
+            self.directions[pick],
+            tuple(self.parts[k] for k in pick),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Motion of places as a weighted mean of points: rows (k, 3) int, weights (k, 3)."""
+
+    rows: np.ndarray
+    weights: np.ndarray
+
+
+def footing(assembly: Assembly, spots: Spots) -> Footing:
+    """Where the spots are on this mesh."""
+    rows = np.zeros((len(spots), 3), dtype=np.int64)
+    weights = np.zeros((len(spots), 3))
+    for name in dict.fromkeys(spots.parts):
+        mine = np.array([p == name for p in spots.parts])
+        p = assembly.part(name)
+        if (assembly.shells.part == p).any():
+            feet = ShellSurface.of(assembly, name).feet(spots.points[mine])
+            rows[mine], weights[mine] = feet.nodes, feet.weight
+        else:
+            rows[mine] = nearest_rows(assembly, p, spots.points[mine])[:, None]
+            weights[mine] = [1.0, 0.0, 0.0]
+    return Footing(rows, weights)
+
+
+def rows_of_part(assembly: Assembly, p: int) -> np.ndarray:
+    """Rows of the points of a part's shells or beams."""
+    shells = assembly.shells.nodes[assembly.shells.part == p]
+    beams = assembly.beams.nodes[assembly.beams.part == p]
+    return np.unique(np.concatenate([shells.ravel(), beams.ravel()]))
+
+
+def nearest_rows(assembly: Assembly, p: int, points: np.ndarray) -> np.ndarray:
+    """Row of the part's point nearest to each place (k,)."""
+    rows = rows_of_part(assembly, p)
+    d2 = ((assembly.points[rows][None] - points[:, None]) ** 2).sum(axis=-1)
+    return np.asarray(rows[d2.argmin(axis=1)])

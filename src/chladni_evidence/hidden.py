@@ -1,0 +1,157 @@
+"""What a kind of hidden effect may know of an article, and what it does to it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from chladni.geometry.facets import point_normals, tangents
+from chladni.model.assembly import Assembly, Bushes, Masses
+
+from .footing import Spots, nearest_rows, rows_of_part
+from .response_of_article import Coupling
+
+FACING = 0.85  # cosine between normals of one face
+LEAST = 12  # points of a patch
+
+Spoil = Callable[[np.ndarray], np.ndarray]  # recorded values (n_f, n_out, n_in) made worse
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """An article before anything is hidden in it.
+
+    Attributes
+    ----------
+    article : Assembly     scattered, on a mesh of its own
+    outputs : Spots        where it is measured
+    hangers : (k, 3)       places of the cords [m]
+    mass : float           [kg]
+    first, top : float     first elastic mode, highest frequency of the fitted band [Hz]
+    sheets : tuple of str  parts an effect may sit on
+    grain, rolled :        direction of rolling, and the parts that may be orthotropic
+    """
+
+    article: Assembly
+    outputs: Spots
+    hangers: np.ndarray
+    mass: float
+    first: float
+    top: float
+    sheets: tuple[str, ...]
+    grain: np.ndarray
+    rolled: tuple[str, ...]
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box round it [m]."""
+        return float(np.linalg.norm(np.ptp(self.article.points, axis=0)))
+
+    @property
+    def scale(self) -> float:
+        """Spring that carries the whole at its first elastic frequency, m ω² [N/m]."""
+        return self.mass * (2 * np.pi * self.first) ** 2
+
+    def part(self, rng: np.random.Generator) -> str:
+        """A sheet, large ones more often."""
+        count = np.array([len(self.rows(name)) for name in self.sheets], dtype=float)
+        return str(rng.choice(np.array(self.sheets), p=count / count.sum()))
+
+    def rows(self, name: str) -> np.ndarray:
+        """Rows of the points of a part."""
+        return rows_of_part(self.article, self.article.part(name))
+
+    def row(self, rng: np.random.Generator) -> int:
+        """A point of a sheet."""
+        return int(rng.choice(self.rows(self.part(rng))))
+
+    def normal(self, row: int) -> np.ndarray:
+        """Unit normal at a point; on a beam, a direction across it."""
+        n = point_normals(self.article.points, self.article.shells.nodes)[row]
+        if n.any():
+            return np.asarray(n)
+        beams = self.article.beams.nodes
+        ends = beams[(beams == row).any(axis=1)][0]
+        x = np.diff(self.article.points[ends], axis=0)
+        return np.asarray(tangents(x / np.linalg.norm(x))[0][0])
+
+
+def _same(values: np.ndarray) -> np.ndarray:
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """An article with an effect in it.
+
+    Attributes
+    ----------
+    article : Assembly      what is built of masses, springs and sections is in here
+    truth : dict            value, point_m, channel ...: for the seal
+    couplings : tuple       what depends on frequency or is no symmetric matrix
+    spoil : Spoil           what happens to the recording
+    unweighed : float       mass that is on the article in the test, not on the balance [kg]
+    """
+
+    article: Assembly
+    truth: dict[str, Any]
+    couplings: tuple[Coupling, ...] = ()
+    spoil: Spoil = field(default=_same)
+    unweighed: float = 0.0
+
+
+def with_lumps(assembly: Assembly, rows: np.ndarray, mass: float) -> Assembly:
+    """Point masses [kg] at rows of points."""
+    old, n = assembly.masses, len(rows)
+    first = int(old.ids.max(initial=10**6)) + 1
+    matrix = np.tile(np.diag([mass, mass, mass, 0, 0, 0]), (n, 1, 1))
+    new = Masses(
+        np.append(old.ids, first + np.arange(n)),
+        np.append(old.node, rows),
+        np.concatenate([old.matrix, matrix]),
+    )
+    return replace(assembly, masses=new)
+
+
+def with_ground_springs(
+    assembly: Assembly, rows: np.ndarray, directions: np.ndarray, k: float
+) -> Assembly:
+    """Springs to ground k e eᵀ at rows of points along directions (n, 3)."""
+    old, n = assembly.bushes, len(rows)
+    first = int(old.ids.max(initial=2 * 10**6)) + 1
+    u, v = tangents(directions)
+    stiffness = np.zeros((n, 6))
+    stiffness[:, 0] = k
+    none = np.zeros((n, 6))
+    new = Bushes(
+        np.append(old.ids, first + np.arange(n)),
+        np.concatenate([old.nodes, np.column_stack([rows, np.full(n, -1)])]),
+        np.concatenate([old.frame, np.stack([directions, u, v], axis=1)]),
+        np.concatenate([old.place, assembly.points[rows]]),
+        np.concatenate([old.stiffness, stiffness]),
+        np.concatenate([old.viscous, none]),
+        np.concatenate([old.loss, none]),
+    )
+    return replace(assembly, bushes=new)
+
+
+def near_outputs(site: Site) -> np.ndarray:
+    """Rows of the article nearest to its sensors."""
+    a, spots = site.article, site.outputs
+    rows = [
+        nearest_rows(a, a.part(part), point[None])[0]
+        for part, point in zip(spots.parts, spots.points, strict=True)
+    ]
+    return np.array(rows)
+
+
+def around(site: Site, row: int, radius: float) -> np.ndarray:
+    """Rows of points of the same face within a radius of one (a dozen at least), itself first."""
+    a, n = site.article, point_normals(site.article.points, site.article.shells.nodes)
+    part = a.shells.part[(a.shells.nodes == row).any(axis=1)][0]
+    rows = rows_of_part(a, int(part))
+    rows = rows[np.abs(n[rows] @ n[row]) > FACING]
+    d = np.linalg.norm(a.points[rows] - a.points[row], axis=1)
+    order = np.argsort(d, kind="stable")
+    return np.asarray(rows[order[: max(LEAST, int((d <= radius).sum()))]])

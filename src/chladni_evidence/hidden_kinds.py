@@ -1,0 +1,148 @@
+"""Hidden effects the catalogue knows, of any size: what is drawn at size 1 is weak."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.errors import ModelError
+from chladni.geometry.facets import cell_normals
+from chladni.model.assembly import Assembly
+from chladni.model.properties import Isotropic, Orthotropic, ShellSection
+
+from .footing import nearest_rows
+from .hidden import Hidden, Site, near_outputs, with_ground_springs, with_lumps
+from .part_scatter import scaled
+
+STEEP = 0.95  # cosine between normal and grain: beyond, a shell keeps an axis of its own
+Kind = Callable[[Site, np.random.Generator, float], Hidden]
+
+
+def nothing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Scatter alone."""
+    return Hidden(site.article, {})
+
+
+def calibration(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """E of one part off by 6 to 12 % at size 1."""
+    part = site.part(rng)
+    factor = float(np.exp(rng.choice([-1, 1]) * rng.uniform(0.06, 0.12) * size))
+    return Hidden(scaled(site.article, {part: {"E": factor}}), {"part": part, "value": factor})
+
+
+def point_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """1.5 to 3 % of the mass on one point."""
+    row, m = site.row(rng), float(rng.uniform(0.015, 0.03)) * site.mass * size
+    truth = {"value": m, "point_m": site.article.points[row].tolist()}
+    return Hidden(with_lumps(site.article, np.array([row]), m), truth)
+
+
+def extra_support(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A spring to ground across the sheet, 5 to 50 % of m ω_1²."""
+    row, k = site.row(rng), float(np.exp(rng.uniform(-3.0, -0.7))) * site.scale * size
+    n = site.normal(row)
+    truth = {"value": k, "point_m": site.article.points[row].tolist(), "direction": n.tolist()}
+    return Hidden(with_ground_springs(site.article, np.array([row]), n[None], k), truth)
+
+
+def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """All sensors together 2 to 4 % of the mass, none of it on the balance."""
+    rows = near_outputs(site)
+    m = float(rng.uniform(0.02, 0.04)) * site.mass * size / len(rows)
+    return Hidden(with_lumps(site.article, rows, m), {"value": m}, unweighed=m * len(rows))
+
+
+def suspension(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A spring to ground across the sheet at every hanger, each 2 to 8 % of m ω_1²."""
+    a = site.article
+    every = np.arange(len(a.parts))
+    rows = np.array([_nearest(a, every, x) for x in site.hangers])
+    k = float(np.exp(rng.uniform(-3.9, -2.5))) * site.scale * size
+    n = np.array([site.normal(int(r)) for r in rows])
+    return Hidden(with_ground_springs(a, rows, n, k), {"value": k})
+
+
+def _nearest(a: Assembly, parts: np.ndarray, point: np.ndarray) -> int:
+    """Row nearest to a place among the points of any shell or beam."""
+    rows = [int(nearest_rows(a, int(p), point[None])[0]) for p in parts if _has_points(a, int(p))]
+    return min(rows, key=lambda r: float(np.linalg.norm(a.points[r] - point)))
+
+
+def _has_points(a: Assembly, p: int) -> bool:
+    return bool((a.shells.part == p).any() or (a.beams.part == p).any())
+
+
+def thinning(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A patch of a sheet thinner by 12 to 25 % in its middle, t (1 - α e^(-d²/2R²))."""
+    a, part = site.article, site.part(rng)
+    if not (a.shells.part == a.part(part)).any():
+        raise ModelError(f"part {part} has no sheet that could be thinner")
+    centre = a.points[rng.choice(site.rows(part))]
+    R = float(rng.uniform(0.06, 0.12)) * site.size * min(size, 1.6) ** 0.5
+    alpha = min(0.45, float(rng.uniform(0.12, 0.25)) * size)
+    q = np.exp(-((a.points - centre) ** 2).sum(axis=1) / (2 * R**2))
+    mine = (a.shells.part == a.part(part))[:, None]
+    t = a.shells.thickness * np.where(mine, 1 - alpha * q[a.shells.nodes], 1.0)
+    truth = {"point_m": centre.tolist(), "value": alpha, "radius_m": R, "part": part}
+    return Hidden(replace(a, shells=replace(a.shells, thickness=t)), truth)
+
+
+def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Sheets rolled: E1/E2 = e^±(0.12 to 0.3), G12 off by up to 15 %."""
+    a, rolled = site.article, [site.article.part(name) for name in site.rolled]
+    ratio = float(rng.choice([-1, 1]) * rng.uniform(0.12, 0.3)) * min(size, 2.0)
+    shear = float(np.exp(rng.uniform(-0.15, 0.15) * min(size, 2.0)))
+    parts = list(a.parts)
+    for p in rolled:
+        m = _sheet(a, p)
+        G = m.shear_modulus * shear
+        E1, E2 = m.E * np.exp(ratio / 2), m.E * np.exp(-ratio / 2)
+        grain = Orthotropic(E1, E2, m.nu * np.sqrt(E1 / E2), G, m.shear_modulus, m.shear_modulus,
+                            m.rho)  # fmt: skip
+        parts[p] = parts[p].with_section(membrane=grain, bending=grain)
+    first = _sheet(a, rolled[0])
+    truth = {
+        "E1": first.E * np.exp(ratio / 2),
+        "E2": first.E * np.exp(-ratio / 2),
+        "G12": first.shear_modulus * shear,
+        "parts": list(site.rolled),
+    }
+    mine = np.isin(a.shells.part, rolled) & (
+        np.abs(cell_normals(a.points, a.shells.nodes) @ site.grain) < STEEP
+    )
+    shells = replace(a.shells, axis=np.where(mine[:, None], site.grain, a.shells.axis))
+    return Hidden(replace(a.with_parts(tuple(parts)), shells=shells), truth)
+
+
+def _sheet(a: Assembly, p: int) -> Isotropic:
+    section = a.parts[p].section
+    assert isinstance(section, ShellSection)
+    assert isinstance(section.membrane, Isotropic)
+    return section.membrane
+
+
+def sensor_fault(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """One channel with a wrong factor or sign."""
+    at = int(rng.integers(len(site.outputs)))
+    gain = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0]))
+
+    def spoil(values: np.ndarray) -> np.ndarray:
+        wrong = values.copy()
+        wrong[:, at] *= gain
+        return wrong
+
+    truth = {"channel": site.outputs.labels[at], "value": gain}
+    return Hidden(site.article, truth, spoil=spoil)
+
+
+CATALOGUED: dict[str, Kind] = {
+    "nothing": nothing,
+    "calibration": calibration,
+    "point-mass": point_mass,
+    "extra-support": extra_support,
+    "sensor-mass": sensor_mass,
+    "suspension": suspension,
+    "thickness-distribution": thinning,
+    "orthotropic-material": orthotropic,
+    "sensor-fault": sensor_fault,
+}

@@ -1,0 +1,230 @@
+"""One case: an article with something hidden, measured; a folder for the user, a seal beside it."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chladni.bench.article import Front, recorded
+from chladni.dynamics.frf import FRF
+from chladni.effects.ordinary import value
+from chladni.errors import ModelError
+from chladni.fem.energy import mass_properties
+from chladni.geometry.facets import cell_areas
+from chladni.io.nastran import write_assembly
+from chladni.io.uff.write_uff import write_uff
+from chladni.model.assembly import Assembly
+from chladni.model.properties import ShellSection
+from chladni.output import write_json, write_text
+from chladni.units import units
+
+from .article_modes import ArticleModes, Solver, article_modes
+from .bench_of_structure import ZETA, Bench
+from .footing import Spots, footing
+from .hidden import Hidden, Site
+from .hidden_kinds import CATALOGUED, Kind
+from .outside_kinds import OUTSIDE
+from .part_scatter import scattered
+from .response_of_article import accelerance, decades_apart, seen
+
+KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE}
+UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # as large as they are
+TWICE = 2.0  # an effect moves the responses at least this many times as far as the scatter does
+FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
+NOTHING = 0.02  # an effect that moves less is none: a bad draw [rms decades]
+GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
+FRONT = Front(noise=0.01, floor=0.001)
+DAMPING_SPREAD = 0.3  # of ln ζ between modes
+LIGHT = 5e-4  # error of the balance, relative
+
+
+@dataclass(frozen=True, eq=False)
+class MadeCase:
+    """What the user has (bench, recording, weighed mass) and what is sealed."""
+
+    bench: Bench
+    frf: FRF
+    mass: float
+    truth: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rig:
+    """Solves articles of one case for their noiseless responses at the sensors."""
+
+    bench: Bench
+    zeta: np.ndarray
+    cache: Path | None
+    residual_bending: bool
+
+    def responses(
+        self, hidden: Hidden, lines: np.ndarray, solver: Solver = "chladni"
+    ) -> tuple[np.ndarray, ArticleModes]:
+        """Accelerance (n_f, n_out, 1) and the modes it was made of."""
+        a = hidden.article
+        out, drive = footing(a, self.bench.outputs), footing(a, self.bench.drive)
+        tied = [c.rows for c in hidden.couplings]
+        modes = article_modes(
+            a,
+            np.concatenate([out.rows.ravel(), *tied]),
+            np.concatenate([drive.rows.ravel(), *tied]),
+            float(lines[-1]),
+            solver,
+            self.cache,
+            self.residual_bending,
+        )
+        phi_o = seen(modes, out, self.bench.outputs.directions)
+        phi_i = seen(modes, drive, self.bench.drive.directions)
+        zeta = self.zeta[np.minimum(np.arange(phi_o.shape[1]), len(self.zeta) - 1)]
+        return accelerance(modes, phi_o, phi_i, zeta, lines, hidden.couplings), modes
+
+
+def made_case(bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None) -> MadeCase:
+    """An article of one of the bench's meshes with part scatter and an effect, measured.
+
+    The effect grows (up to fivefold) until it moves the responses over the fitted band by twice
+    what the scatter moves them, or twice ``FULL`` where that is less; both figures (rms decades)
+    are in the truth. On CalculiX' mesh the size is found with our elements, the recording comes
+    from CalculiX.
+    """
+    common = [seed, *bench.name.encode(), *mesh.encode()]
+    rng, noise = np.random.default_rng(common), np.random.default_rng([*common, *kind.encode()])
+    plain = bench.meshes[mesh]()
+    article, scales = scattered(plain, rng)  # one article a seed: whatever is hidden, it is in it
+    zeta = ZETA * np.exp(DAMPING_SPREAD * rng.normal(size=2000))
+    rig = _Rig(bench, zeta, cache, bool(rng.integers(2)))
+    site = _site(bench, article)
+    band = bench.lines[(bench.lines >= bench.fit[0]) & (bench.lines <= bench.fit[1])]
+    band = band[:: max(1, len(band) // COARSE)]
+    own = rig.responses(Hidden(article, {}), band)[0]
+    scatter = decades_apart(own, rig.responses(Hidden(plain, {}), band)[0])
+    hidden, effect, size = _sized(rig, site, kind, [seed, *kind.encode()], own, scatter, band)
+    solver: Solver = "calculix" if mesh == "calculix" else "chladni"
+    H, modes = rig.responses(hidden, bench.lines, solver)
+    frf = recorded(H, bench.lines, FRONT, noise, bench.outputs.labels, bench.drive.labels)
+    frf = _spoiled(frf, hidden)
+    weight = mass_properties(hidden.article)[0] - hidden.unweighed
+    truth = {
+        "effect": kind, "seed": seed, "structure": bench.name, "mesh": mesh,
+        "solver": solver,
+        **hidden.truth, "size": size, **_ordinary(bench.deck, hidden.article),
+        "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
+        "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
+        "drive": bench.drive.labels[0], "mass_kg": weight,
+    }  # fmt: skip
+    return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth)
+
+
+def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
+    """E, rho and t of every sheet of the article [SI], and what each part of the deck weighs."""
+    sheets = [p for p in article.parts if isinstance(p.section, ShellSection)]
+    known = {q: {p.name: value(p, q) for p in sheets} for q in ("E", "rho", "t")}
+    area = cell_areas(deck.points, deck.shells.nodes) * deck.thickness()
+    weight = {
+        p.name: float(area[deck.shells.part == k].sum() * value(p, "rho"))
+        for k, p in enumerate(deck.parts)
+        if isinstance(p.section, ShellSection)
+    }
+    return {"values": known, "part_mass_kg": weight}
+
+
+def _site(bench: Bench, article: Assembly) -> Site:
+    return Site(
+        article,
+        bench.outputs,
+        bench.deck.points[bench.deck.rows(list(bench.hangers))],
+        mass_properties(article)[0],
+        bench.first,
+        bench.fit[1],
+        bench.sheets,
+        np.array(bench.grain),
+        bench.rolled,
+    )
+
+
+def _sized(
+    rig: _Rig, site: Site, kind: str, seed: list[int], own: np.ndarray, scatter: float,
+    band: np.ndarray,
+) -> tuple[Hidden, float, float]:  # fmt: skip
+    """The effect at the smallest size that does, how far it moves the responses, and the size."""
+    size = 1.0
+    for _ in range(TRIES):
+        hidden = KINDS[kind](site, np.random.default_rng(seed), size)
+        if kind == "nothing":
+            return hidden, 0.0, size
+        moved = decades_apart(hidden.spoil(rig.responses(hidden, band)[0]), own)
+        if kind in UNSIZED or moved >= TWICE * min(scatter, FULL):
+            break
+        size *= GROWTH
+    if kind not in UNSIZED and moved < NOTHING:
+        raise ModelError(f"{kind} of size {size:.3g} moves {rig.bench.name} by {moved:.1e} decades")
+    return hidden, moved, size
+
+
+def _spoiled(frf: FRF, hidden: Hidden) -> FRF:
+    return FRF(
+        hidden.spoil(frf.values), frf.frequency, frf.outputs, frf.inputs, frf.quantity,
+        variance=frf.variance,
+    )  # fmt: skip
+
+
+def write_case(case: MadeCase, folder: Path, sealed: Path) -> str:
+    """The case as a user would have it, elsewhere the truth; the hash of the sealed file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_assembly(case.bench.deck, folder / "deck.bdf", units("mm-t-s"))
+    write_uff(folder / "recording.uff", case.frf)
+    write_text(folder / "sensors.csv", _sensors(case.bench))
+    write_text(folder / "case.toml", _toml(case))
+    return seal_hash(write_json(sealed, case.truth))
+
+
+def seal_hash(sealed: Path) -> str:
+    """SHA-256 of a sealed truth."""
+    return hashlib.sha256(sealed.read_bytes()).hexdigest()
+
+
+def opened(sealed: Path) -> dict[str, Any]:
+    """The truth."""
+    return dict(json.loads(sealed.read_text(encoding="utf-8")))
+
+
+def _sensors(bench: Bench) -> str:
+    """The table of sensors and the shaker."""
+    rows = ["label,grid,x,y,z,nx,ny,nz,role"]
+    for spots, role in ((bench.outputs, "output"), (bench.drive, "input")):
+        rows += [_sensor(spots, k, role) for k in range(len(spots))]
+    return "\n".join([*rows, ""])
+
+
+def _sensor(spots: Spots, k: int, role: str) -> str:
+    grid, place = str(spots.grids[k]), ",,"
+    if spots.grids[k] == 0:
+        grid, place = "", ",".join(f"{x:.7g}" for x in spots.points[k])
+    way = ",".join(f"{x:.9g}" for x in spots.directions[k])
+    return f"{spots.labels[k]},{grid},{place},{way},{role}"
+
+
+def _toml(case: MadeCase) -> str:
+    b = case.bench
+    return f"""[model]
+deck = "deck.bdf"
+units = "mm-t-s"
+damping = 0.01
+
+[test]
+recordings = ["recording.uff"]
+sensors = "sensors.csv"
+mass = {case.mass:.5f}
+mass_sd = {0.001 * case.mass:.5f}
+hangers = [{", ".join(str(h) for h in b.hangers)}]
+
+[band]
+fit = [{b.fit[0]:.2f}, {b.fit[1]:.2f}]
+
+[held_out]
+sensors = {b.held_sensors}
+band = [{b.held[0]:.2f}, {b.held[1]:.2f}]
+"""

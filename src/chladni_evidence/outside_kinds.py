@@ -1,0 +1,187 @@
+"""Hidden effects no catalogue of ours has: the diagnosis should say that it does not know."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.errors import ModelError
+from chladni.geometry.facets import cell_areas, point_normals, tangents, unit
+from chladni.model.assembly import Assembly
+from chladni.model.properties import BeamSection, Part, ShellSection, SolidSection
+
+from .hidden import Hidden, Site, around
+from .hidden_kinds import Kind
+from .part_scatter import stiffer
+from .response_of_article import Coupling
+
+CRACKED = 4  # shells of a crack, at least
+PATCH = 0.06  # radius of rotors' feet and foam, of the structure's size
+
+
+def _patch(site: Site, rng: np.random.Generator) -> tuple[int, np.ndarray]:
+    """A point of a sheet and up to forty round it, in the same face and spread both ways."""
+    for _ in range(200):
+        row = site.row(rng)
+        rows = around(site, row, PATCH * site.size)[:40]
+        X = site.article.points[rows] - site.article.points[row]
+        extent = np.linalg.svd(X, compute_uv=False)
+        if extent[1] > 0.3 * extent[0]:
+            return row, rows
+    raise ModelError("no sheet of the article has room for a patch")
+
+
+def rotor(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A spinning disc: torques h n x θ', which couple tilting about two axes (gyroscopic).
+
+    θ comes from the deflection round its foot by least squares.
+    """
+    row, rows = _patch(site, rng)
+    n = site.normal(row)
+    e = np.concatenate(tangents(n[None]))
+    d = (site.article.points[rows] - site.article.points[row]) @ e.T
+    slopes = np.linalg.pinv(np.column_stack([np.ones(len(d)), d]))[1:]  # (2, k) of w = u·n
+    h = 5e-4 * site.mass * site.size**2 * (2 * np.pi * site.first) * size  # [N m s]
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    coupling = Coupling(rows, slopes[:, :, None] * n, lambda s: h * s[:, None, None] * turn)
+    truth = {"value": h, "point_m": site.article.points[row].tolist()}
+    return Hidden(site.article, truth, (coupling,))
+
+
+def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Foam between a patch and ground: k (1 + Δ iωτ/(1 + iωτ)), Zener's solid, per point."""
+    row, rows = _patch(site, rng)
+    n = point_normals(site.article.points, site.article.shells.nodes)[rows]
+    k = 0.03 * site.scale * size
+    relaxed, tau = float(rng.uniform(4.0, 8.0)), 1 / (2 * np.pi * np.sqrt(site.first * site.top))
+
+    def stiffness(s: np.ndarray) -> np.ndarray:
+        each = k / len(rows) * (1 + relaxed * s * tau / (1 + s * tau))
+        return np.asarray(each[:, None, None] * np.eye(len(rows)))
+
+    weights = np.eye(len(rows))[:, :, None] * n
+    truth = {
+        "value": k,
+        "point_m": site.article.points[row].tolist(),
+        "relaxation": relaxed,
+        "tau_s": tau,
+    }
+    return Hidden(site.article, truth, (Coupling(rows, weights, stiffness),))
+
+
+def resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
+    row = site.row(rng)
+    n = site.normal(row)
+    m = float(rng.uniform(0.005, 0.01)) * site.mass * size
+    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.top))))
+    k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
+
+    def stiffness(s: np.ndarray) -> np.ndarray:
+        return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
+
+    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
+    coupling = Coupling(np.array([row]), n[None, None], stiffness)
+    return Hidden(site.article, truth, (coupling,), unweighed=-m)
+
+
+def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
+    a = site.article
+    length = float(rng.uniform(0.12, 0.2)) * site.size * min(size, 3.0)
+    for _ in range(50):
+        row, angle = site.row(rng), rng.uniform(-np.pi / 6, np.pi / 6)
+        p, mine = _along(site, row, angle, length)
+        if mine.sum() >= CRACKED:
+            break
+    kept = 0.25 / size**2
+    section = a.parts[p].section
+    assert isinstance(section, ShellSection)
+    new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
+    shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
+    truth = {
+        "value": kept,
+        "point_m": a.points[row].tolist(),
+        "length_m": length,
+        "shells": int(mine.sum()),
+    }
+    return Hidden(replace(a, parts=(*a.parts, new), shells=shells), truth)
+
+
+def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.ndarray]:
+    """The part at a point, and its shells (m,) bool on a line through it across its length."""
+    a, n = site.article, site.normal(row)
+    p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
+    e = _longest(a.points[site.rows(a.parts[p].name)])
+    across = unit(np.cross(n, e))
+    along = np.cos(angle) * across + np.sin(angle) * np.cross(n, across)
+    X = a.points[a.shells.nodes].mean(axis=1) - a.points[row]
+    h = float(np.sqrt(np.median(cell_areas(a.points, a.shells.nodes))))
+    mine = (a.shells.part == p) & (np.abs(X @ np.cross(n, along)) <= 0.55 * h)
+    return p, mine & (np.abs(X @ along) <= length / 2) & (np.abs(X @ n) < length / 4)
+
+
+def _longest(points: np.ndarray) -> np.ndarray:
+    """Direction in which points (n, 3) lie farthest apart."""
+    d = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(d.T @ d)[1][:, -1])
+
+
+def friction(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A joint that slips, as it looks at one level: softer, and with a loss factor of its own.
+
+    Of solids the fifth of all joints nearest to one of them; of beams those at one end of one.
+    """
+    a = site.article
+    soft, eta = 0.2 / size**3, float(rng.uniform(0.4, 0.8))
+    if any(map(len, a.solids)):
+        return _slipping_solids(a, rng, soft, eta)
+    row = int(rng.choice(a.beams.nodes.ravel()))
+    mine = (a.beams.nodes == row).any(axis=1)
+    old = a.parts[int(a.beams.part[mine][0])]
+    new = replace(_lossy(old, soft, eta), id=1 + max(p.id for p in a.parts), name="slipping")
+    beams = replace(a.beams, part=np.where(mine, len(a.parts), a.beams.part))
+    truth = {"value": soft, "loss": eta, "point_m": a.points[row].tolist()}
+    return Hidden(replace(a, parts=(*a.parts, new), beams=beams), truth)
+
+
+def _slipping_solids(a: Assembly, rng: np.random.Generator, soft: float, eta: float) -> Hidden:
+    group = a.solids[0]
+    middle = a.points[group.nodes].mean(axis=1)
+    centre = middle[rng.integers(len(middle))]
+    order = np.argsort(np.linalg.norm(middle - centre, axis=1))
+    part, parts = group.part.copy(), list(a.parts)
+    for e in order[: max(1, len(order) // 5)]:
+        old = a.parts[int(group.part[e])]
+        parts.append(replace(_lossy(old, soft, eta), id=1 + max(p.id for p in parts)))
+        part[e] = len(parts) - 1
+    solids = (replace(group, part=part), *a.solids[1:])
+    truth = {"value": soft, "loss": eta, "point_m": centre.tolist()}
+    return Hidden(replace(a, parts=tuple(parts), solids=solids), truth)
+
+
+def _lossy(part: Part, soft: float, eta: float) -> Part:
+    assert isinstance(part.section, SolidSection | BeamSection)
+    return part.with_section(material=replace(stiffer(part.section.material, soft), damping=eta))
+
+
+def duplicated(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Two channels of one cable: the second is a copy of the first."""
+    one, other = rng.choice(len(site.outputs), 2, replace=False)
+
+    def spoil(values: np.ndarray) -> np.ndarray:
+        wrong = values.copy()
+        wrong[:, other] = wrong[:, one]
+        return wrong
+
+    labels = site.outputs.labels
+    return Hidden(site.article, {"channel": labels[other], "copy_of": labels[one]}, spoil=spoil)
+
+
+OUTSIDE: dict[str, Kind] = {
+    "rotor": rotor,
+    "foam": foam,
+    "resonator": resonator,
+    "crack": crack,
+    "friction-joint": friction,
+    "duplicated-pair": duplicated,
+}

@@ -1,0 +1,97 @@
+"""Scatter no two articles share: E and t of every part, adhesive, every single weld."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.model.assembly import Assembly
+from chladni.model.properties import (
+    BeamSection,
+    Isotropic,
+    Material,
+    Part,
+    ShellSection,
+    SolidSection,
+)
+
+PART, ADHESIVE, WELD = 0.01, 0.1, 0.3  # standard deviations of ln E (and of ln t of sheets)
+WELDS = "spot welds"  # part whose every solid is a weld of its own
+
+Scales = dict[str, dict[str, float]]  # {part: {"E": factor, "t": factor}}
+
+
+def scattered(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
+    """Another article of the same drawing, and the factor on E and t of every part (log-normal).
+
+    E and t of a sheet or tube vary by 1 %, E of adhesive by 10 %, of each weld by 30 %.
+    """
+    scales: Scales = {}
+    for part in assembly.parts:
+        drawn = rng.normal(size=2)
+        if not isinstance(part.section, SolidSection):
+            E, t = np.exp(PART * drawn)
+            scales[part.name] = {"E": float(E), "t": float(t)}
+        elif part.name != WELDS:
+            scales[part.name] = {"E": float(np.exp(ADHESIVE * drawn[0]))}
+    return _each_weld(scaled(assembly, scales), rng), scales
+
+
+def scaled(assembly: Assembly, scales: Scales) -> Assembly:
+    """The assembly with E and t (of tubes: the wall) of its parts times these factors."""
+    parts = tuple(_scaled(p, scales.get(p.name, {})) for p in assembly.parts)
+    t = np.array([scales.get(p.name, {}).get("t", 1.0) for p in assembly.parts])
+    shells = assembly.shells
+    thicker = shells.thickness * t[shells.part][:, None] if len(shells) else shells.thickness
+    return replace(assembly.with_parts(parts), shells=replace(shells, thickness=thicker))
+
+
+def _scaled(part: Part, scale: dict[str, float]) -> Part:
+    section, E, t = part.section, scale.get("E", 1.0), scale.get("t", 1.0)
+    if isinstance(section, ShellSection):
+        sheet = section.membrane
+        assert sheet is not None
+        return part.with_section(
+            membrane=stiffer(sheet, E), bending=stiffer(sheet, E), thickness=section.thickness * t
+        )
+    if isinstance(section, BeamSection):
+        sizes = {name: getattr(section, name) * t for name in ("area", "I1", "I2", "I12", "J")}
+        return part.with_section(material=stiffer(section.material, E), **sizes)
+    return part.with_section(material=stiffer(section.material, E))
+
+
+def stiffer(material: Material, factor: float) -> Material:
+    """The material with E times a factor.
+
+    >>> stiffer(Isotropic(210e9, 0.3, 7850.0), 2.0).E
+    420000000000.0
+    """
+    assert isinstance(material, Isotropic)
+    return replace(material, E=material.E * factor)
+
+
+def with_parts_of_solids(
+    assembly: Assembly, chosen: np.ndarray, parts: list[Part], kind: int
+) -> Assembly:
+    """Solids ``chosen`` of one family each on a new part of its own; ids follow the last."""
+    first = 1 + max(p.id for p in assembly.parts)
+    new = [replace(p, id=first + k) for k, p in enumerate(parts)]
+    group = assembly.solids[kind]
+    part = group.part.copy()
+    part[chosen] = len(assembly.parts) + np.arange(len(new))
+    solids = list(assembly.solids)
+    solids[kind] = replace(group, part=part)
+    return replace(assembly, parts=(*assembly.parts, *new), solids=tuple(solids))
+
+
+def _each_weld(assembly: Assembly, rng: np.random.Generator) -> Assembly:
+    """Every solid of the welds' part on a material of its own."""
+    names = [p.name for p in assembly.parts]
+    if WELDS not in names:
+        return assembly
+    p = names.index(WELDS)
+    for kind, group in enumerate(assembly.solids):
+        mine = np.flatnonzero(group.part == p)
+        factors = np.exp(WELD * rng.normal(size=len(mine)))
+        parts = [_scaled(assembly.parts[p], {"E": float(f)}) for f in factors]
+        assembly = with_parts_of_solids(assembly, mine, parts, kind)
+    return assembly

@@ -1,0 +1,72 @@
+"""Responses of an article with things attached to it, and how far two responses are apart."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .article_modes import ArticleModes
+from .footing import Footing
+
+LINES_AT_ONCE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """Something on the article that answers its motion q = W u with the force -D(s) q.
+
+    Attributes
+    ----------
+    rows : (k,) int                     of the article's points
+    weights : (n, k, 3)                 q from the translations of these points
+    stiffness : (n_f,) -> (n_f, n, n)   dynamic stiffness D at s [rad/s]
+    """
+
+    rows: np.ndarray
+    weights: np.ndarray
+    stiffness: Callable[[np.ndarray], np.ndarray]
+
+
+def seen(modes: ArticleModes, foot: Footing, directions: np.ndarray) -> np.ndarray:
+    """Mode shapes (k, r) at places along directions."""
+    motion = np.einsum("kc,kcir->kir", foot.weights, modes.at(foot.rows))
+    return np.asarray(np.einsum("kir,ki->kr", motion, directions))
+
+
+def accelerance(
+    modes: ArticleModes,
+    phi_out: np.ndarray,
+    phi_in: np.ndarray,
+    zeta: np.ndarray,
+    frequency: np.ndarray,
+    couplings: Sequence[Coupling] = (),
+) -> np.ndarray:
+    """H = s² Φ_o [s² + 2ζω_r s + ω_r² + iL + Σ BᵀD(s)B]⁻¹ Φ_iᵀ, line by line (n_f, n_out, n_in).
+
+    Parameters
+    ----------
+    phi_out, phi_in : (n_out, r), (n_in, r)
+    zeta : (r,)
+    """
+    s = 2j * np.pi * frequency
+    w = 2 * np.pi * modes.frequency
+    d = s[:, None] ** 2 + 2 * zeta * w * s[:, None] + w**2
+    tied = [(np.einsum("nki,kir->nr", c.weights, modes.at(c.rows)), c.stiffness) for c in couplings]
+    if not tied and not modes.loss.any():
+        return np.asarray((phi_out / d[:, None, :]) @ phi_in.T * s[:, None, None] ** 2)
+    out = []
+    for k in range(0, len(s), LINES_AT_ONCE):
+        part = slice(k, k + LINES_AT_ONCE)
+        Z = d[part, :, None] * np.eye(len(w)) + 1j * modes.loss
+        for B, stiffness in tied:
+            Z = Z + np.einsum("nr,fnm,mq->frq", B, stiffness(s[part]), B, optimize=True)
+        out.append(
+            phi_out @ np.linalg.solve(Z, np.broadcast_to(phi_in.T, (len(Z), *phi_in.T.shape)))
+        )
+    return np.concatenate(out) * s[:, None, None] ** 2
+
+
+def decades_apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Root mean square of |log10 (H_1 / H_2)| over all lines and channels, phase included."""
+    ratio = np.log(one / other)
+    return float(np.sqrt(np.mean(np.abs(ratio) ** 2)) / np.log(10))

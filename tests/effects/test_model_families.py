@@ -1,0 +1,58 @@
+"""Factors on joints and on the shear of shells: exact, harmless at nought, never negative."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.model_families import model_families
+from chladni.effects.shell_groups import shell_groups
+from chladni.fem.assemble import structure
+from chladni.model.assembly import Bushes
+from chladni.updating.reduced_model import evaluate, reduce
+from chladni_specimens.plates import folded_panel
+
+
+@pytest.fixture(scope="module")
+def jointed():
+    """A folded panel with a bush between two of its points."""
+    panel = folded_panel(0.2, 0.1, 0.02, 0.004, 0.02, 1e-3)
+    k = np.array([[1e5, 1e5, 1e5, 10.0, 10.0, 10.0]])
+    bush = Bushes(
+        np.array([900]), np.array([[0, 7]]), np.eye(3)[None], panel.points[[0]], k, 0 * k, 0 * k
+    )  # fmt: skip
+    return replace(panel, bushes=bush)
+
+
+def test_every_family_is_found(jointed):
+    names = [f.text for f in model_families(structure(jointed))]
+    assert names == ["bushes"] + [f"shear of {p.name}" for p in jointed.parts]
+
+
+def test_a_factor_on_bushes_is_that_of_the_deck(jointed):
+    built = structure(jointed)
+    twice = replace(jointed, bushes=replace(jointed.bushes, stiffness=2 * jointed.bushes.stiffness))
+    found = model_families(built)[0].slope.K
+    assert_allclose((structure(twice).system.K - built.system.K - found).toarray(), 0, atol=1e-3)
+
+
+def test_shear_is_the_part_of_the_stiffness_that_residual_bending_softens(jointed):
+    """Without it the stiffness is larger, and in no other strain."""
+    built = structure(jointed)
+    shear = sum(f.slope.K for f in model_families(built)[1:]).toarray()
+    stiffer = (structure(jointed, residual_bending=False).system.K - built.system.K).toarray()
+    w, V = np.linalg.eigh(stiffer)
+    idle = V[:, np.abs(w) < 1e-9 * w.max()]
+    assert_allclose(idle.T @ shear @ idle, 0, atol=1e-6 * np.abs(shear).max())
+
+
+def test_idle_at_nought_and_positive_far_away(jointed):
+    built = structure(jointed)
+    basis = normal_modes(built.system, band=2000.0).shapes
+    model, found = reduce(shell_groups(built), basis), model_families(built)
+    zero = evaluate(model, found, np.zeros(len(found)))
+    assert_allclose(zero.lam, evaluate(model, [], np.zeros(0), False).lam, rtol=1e-9, atol=1e-3)
+    for x in (-4.0, 4.0):
+        assert evaluate(model, found, np.full(len(found), x), False).lam.min() > -1e-3 * zero.lam[9]

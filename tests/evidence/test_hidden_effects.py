@@ -1,0 +1,194 @@
+"""What is hidden is physics: limits, reciprocity, work, and sizes that can be seen."""
+
+import numpy as np
+import pytest
+
+from chladni.fem.energy import mass_properties
+from chladni_evidence.article_modes import article_modes
+from chladni_evidence.footing import Spots, footing
+from chladni_evidence.hidden import Hidden, Site, with_ground_springs, with_lumps
+from chladni_evidence.hidden_kinds import CATALOGUED, calibration, orthotropic, thinning
+from chladni_evidence.outside_kinds import crack, duplicated, foam, friction, resonator, rotor
+from chladni_evidence.part_scatter import WELDS, scattered
+from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
+from chladni_specimens.forms import FORMS
+from chladni_specimens.plates import folded_panel
+
+TOP = 200.0
+LINES = np.linspace(20.0, TOP, 120)
+
+
+@pytest.fixture(scope="module")
+def site():
+    a = folded_panel(0.4, 0.2, 0.04, 0.01, 0.02, 1e-3)
+    at = a.rows([60, 90, 120, 150])
+    spots = Spots(
+        tuple(f"{i}:+Z" for i in a.ids[at]), a.ids[at], a.points[at],
+        np.tile([0.0, 0, 1], (4, 1)), ("panel",) * 4,
+    )  # fmt: skip
+    mass = mass_properties(a)[0]
+    names = ("panel", "flanges")
+    grain = np.array([1.0, 0, 0])
+    return Site(a, spots, a.points[at[:2]], mass, 30.0, TOP, names, grain, names)
+
+
+def response(site, hidden, damping=0.01):
+    """Accelerance of four sensors to a force at the first."""
+    foot = footing(hidden.article, site.outputs)
+    tied = [c.rows for c in hidden.couplings]
+    rows = np.concatenate([foot.rows.ravel(), *tied])
+    modes = article_modes(hidden.article, rows, rows, TOP)
+    phi = seen(modes, foot, site.outputs.directions)
+    zeta = np.full(phi.shape[1], damping)
+    return accelerance(modes, phi, phi[:1], zeta, LINES, hidden.couplings)
+
+
+def spring(site, k):
+    """A spring across the sheet at one point, as a coupling."""
+    row, up = np.array([site.article.rows([100])[0]]), np.array([[[0.0, 0, 1]]])
+    return row, Coupling(row, up, lambda s: np.full((len(s), 1, 1), k, dtype=complex))
+
+
+def test_a_coupled_spring_is_an_assembled_one(site):
+    """The same spring in the stiffness matrix and as a dynamic stiffness, without damping.
+
+    (Modal damping belongs to the modes of the whole, so that with it the two are not the same.)
+    """
+    row, coupling = spring(site, 2e4)
+    built = with_ground_springs(site.article, row, np.array([[0.0, 0, 1]]), 2e4)
+    plain = response(site, Hidden(site.article, {}), 0.0)
+    one = response(site, Hidden(site.article, {}, (coupling,)), 0.0)
+    assert decades_apart(one, plain) > 0.1
+    assert decades_apart(one, response(site, Hidden(built, {}), 0.0)) < 2e-3
+
+
+def test_a_resonator_on_a_rigid_spring_is_a_mass(site):
+    """M s² k/(m s² + k) becomes m s² where k is large: the coupling of a lump."""
+    m = 0.02
+    row = np.array([site.article.rows([100])[0]])
+    coupling = Coupling(row, np.eye(3)[:, None], lambda s: (m * s**2)[:, None, None] * np.eye(3))
+    one = response(site, Hidden(site.article, {}, (coupling,)), 0.0)
+    other = response(site, Hidden(with_lumps(site.article, row, m), {}), 0.0)
+    assert decades_apart(one, other) < 2e-3
+
+
+def test_a_resonator_is_felt_where_it_is_tuned(site):
+    """Its dynamic stiffness is that of its mass far below its frequency, and turns sign above."""
+    hidden = resonator(site, np.random.default_rng(1), 1.0)
+    D, f = hidden.couplings[0].stiffness, hidden.truth["frequency_hz"]
+    low, high = 2j * np.pi * np.array([f / 50, 3 * f])
+    m = hidden.truth["value"]
+    np.testing.assert_allclose(D(np.array([low]))[0, 0, 0], m * low**2, rtol=2e-3)
+    assert D(np.array([high]))[0, 0, 0].real > 0
+    assert hidden.unweighed == -m
+
+
+def test_a_rotor_does_no_work_and_breaks_reciprocity(site):
+    """D(iω) is Hermitian (no power), but not symmetric: H_ij is not H_ji."""
+    hidden = rotor(site, np.random.default_rng(2), 4.0)
+    s = 2j * np.pi * np.array([50.0])
+    D = hidden.couplings[0].stiffness(s)[0]
+    np.testing.assert_allclose(D, D.conj().T)
+    assert np.abs(D - D.T).max() > 0
+    foot = footing(site.article, site.outputs)
+    rows = np.concatenate([foot.rows.ravel(), hidden.couplings[0].rows])
+    modes = article_modes(site.article, rows, rows, TOP)
+    phi = seen(modes, foot, site.outputs.directions)
+    H = accelerance(modes, phi, phi, np.full(phi.shape[1], 0.01), LINES, hidden.couplings)
+    assert np.abs(H - H.swapaxes(1, 2)).max() > 1e-3 * np.abs(H).max()
+
+
+def test_foam_is_stiffer_and_lossy_between_its_limits(site):
+    """Zener: k at rest, k (1 + Δ) at once, the loss largest at ωτ = (1 + Δ)^½/(1 + Δ) ... > 0."""
+    hidden = foam(site, np.random.default_rng(3), 1.0)
+    D, n = hidden.couplings[0].stiffness, len(hidden.couplings[0].rows)
+    k, relaxed, tau = (hidden.truth[name] for name in ("value", "relaxation", "tau_s"))
+    slow, middle, fast = (D(np.array([1j * w / tau]))[0, 0, 0] * n for w in (1e-4, 1.0, 1e4))
+    assert slow == pytest.approx(k, rel=1e-3)
+    assert abs(fast) == pytest.approx(k * (1 + relaxed), rel=1e-3)
+    assert middle.imag / middle.real > 0.5
+
+
+def test_a_crack_takes_bending_alone(site):
+    """Mass and membrane are as they were, and no mode of the article is stiffer."""
+    hidden = crack(site, np.random.default_rng(4), 2.0)
+    assert hidden.truth["shells"] >= 3
+    assert mass_properties(hidden.article)[0] == pytest.approx(site.mass, rel=1e-12)
+    rows = site.article.rows([60])
+    f, g = (article_modes(a, rows, rows, TOP).frequency for a in (site.article, hidden.article))
+    assert (g[6:16] < f[6:16] * (1 + 1e-9)).all()
+    assert (g[6:16] < 0.995 * f[6:16]).any()
+
+
+def test_friction_softens_and_damps():
+    """Joints of the box: lower modes, and a modal loss no negative motion feeds."""
+    form = FORMS["lidded box"]
+    a = form.made(0)
+    site_ = Site(a, None, None, 1.0, 60.0, TOP, ("lid",), np.zeros(3), ())
+    hidden = friction(site_, np.random.default_rng(5), 1.5)
+    rows = a.rows([1])
+    plain, slipping = (article_modes(x, rows, rows, TOP) for x in (a, hidden.article))
+    assert not plain.loss.any()
+    assert np.linalg.eigvalsh(slipping.loss).min() > -1e-6 * np.abs(slipping.loss).max()
+    assert slipping.loss.max() > 0
+    assert (slipping.frequency[6:16] <= plain.frequency[6:16] * (1 + 1e-6)).all()
+
+
+def test_a_pair_of_channels_is_one(site):
+    hidden = duplicated(site, np.random.default_rng(6), 1.0)
+    values = np.arange(8.0).reshape(2, 4, 1)
+    spoilt = hidden.spoil(values)
+    one, other = (site.outputs.labels.index(hidden.truth[k]) for k in ("copy_of", "channel"))
+    np.testing.assert_array_equal(spoilt[:, other], values[:, one])
+    np.testing.assert_array_equal(np.delete(spoilt, other, 1), np.delete(values, other, 1))
+
+
+@pytest.mark.parametrize("kind", [k for k in CATALOGUED if k not in ("nothing", "sensor-fault")])
+def test_more_is_more(site, kind):
+    """Twice the size moves the responses farther, and no size leaves them where they were."""
+    plain = response(site, Hidden(site.article, {}))
+    small, large = (
+        decades_apart(response(site, CATALOGUED[kind](site, np.random.default_rng(7), s)), plain)
+        for s in (0.1, 0.2)
+    )
+    assert 0 < small < large
+
+
+def test_truth_is_what_was_done(site):
+    """E of the part, the thinnest spot, the moduli of the grain."""
+    rng = np.random.default_rng
+    off = calibration(site, rng(8), 1.0)
+    section = off.article.parts[off.article.part(off.truth["part"])].section
+    assert section.bending.E == pytest.approx(210e9 * off.truth["value"])
+    thin = thinning(site, rng(9), 1.0)
+    least = thin.article.shells.thickness.min() / 1e-3
+    assert least == pytest.approx(1 - thin.truth["value"], abs=0.01)
+    rolled = orthotropic(site, rng(10), 1.0).article.parts[0].section.membrane
+    truth = orthotropic(site, rng(10), 1.0).truth
+    assert (rolled.E1, rolled.E2, rolled.G12) == (truth["E1"], truth["E2"], truth["G12"])
+
+
+def test_scatter_is_as_wide_as_it_says():
+    """1 % of E and t, 30 % of each weld, over 200 draws (chi-squared, 4 sd); the names stay."""
+    a = FORMS["lidded box"].made(0)
+    E, welds = [], []
+    for seed in range(200):
+        drawn, scales = scattered(a, np.random.default_rng(seed))
+        E.append([np.log(scales[n][q]) for n in ("box", "lid") for q in ("E", "t")])
+        one = [p for p in drawn.parts if p.name == WELDS][1]
+        welds.append(np.log(one.section.material.E / 210e9))
+    assert np.std(E) == pytest.approx(0.01, rel=4 / np.sqrt(2 * 800))
+    assert np.std(welds) == pytest.approx(0.3, rel=4 / np.sqrt(2 * 200))
+    assert [p.name for p in drawn.parts[:3]] == [p.name for p in a.parts]
+
+
+def test_modes_another_code_was_not_asked_for_are_ours(monkeypatch):
+    """Were CalculiX' modes ours, so would be the drive point: no flexibility is lost above them."""
+    a = FORMS["tube frame"].made(0)
+    rows = a.rows([5, 40])
+    ours = article_modes(a, rows, rows[:1], 130.0)
+    first = ours.frequency[:8], ours.shapes[..., :8]
+    monkeypatch.setattr("chladni_evidence.article_modes.calculix_modes", lambda *_: first)
+    both = article_modes(a, rows, rows[:1], 130.0, "calculix")
+    np.testing.assert_allclose(both.frequency[6:], ours.frequency[6:])
+    np.testing.assert_array_equal(both.shapes, ours.shapes)

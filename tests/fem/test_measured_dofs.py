@@ -1,0 +1,63 @@
+"""Sensors on a structure: grids, places between them, the base, places known to millimetres."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.fem.assemble import structure
+from chladni.fem.measured_dofs import MeasuredDofs
+from chladni_specimens.plates import plate
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def built():
+    return structure(plate(0.4, 0.3, 8, 6, 1.5e-3))
+
+
+def dofs(built, points, grids=None, sd=0.0):
+    k = len(points)
+    grids = np.zeros(k, int) if grids is None else np.asarray(grids)
+    labels = tuple(f"{i}:+Z" for i in range(k))
+    points, up = np.asarray(points, dtype=float), np.tile(UP, (k, 1))
+    return MeasuredDofs(labels, grids, points, up, np.full(k, sd), np.zeros(k))
+
+
+def deflection(built, w):
+    """Motion over the free dofs in which every grid's z is w(x, y), without rotations."""
+    x, y, _ = built.assembly.points.T
+    u = np.zeros((len(x), 6))
+    u[:, 2] = w(x, y)
+    return built.T.T @ u.ravel()  # T is a selection of dofs here
+
+
+def test_a_grid_and_the_same_place_without_its_number_are_one(built):
+    a = built.assembly
+    there = [a.points[20], a.points[31]]
+    by_number = dofs(built, there, a.ids[[20, 31]]).rows(built)
+    assert_allclose((by_number - dofs(built, there).rows(built)).toarray(), 0, atol=1e-12)
+
+
+def test_the_base_has_no_row_of_its_own(built):
+    a = built.assembly
+    both = dofs(built, [a.points[20], np.full(3, np.nan)], [a.ids[20], 0])
+    assert both.base.tolist() == [False, True]
+    rows = both.rows(built).toarray()
+    assert rows[0].any()
+    assert not rows[1].any()
+
+
+def test_rows_around_a_place_have_its_variance(built):
+    """A tilted plane w = a x + b y differs among the four by (a² + b²) sd² in the mean square."""
+    sd, a, b = 4e-3, 3.0, -2.0
+    sensor = dofs(built, [[0.21, 0.14, 0.0]], sd=sd)
+    seen = sensor.around(built) @ deflection(built, lambda x, y: a * x + b * y)
+    assert len(seen) == 5
+    assert seen[0] == pytest.approx(a * 0.21 + b * 0.14)
+    assert seen[1:].mean() == pytest.approx(seen[0])
+    assert ((seen[1:] - seen[0]) ** 2).mean() == pytest.approx((a**2 + b**2) * sd**2)
+
+
+def test_only_uncertain_places_have_rows_around_them(built):
+    assert dofs(built, [[0.2, 0.1, 0], [0.3, 0.1, 0]]).around(built).shape[0] == 2

@@ -1,0 +1,66 @@
+"""P values of a test of fit: uniform where the model is true, small where it is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from chladni.effects.effect import Effect
+from chladni.effects.ordinary import ordinary
+from chladni.updating.adequacy import _drawn, _Linear, adequacy, ranked
+from chladni.updating.hypothesis_fit import Trial, fitted
+from chladni.updating.map_fit import Weighing, beside
+from chladni.updating.reduced_model import evaluate
+
+SCALES = Weighing(1.413, 1.4e-3)
+
+
+@pytest.fixture(scope="module")
+def seen(bench, responses):
+    """A plate seen with 8 % damping, and E and rho free."""
+    s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
+    empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
+    effects = [ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "rho", [0])]
+    return empty, effects
+
+
+def answered(bench, data, effects):
+    state = evaluate(bench.model, effects, np.zeros(2))
+    fit = fitted(bench.model, effects, data.allowing_errors(state), SCALES, np.zeros(2))
+    return adequacy(Trial(Effect(), fit, bench.model), SCALES, tuple("abcd"), 100)
+
+
+def test_draws_of_the_model_itself_have_uniform_p(bench, seen):
+    data, effects = seen
+    state = evaluate(bench.model, effects, np.zeros(2))
+    data = replace(data, values=data.model(state)).allowing_errors(state)
+    _, J = data.scaled(state, True)
+    r0, J0 = beside(effects, SCALES, np.zeros(2), state)
+    model, rng = _Linear(data.error, J, J0, data.use, 2), np.random.default_rng(1)
+    sd = np.array([e.parameters[0].sd for e in effects])
+    drawn = np.array([_drawn(model, sd, len(r0), rng) for _ in range(600)])
+    p = [ranked(drawn[k], drawn[300:])[0] for k in range(300)]
+    assert kstest(p, "uniform").statistic < 1.63 * np.sqrt(2 / 300)  # 1 %, both samples random
+
+
+def test_a_model_that_is_right_fits(bench, seen):
+    data, effects = seen
+    truth = evaluate(bench.model, effects, np.array([0.03, 0.0]))
+    assert answered(bench, replace(data, values=data.model(truth)), effects).passes
+
+
+def test_a_channel_of_another_structure_does_not_fit_and_is_named(bench, seen):
+    data, effects = seen
+    H = data.model(evaluate(bench.model, effects, np.zeros(2)))
+    H[:, 2] *= np.exp(2j * np.sin(np.arange(24)))[:, None]
+    found = answered(bench, replace(data, values=H), effects)
+    assert not found.passes
+    assert found.where.endswith("on c")
+
+
+def test_poles_are_not_tested(bench, seen):
+    data, effects = seen
+    data = replace(data, values=data.model(evaluate(bench.model, effects, np.zeros(2))))
+    fit = fitted(bench.model, effects, data, SCALES, np.zeros(2))
+    assert adequacy(Trial(Effect(), fit, bench.model), SCALES, ()) is None

@@ -1,0 +1,156 @@
+"""Errors of the model's form: their slopes, their covariance, and what is learned of their size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.ordinary import ordinary
+from chladni.updating import discrepancy as dis
+from chladni.updating.discrepancy import columns, discrepancy, form, learned
+from chladni.updating.hypothesis_fit import fitted
+from chladni.updating.map_fit import Weighing, beside, fit
+from chladni.updating.reduced_model import evaluate
+
+
+@pytest.fixture(scope="module")
+def softer(bench, responses):
+    """The recording, at 8 % damping, seen from a model that is nearly right."""
+    s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
+    empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
+    effects = [ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "rho", [0])]
+    truth = evaluate(bench.model, effects, np.array([0.01, 0.005]))
+    return replace(empty, values=empty.model(truth)), effects
+
+
+@pytest.fixture(scope="module")
+def state(bench, softer):
+    return evaluate(bench.model, softer[1], np.zeros(2))
+
+
+def disturbed(model, effects, about, x):
+    """The nominal state with modal stiffness and mass changed by x deviations at δ = 1."""
+    return evaluate(about.with_values(x).changed(model), effects, np.zeros(2), False)
+
+
+@pytest.fixture(scope="module")
+def about(softer, state):
+    return form(state, softer[0].s.imag.max())
+
+
+@pytest.fixture(scope="module")
+def draw(bench, softer, about):
+    """A state with errors of form of a given size, drawn."""
+
+    def drawn(rng, delta):
+        x = delta * rng.normal(size=2 * len(about.pairs))
+        return x, disturbed(bench.model, softer[1], about, x)
+
+    return drawn
+
+
+def test_slopes_leave_a_quadratic_remainder(softer, state, bench, about):
+    data = softer[0]
+    x = np.random.default_rng(1).normal(size=2 * len(about.pairs))
+
+    def at(h):
+        return data.scaled(disturbed(bench.model, softer[1], about, h * x), False)[0]
+
+    dr, r = columns(data, state, about) @ x, data.scaled(state, False)[0]
+    left = [np.linalg.norm(at(h) - r - h * dr) for h in (1e-3, 5e-4)]
+    assert left[0] / left[1] == pytest.approx(4, rel=0.1)
+
+
+def test_slopes_about_a_change_of_form(softer, bench, about):
+    """The same remainder about G that is not zero."""
+    data, rng = softer[0], np.random.default_rng(6)
+    held, x = 0.02 * rng.normal(size=(2, 2 * len(about.pairs)))
+
+    def at(h):
+        return data.scaled(disturbed(bench.model, softer[1], about, held + h * x), False)[0]
+
+    state = disturbed(bench.model, softer[1], about, held)
+    dr = columns(data, state, about.with_values(held)) @ x
+    left = [np.linalg.norm(at(h) - at(0) - h * dr) for h in (4e-2, 2e-2)]
+    assert left[0] / left[1] == pytest.approx(4, rel=0.15)
+
+
+@pytest.mark.parametrize("most", [2000, 60])
+def test_low_rank_covariance_is_the_dense_one(softer, state, about, most, monkeypatch):
+    data = softer[0]
+    W = columns(data, state, about)
+    if most < W.shape[1]:
+        W = W[:, np.argsort(-(W**2).sum(axis=0))[:most]]
+    monkeypatch.setattr(dis, "MOST", most)
+    error = discrepancy(data, state).with_delta(0.02)
+    C = np.eye(len(W)) + 0.02**2 * W @ W.T
+    r = np.random.default_rng(3).normal(size=(len(W), 2))
+    z = error.whitened(r)
+    assert_allclose(z.T @ z, r.T @ np.linalg.solve(C, r), rtol=2e-2)
+    assert error.log_det() == pytest.approx(np.linalg.slogdet(C)[1], rel=2e-2)
+
+
+def test_no_error_at_all_is_the_plain_likelihood(bench, softer, state):
+    data = softer[0]
+    tiny = discrepancy(data, state).with_delta(1e-9)
+    plain = data.residual(state, True)
+    for a, b in zip(replace(data, error=tiny).residual(state, True), plain, strict=True):
+        assert_allclose(a, b, atol=1e-9 * np.abs(b).max())
+
+
+def test_evidence_is_the_sum_over_sizes_of_the_dense_one(bench, softer, state):
+    data, effects = softer
+    error = discrepancy(data, state)
+    (r, J), (r0, J0) = data.scaled(state, True), beside(effects, None, np.zeros(2), state)
+    U, s, S = error.U, error.s, []
+    for delta in dis.GRID:
+        C = np.eye(len(r)) + (U * delta**2 * s) @ U.T
+        A = J.T @ np.linalg.solve(C, J) + J0.T @ J0
+        g = J.T @ np.linalg.solve(C, r) + J0.T @ r0
+        cost = r @ np.linalg.solve(C, r) + r0 @ r0 - g @ np.linalg.solve(A, g)
+        S.append(cost + np.linalg.slogdet(C)[1] + np.linalg.slogdet(A)[1] + dis.prior(delta))
+    total = -2 * np.log(np.exp(-np.array(S) / 2).sum() * np.log(dis.GRID[1] / dis.GRID[0]))
+    assert learned(error, r, J, r0, J0).S == pytest.approx(total, abs=1e-6)
+
+
+SCALES = Weighing(1.413, 1.4e-3)
+
+
+def fit_with_errors(bench, seen, effects, state):
+    data = seen.allowing_errors(state)
+    return fitted(bench.model, effects, data, SCALES, np.zeros(2))
+
+
+def test_size_of_the_error_is_learned(bench, softer, state, draw):
+    """Drawn at 0.5 and 2 %, it is found within a third."""
+    data, effects = softer
+    for delta in (0.005, 0.02):
+        seen = replace(data, values=data.model(draw(np.random.default_rng(4), delta)[1]))
+        assert (
+            abs(np.log(fit_with_errors(bench, seen, effects, state).data.error.delta / delta)) < 0.4
+        )
+
+
+def test_intervals_hold_the_truth_under_errors_of_form(bench, softer, state, draw):
+    """E is 95 % covered when G is drawn at 1 %; taken to be exact, the model is over-confident."""
+    data, effects = softer
+    rng, inside, believed = np.random.default_rng(5), [], []
+    for _ in range(30):
+        seen = replace(data, values=data.model(draw(rng, 0.01)[1]))
+        plain = fitted(bench.model, effects, seen, SCALES, np.zeros(2))
+        for out, found in (
+            (inside, fit_with_errors(bench, seen, effects, state)),
+            (believed, plain),
+        ):
+            out.append(np.abs(found.x / np.sqrt(np.diag(found.covariance))) < 1.96)
+    assert np.mean(inside) > 0.85
+    assert np.mean(believed) < 0.5
+
+
+def test_a_plain_fit_takes_no_notice(bench, softer):
+    data, effects = softer
+    a = fit(bench.model, effects, data, None, np.zeros(2))
+    b = fitted(bench.model, effects, data, None, np.zeros(2))
+    assert_allclose(a.x, b.x)
+    assert a.S == b.S
