@@ -11,7 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ..dofs import label
+from ..errors import ModelError
 from ..sparse.factor import Factor, factorise
+from ..sparse.multifrontal import NotDefinite
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
@@ -41,9 +44,22 @@ def orthonormal(
 
 
 def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:
-    """Factor of K + (2π f)² M, positive definite for a free structure too."""
+    """Factor of K + (2π f)² M, positive definite for a free structure too.
+
+    Raises
+    ------
+    ModelError
+        If something can move without stiffness and without mass; the sentence says what.
+    """
     A = sp.csc_array(system.K + (2 * np.pi * hertz) ** 2 * system.M)
-    return factorise(A, points)
+    try:
+        return factorise(A, points)
+    except NotDefinite as error:
+        point, component = system.dofs[error.row].tolist()
+        raise ModelError(
+            f"{label(point, component)} can move without stiffness and without mass, as a chain of "
+            "bars without torsional inertia can turn; hold it or give it inertia"
+        ) from error
 
 
 def attachments(factor: Factor, rows: sp.csr_array) -> np.ndarray:

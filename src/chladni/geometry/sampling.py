@@ -15,6 +15,8 @@ def farthest_point_sample(points: np.ndarray, count: int) -> np.ndarray:
     points : (n, d) [m]
     count : at most this many; all points, in this order, where there are fewer
     """
+    if not len(points):
+        return np.zeros(0, dtype=int)
     far: np.ndarray = np.linalg.norm(points - points.mean(axis=0), axis=1)
     order: list[int] = []
     for _ in range(min(count, len(points))):

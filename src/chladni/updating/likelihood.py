@@ -227,7 +227,8 @@ class Poles:
             return np.ones(len(modes))
         seen = np.sqrt(((self.a @ state.phi[:, modes]) ** 2).mean(axis=0))
         hit = np.sqrt(((self.b @ state.phi[:, modes]) ** 2).mean(axis=0))
-        return np.asarray(seen * hit / (seen * hit).max())
+        both = seen * hit
+        return np.asarray(both / both.max()) if both.any() else np.ones(len(modes))
 
     def deviation(
         self, state: State, among: np.ndarray | None = None

@@ -65,8 +65,10 @@ def _by_responses(question: Question) -> Prepared:
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     top = reach[1]
-    seen = (found.frequency >= low) & (found.frequency <= fit_top) & (found.gain > LEAST_GAIN)
-    if not seen.any():
+    if question.held_band is None and not _modes_seen(found, low, fit_top):
+        held_band, fit_top = (high, high), high  # all modes lie where the band was to be held out
+    seen = _modes_seen(found, low, fit_top)
+    if not seen:
         raise FileError(
             f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
             "nothing to fit a model to"
@@ -102,8 +104,7 @@ def _by_responses(question: Question) -> Prepared:
     outside = (f >= held_band[0]) & (f <= held_band[1])
     held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
-    band = f"band {held_band[0]:g}-{held_band[1]:g} Hz"
-    what = f"{len(names)} sensors ({', '.join(names[:8])}), {band}" if names else band
+    what = _held_in_words(names, held_band)
     notes = [
         f"FRFs were compared: {found.order} modes identified between {found.band[0]:g} and "
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
@@ -119,10 +120,23 @@ def _by_responses(question: Question) -> Prepared:
         )
     notes += _mass_note(question)
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
-    few = too_little(int(seen.sum()), int(data[0].use.any(axis=0).sum()))
+    few = too_little(seen, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
     )
+
+
+def _modes_seen(found: Identified, low: float, high: float) -> int:
+    """How many poles that stand out lie between two frequencies."""
+    inside = (found.frequency >= low) & (found.frequency <= high)
+    return int((inside & (found.gain > LEAST_GAIN)).sum())
+
+
+def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
+    """What no fit saw: sensors, a band, or nothing."""
+    said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
+    said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
+    return ", ".join(said) or "nothing"
 
 
 def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:

@@ -98,11 +98,9 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         rows = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
         for parameter, row in zip(effect.parameters, rows, strict=True):
             given = parameter.value(parameter.mean)
-            where = getattr(effect, "called", "") or effect.text
-            said = (
-                effect.text if where in (effect.text, parameter.name) else f"{where}: {effect.text}"
-            )
-            out.append(CalibratedParameter(said, estimate(row), given))
+            called = getattr(effect, "called", "")  # by the user
+            where = f"{called}: {effect.text}" if called not in ("", row["name"]) else effect.text
+            out.append(CalibratedParameter(where, estimate(row), given))
     return tuple(out)
 
 

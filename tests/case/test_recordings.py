@@ -1,0 +1,138 @@
+"""Of several recordings one is compared; what is not used is named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.case import load_case
+from chladni.case.recordings import compared_first, deviation, notes_of, without_dead_channels
+from chladni.case.sensor_places import places
+from chladni.case.toml_sections import TomlSection
+from chladni.dynamics.frf import FRF
+from chladni.ema.setup import Function, PoleTable, Recording, Shapes, TestSetup
+from chladni.errors import ChladniError
+from chladni.io.nastran import assembly, read_deck
+from chladni.units import UNITS
+
+from .test_case import a_frf, deck
+
+
+def section(**values: object) -> TomlSection:
+    return TomlSection(Path("case.toml"), "test", dict(values), {}, 1)
+
+
+def poles(*states: str) -> PoleTable:
+    n = len(states)
+    nothing = np.full(n, np.nan)
+    return PoleTable(np.arange(1.0, n + 1), nothing, nothing, np.arange(n), states)
+
+
+FIRST = Recording("a.csv, level 2", frf=a_frf(), level=2.0)
+SECOND = Recording("b.npz", frf=a_frf(), article="B")
+TABLE = Recording("p.csv", poles=poles("bare", "loaded", "bare"))
+
+
+def test_the_first_with_responses_is_compared() -> None:
+    assert compared_first(section(), [TABLE, FIRST, SECOND])[0] is FIRST
+
+
+@pytest.mark.parametrize("name", ["b.npz", "B"])
+def test_the_one_that_is_named_is_compared(name: str) -> None:
+    assert compared_first(section(use=name), [FIRST, SECOND])[0] is SECOND
+
+
+def test_a_state_is_named() -> None:
+    first = compared_first(section(use="loaded"), [FIRST, TABLE])[0]
+    assert first.poles is not None
+    assert first.poles.states == ("loaded", "bare")
+    assert first.poles.of("loaded").frequency.tolist() == [2.0]
+    assert any("'loaded' are compared; not used: 'bare'" in n for n in notes_of([first]))
+
+
+def test_a_name_nobody_has_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ChladniError, match=r"no recording is called so; there are .*b.npz, B"):
+        compared_first(section(use="c.npz"), [FIRST, SECOND])
+
+
+def test_the_others_are_measured_against_it() -> None:
+    """Twice the response is log10(2) decades away on every line."""
+    a = a_frf()
+    double = FRF(2 * a.values, a.frequency, a.outputs, a.inputs, "accelerance")
+    assert deviation(a, double) == pytest.approx(np.log10(2))
+    said = notes_of([FIRST, Recording("d.npz", frf=double)])
+    assert any("d.npz (0.3 decades rms off)" in note for note in said)
+
+
+def test_what_else_a_file_holds_is_named() -> None:
+    extra = Recording(
+        "t.uff",
+        frf=a_frf(),
+        functions=(Function("time", "1:+Z", "", np.zeros(2), np.zeros(2)),),
+        shapes=Shapes(np.ones(1), np.ones(1), np.ones((1, 1)), ("1:+Z",)),
+    )
+    said = " ".join(notes_of([extra]))
+    assert "1 records that are no FRFs are not used (time)" in said
+    assert "1 mode shapes are not used" in said
+
+
+def test_dead_channels_are_left_out_and_named() -> None:
+    frf = a_frf()
+    values = frf.values.copy()
+    values[:, 1] = 0
+    dead = Recording("a.npz", frf=FRF(values, frf.frequency, frf.outputs, frf.inputs, "mobility"))
+    kept = without_dead_channels(dead)
+    assert kept.frf is not None
+    assert kept.frf.outputs == (frf.outputs[0], frf.outputs[2])
+    assert frf.outputs[1] in kept.notes[0]
+
+
+def test_nodes_and_axes_of_a_recording_are_used(tmp_path: Path) -> None:
+    """A turned node measures along its own axes; a node that is no grid sits where it is."""
+    (tmp_path / "plate.bdf").write_text(deck())
+    made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
+    turned = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    recorded = Recording(
+        "a.uff",
+        nodes={12: made.points[made.rows([12])[0]], 900: np.array([0.22, 0.11, 0.0])},
+        axes={12: turned},
+    )
+    notes: list[str] = []
+    found = places(section(), TestSetup(), made, ("12:+X", "900:+Z"), "output", [recorded], notes)
+    np.testing.assert_allclose(found.directions, [[0, 1, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_array_equal(found.grids, [12, 0])
+    np.testing.assert_allclose(found.points[1], [0.22, 0.11, 0.0])
+    assert any("nodes [900]" in n for n in notes)
+    assert any("nodes [12]" in n for n in notes)
+
+
+def test_numbers_that_coincide_by_chance_are_noticed(tmp_path: Path) -> None:
+    (tmp_path / "plate.bdf").write_text(deck())
+    made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
+    notes: list[str] = []
+    elsewhere = Recording("a.uff", nodes={12: made.points[made.rows([30])[0]]})
+    places(section(), TestSetup(), made, ("12:+Z",), "output", [elsewhere], notes)
+    assert any("node 12 of the recording is" in n and "give the places" in n for n in notes)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "quantity", "said"),
+    [
+        (("1:+Z",), "transmissibility", "its input must be base"),
+        (("base:+Z",), "accelerance", "what a moving base causes is"),
+        (("base:+Z", "1:+Z"), "transmissibility", "cannot both be inputs"),
+    ],
+)
+def test_base_and_quantity_belong_together(
+    tmp_path: Path, inputs: tuple[str, ...], quantity: str, said: str
+) -> None:
+    from chladni.io.tables.write_tables import write_npz
+
+    (tmp_path / "plate.bdf").write_text(deck(held=True))
+    H = a_frf(("12:+Z",), inputs)
+    write_npz(tmp_path / "a.npz", FRF(H.values, H.frequency, H.outputs, inputs, quantity))  # type: ignore[arg-type]
+    (tmp_path / "case.toml").write_text(
+        '[model]\ndeck = "plate.bdf"\nunits = "mm-t-s"\n[test]\nrecordings = ["a.npz"]\n'
+    )
+    with pytest.raises(ChladniError, match=said):
+        load_case(tmp_path)

@@ -1,0 +1,183 @@
+"""Small and odd data end in an answer or in a sentence, and never in a name they cannot bear."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.case import load_case
+from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.frf import FRF
+from chladni.errors import AccuracyError, ChladniError
+from chladni.fem.assemble import structure
+from chladni.io.nastran import assembly, read_deck
+from chladni.io.tables.write_tables import write_npz
+from chladni.units import UNITS
+from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.least_data import too_little, withheld
+from chladni.updating.reduced_model import _eigen
+from chladni.updating.test_frequencies import widened
+from chladni.workflows.calibrate import calibrate
+from chladni.workflows.correlate import correlate
+from chladni.workflows.diagnose import diagnose
+from chladni.workflows.identify import identify
+
+NX, NY = 6, 4
+
+
+def plate_deck(held: bool = False) -> str:
+    """A flat steel plate of 24 quads, 0.6 x 0.3 m, in SI."""
+    cards = ["SOL 103", "CEND", *["SPC = 1"] * held, "BEGIN BULK", "MAT1,1,210.+9,,.3,7850."]
+    cards += ["PSHELL,1,1,.001,1,,1"]
+    for i in range(NX + 1):
+        for j in range(NY + 1):
+            cards.append(f"GRID,{1 + i * (NY + 1) + j},,{0.6 * i / NX},{0.3 * j / NY},0.")
+    corner = [(i * (NY + 1) + j + 1) for i in range(NX) for j in range(NY)]
+    for n, a in enumerate(corner, start=1):
+        cards.append(f"CQUAD4,{n},1,{a},{a + NY + 1},{a + NY + 2},{a + 1}")
+    return "\n".join([*cards, *["SPC1,1,123456,1,2,3,4,5"] * held, "ENDDATA"]) + "\n"
+
+
+def bar_deck() -> str:
+    """A steel cantilever of ten bars, 0.3 m."""
+    cards = ["SOL 103", "CEND", "SPC = 1", "BEGIN BULK", "MAT1,1,210.+9,,.3,7850."]
+    cards += ["PBARL,1,1,,BAR", "+,.02,.003"]
+    cards += [f"GRID,{k + 1},,{0.03 * k},0.,0." for k in range(11)]
+    cards += [f"CBAR,{k + 1},1,{k + 1},{k + 2},0.,1.,0." for k in range(10)]
+    return "\n".join([*cards, "SPC1,1,123456,1", "ENDDATA"]) + "\n"
+
+
+def case_of(folder: Path, text: str, deck: str, test: str = "") -> Path:
+    (folder / "deck.bdf").write_text(deck)
+    (folder / "case.toml").write_text(
+        f'[model]\ndeck = "deck.bdf"\nunits = "SI"\n[test]\n{test}recordings = ["{text}"]\n'
+    )
+    return folder
+
+
+def with_poles(folder: Path, deck: str, *frequency: float) -> Path:
+    rows = [f"{k + 1},{f}" for k, f in enumerate(frequency)]
+    (folder / "p.csv").write_text("\n".join(["mode,frequency_hz", *rows]) + "\n")
+    return case_of(folder, "p.csv", deck)
+
+
+def with_responses(folder: Path, outputs: int, modes: int) -> Path:
+    """The plate's first flexible modes at so many outputs, 2 % higher, in a band around them."""
+    (folder / "deck.bdf").write_text(plate_deck())
+    built = structure(assembly(read_deck(folder / "deck.bdf"), UNITS["SI"]))
+    modal = normal_modes(built.system, 30)
+    top = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
+    f = np.arange(0.5 * modal.frequency[6], 1.02 * top, 0.02)
+    grids = [3, 12, 16, 22, 30][:outputs]
+    a = built.rows(np.array([(g, 3) for g in grids])) @ modal.shapes
+    b = built.rows(np.array([(8, 3)])) @ modal.shapes
+    s, w = 2j * np.pi * f[:, None], 2 * np.pi * 1.02 * modal.frequency
+    H = np.einsum("or,fr,ir->foi", a, s**2 / (s**2 + 0.01 * w * s + w**2), b)
+    noise = np.random.default_rng(0).normal(size=(2, *H.shape))
+    labels = tuple(f"{g}:+Z" for g in grids)
+    frf = FRF(H * (1 + 0.01 * (noise[0] + 1j * noise[1])), f, labels, ("8:+Z",), "accelerance")
+    write_npz(folder / "a.npz", frf)
+    return case_of(folder, "a.npz", plate_deck())
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_few_poles_calibrate_and_name_nothing(tmp_path: Path, count: int) -> None:
+    case = load_case(with_poles(tmp_path, plate_deck(), *[11.0, 14.0, 29.0, 33.0, 41.0][:count]))
+    assert calibrate(case).verdict
+    found = diagnose(case)
+    assert (found.verdict, found.effects) == ("not in catalogue", ())
+    assert found.one_of[0][0] == "calibration alone"
+    with pytest.raises(AccuracyError, match=r"modes? cannot bear a name: 8 modes"):
+        found.trusted()
+    assert len(correlate(case).f_test) == count
+
+
+@pytest.mark.parametrize(("outputs", "modes"), [(1, 1), (3, 1), (2, 2)])
+def test_few_modes_at_few_outputs_name_nothing(tmp_path: Path, outputs: int, modes: int) -> None:
+    case = load_case(with_responses(tmp_path, outputs, modes))
+    assert identify(case).recordings[0].modes.order >= 1
+    assert len(correlate(case).pairs) >= 1
+    found = diagnose(case)
+    assert not found.effects
+    assert found.distrust
+
+
+def test_a_deck_of_bars_is_calibrated(tmp_path: Path) -> None:
+    """E alone moves the frequencies of a cantilever whose mass is not weighed by 2 %."""
+    folder = with_poles(tmp_path, bar_deck(), *(1.02 * f for f in first_of(tmp_path)))
+    case = load_case(folder)
+    ratio = {c.estimate.name: c.estimate.value for c in calibrate(case).calibrated}
+    assert ratio["E"] / 210e9 / (ratio["rho"] / 7850) == pytest.approx(1.02**2, rel=5e-3)
+    with pytest.raises(ChladniError, match="no shells"):
+        diagnose(case)
+
+
+def first_of(folder: Path) -> np.ndarray:
+    (folder / "deck.bdf").write_text(bar_deck())
+    made = assembly(read_deck(folder / "deck.bdf"), UNITS["SI"])
+    return normal_modes(structure(made).system, 4).frequency
+
+
+def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None:
+    f = np.linspace(5, 60, 300)
+    flat = FRF(np.full((300, 2, 1), 0.7 + 0j), f, ("3:+Z", "12:+Z"), ("8:+Z",), "accelerance")
+    write_npz(tmp_path / "a.npz", flat)
+    case = load_case(case_of(tmp_path, "a.npz", plate_deck()))
+    assert len(correlate(case).f_test) == 0
+    assert identify(case).distrust
+    for workflow in (calibrate, diagnose):
+        with pytest.raises(ChladniError, match="no mode stands out"):
+            workflow(case)
+
+
+def test_poles_outside_of_the_band_are_refused(tmp_path: Path) -> None:
+    folder = with_poles(tmp_path, plate_deck(), 11.0, 14.0)
+    with (folder / "case.toml").open("a") as file:
+        file.write("[band]\nfit = [100.0, 200.0]\n")
+    with pytest.raises(ChladniError, match="none of the 2 poles, 11 to 14 Hz, lies in the band"):
+        calibrate(load_case(folder))
+
+
+def test_time_records_are_no_responses(tmp_path: Path) -> None:
+    np.savez(tmp_path / "t.npz", force=np.zeros(4), fs=np.array(48e3))
+    with pytest.raises(ChladniError, match="unknown array force, fs"):
+        load_case(case_of(tmp_path, "t.npz", plate_deck(), 'quantity = "accelerance"\n'))
+
+
+@pytest.mark.parametrize(
+    ("modes", "channels", "enough"),
+    [(7, 0, False), (8, 0, True), (2, 30, False), (3, 2, True), (3, 1, False), (4, 1, True)],
+)
+def test_least_data(modes: int, channels: int, enough: bool) -> None:
+    assert (too_little(modes, channels) == "") is enough
+
+
+def test_a_name_is_withheld_with_what_it_cannot_be_told_from() -> None:
+    def trial(name: str, S: float) -> SimpleNamespace:
+        return SimpleNamespace(effect=SimpleNamespace(name=name), S=S)
+
+    trials = (trial("point-mass", 10.0), trial("suspension", 90.0), trial("sensor-fault", 130.0))
+    null = trial("nothing", 100.0)
+    found = Diagnosis(null, null, null, trials, "missing physics")  # type: ignore[arg-type]
+    few = SimpleNamespace(too_little="3 modes cannot bear a name")
+    kept = withheld(SimpleNamespace(too_little=""), found)  # type: ignore[arg-type]
+    assert kept is found
+    answer = withheld(few, found)  # type: ignore[arg-type]
+    assert answer.one_of == ("calibration alone", "point-mass", "suspension")
+    assert answer.found is None
+
+
+def test_a_wide_band_says_nothing_of_what_lies_far_below_it() -> None:
+    f = np.arange(1.0, 600.0)
+    wide = FRF(np.ones((len(f), 1, 1), complex), f, ("1:+Z",), ("1:+Z",))
+    assert widened(wide, (20.0, 480.0)) == (16.0, pytest.approx(498.4))
+    assert widened(wide, (20.0, 25.0)) == (pytest.approx(19.8), pytest.approx(25.2))
+
+
+def test_a_rigid_mode_in_the_middle_is_no_negative_stiffness() -> None:
+    """Six rigid modes of seven: rounding about zero is not compared with a rigid mode."""
+    lam = np.array([-2e-5, -1e-5, 0, 1e-5, 1e-5, 2e-5, 2.5e6])
+    assert _eigen(np.diag(lam), np.eye(7))[0][-1] == pytest.approx(2.5e6)
+    with pytest.raises(ChladniError, match="negative stiffness"):
+        _eigen(np.diag([-100.0, *lam[1:]]), np.eye(7))
