@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from chladni.updating.test_frequencies import widened
 
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
@@ -17,7 +18,6 @@ from chladni.units import UNITS
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
 from chladni.updating.reduced_model import _eigen
-from chladni.updating.test_frequencies import widened
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose
