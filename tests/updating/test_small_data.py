@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from chladni.updating.test_frequencies import widened
 
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
@@ -17,6 +16,7 @@ from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
+from chladni.updating.measured_frequencies import widened
 from chladni.updating.reduced_model import _eigen
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
