@@ -106,7 +106,7 @@ def test_calibration_leaves_an_article_that_is_right_as_it_is(folder: Path) -> N
     assert found.mass is not None
     assert found.mass.model_kg == pytest.approx(found.mass.weighed_kg, rel=2e-3)
     assert found.models is not None
-    assert not any("CONM2" in repr(change) for change in found.models.changes or ())
+    assert not any("CONM2" in repr(change) for change in found.models.final.changes or ())
     json.dumps([n for n in found.notes])
 
 
