@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from chladni.errors import AccuracyError
 from chladni.output import write_json, write_text
 
-from .blind_diagnosis import diagnosed
+from .blind_diagnosis import Answer, diagnosed
 from .evidence_sets import Order
 from .made_case import made_case, opened, seal_hash, write_case
 from .outcome_row import Row, line, row, table
@@ -20,7 +20,7 @@ from .outcome_row import Row, line, row, table
 
 @dataclass(frozen=True)
 class RunFolders:
-    """Folders of a run: case folders, sealed truths, answers, rows; the cache of solved modes."""
+    """Folders of a run: case folders, sealed truths, answers; the cache of solved modes."""
 
     out: Path
 
@@ -30,15 +30,38 @@ class RunFolders:
 
 
 def made(order: Order, places: RunFolders) -> str:
-    """The case on disk, and the hash of its sealed truth; one that is there is kept."""
-    sealed = places.of("sealed", order, ".json")
-    if not sealed.exists():
+    """The case on disk, and the hash of its sealed truth; one that is there is kept.
+
+    Raises
+    ------
+    AccuracyError
+        If the sealed truth of a case made before is not the one whose hash was said then.
+    """
+    sealed, said = (places.of("sealed", order, ending) for ending in (".json", ".sha256"))
+    if not said.exists():
         with threadpool_limits(1):
             case = made_case(
                 order.bench(), order.kind, order.seed, order.mesh, places.out / "cache"
             )
-        write_case(case, places.of("cases", order), sealed)
-    return seal_hash(sealed)
+        write_text(said, write_case(case, places.of("cases", order), sealed) + "\n")
+    mark = said.read_text(encoding="ascii").strip()
+    _held(sealed, mark)
+    return mark
+
+
+def _held(sealed: Path, mark: str) -> None:
+    if seal_hash(sealed) != mark:
+        raise AccuracyError(f"{sealed.name} has changed since its hash was said")
+
+
+def answered(order: Order, places: RunFolders, limit: float) -> Answer:
+    """The answer to a case; one that was given before, crash or not, is kept."""
+    kept = places.of("answers", order, ".answer.json")
+    if kept.exists():
+        return Answer(**json.loads(kept.read_text(encoding="utf-8")))
+    answer = diagnosed(places.of("cases", order), places.of("answers", order), limit)
+    write_json(kept, vars(answer))
+    return answer
 
 
 def judged_blindly(order: Order, places: RunFolders, expected: str, limit: float) -> Row:
@@ -49,10 +72,9 @@ def judged_blindly(order: Order, places: RunFolders, expected: str, limit: float
     AccuracyError
         If the sealed truth is not the one whose hash was said before.
     """
-    answer = diagnosed(places.of("cases", order), places.of("answers", order), limit)
+    answer = answered(order, places, limit)
     sealed = places.of("sealed", order, ".json")
-    if seal_hash(sealed) != expected:
-        raise AccuracyError(f"{sealed.name} has changed since its hash was said")
+    _held(sealed, expected)
     return {"case": order.name, "hash": expected, **row(answer, opened(sealed))}
 
 
@@ -64,9 +86,6 @@ def one(order: Order, places: RunFolders, limit: float, say: Say) -> Row | None:
 
     The hash of its truth is said before the diagnosis begins.
     """
-    kept = places.of("rows", order, ".json")
-    if kept.exists():
-        return dict(json.loads(kept.read_text(encoding="utf-8")))
     try:
         mark = made(order, places)
     except Exception:  # noqa: BLE001  a maker that fails is a line too, and the others go on
@@ -76,7 +95,6 @@ def one(order: Order, places: RunFolders, limit: float, say: Say) -> Row | None:
         return None
     say(f"{order.name} sealed with {mark}")
     found = judged_blindly(order, places, mark, limit)
-    write_json(kept, found)
     say(f"{order.name}: {line(found)}")
     return found
 

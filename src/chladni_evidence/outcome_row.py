@@ -46,7 +46,7 @@ def row(answer: Answer, truth: Row) -> Row:
         "place_m": _place(d, truth),
         "gain_share": _gain(d),
         "covered": _covered(d, truth),
-        "p": d.get("adequate", {}).get("p"),
+        "p": (d.get("adequate") or {}).get("p"),
         "times_scatter": _times(truth),
         "seconds": answer.seconds,
         "gigabytes": answer.gigabytes,
@@ -63,7 +63,7 @@ def _called(d: Row) -> str:
 
 def _vetoed(d: Row) -> str | None:
     """The effect that led in evidence and was refused for what it does to the held-out data."""
-    found = [m[1] for note in d.get("notes", []) if (m := VETO.match(note))]
+    found = [m[1] for note in d.get("notes") or [] if (m := VETO.match(note))]
     return found[0] if found else None
 
 
@@ -72,7 +72,7 @@ def _outcome(answer: Answer, called: str, truth: Row) -> str:
         return "crash"
     if answer.code == 2:
         return "refused"
-    among = [set(names) for names in answer.result.get("one_of", [])]
+    among = [set(names) for names in answer.result.get("one_of") or []]
     if answer.code == 3 or called in ADMITTED:
         return "admitted"
     if called in ("nothing missing", "calibration only"):
@@ -105,11 +105,12 @@ def _place(d: Row, truth: Row) -> float | None:
 
 def _gain(d: Row) -> float | None:
     """How far the effect brings the held-out Q from plain calibration's to the floor."""
-    held = d.get("fit", {}).get("held_out")
-    if not held or not d.get("effects"):
+    held = (d.get("fit") or {}).get("held_out") or {}
+    before, after = held.get("Q_calibrated"), held.get("Q_with_effect")
+    if before is None or after is None or not d.get("effects"):
         return None
-    way = held["Q_calibrated"] - held.get("Q_floor", 0.0)
-    return float((held["Q_calibrated"] - held["Q_with_effect"]) / way) if way > 0 else None
+    way = before - (held.get("Q_floor") or 0.0)
+    return float((before - after) / way) if way > 0 else None
 
 
 def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
@@ -118,7 +119,7 @@ def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
     The mean is of logarithms, weighted with the parts' mass.
     """
     count = {name: [0, 0] for name in ("E", "rho", "t")}
-    for entry in d.get("calibrated", []):
+    for entry in d.get("calibrated") or []:
         quantity, _, parts = entry["where"].partition(" of ")
         known = truth["values"].get(quantity, {})
         names = [n for n in parts.split(", ") if n in known]

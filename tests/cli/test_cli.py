@@ -12,6 +12,7 @@ from chladni.cli.app import COMMANDS, application, guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
 from chladni.workflows.diagnosis_pipeline import _deck
+from chladni.workflows.question_of_case import question
 
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
@@ -314,7 +315,7 @@ def test_answer_stands_where_no_card_holds_the_change(case, tmp_path):
     shells = opened.assembly.shells
     thickness = shells.thickness * np.where(np.arange(len(shells)) == 3, 0.9, 1.0)[:, None]
     final = replace(opened.assembly, shells=replace(shells, thickness=thickness))
-    deck, notes = _deck(opened, modelled(opened.assembly, 100.0), final)
+    deck, notes = _deck(opened, question(opened), modelled(opened.assembly, 100.0), final)
     assert deck.changes is None
     assert deck.model.assembly is final
     assert len(notes) == 1

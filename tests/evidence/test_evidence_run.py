@@ -57,7 +57,7 @@ def answering(calls):
 
 
 def test_a_finished_case_is_never_run_again(tmp_path, monkeypatch):
-    """Seal before answer, a crash is a row, a second run reads the rows of the first."""
+    """Seal before answer, a crash is a row, a second run takes the answers of the first."""
     calls, said = [], []
     monkeypatch.setattr(evidence_run, "diagnosed", answering(calls))
     rows = run([NULL, MASS], tmp_path, 1, said.append)
@@ -81,6 +81,9 @@ def test_a_seal_that_changed_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr(evidence_run, "diagnosed", meddle)
     with pytest.raises(AccuracyError, match="changed since"):
         run([NULL], tmp_path, 1, str)
+    said = []
+    assert run([NULL], tmp_path, 1, said.append) == []
+    assert any("changed since" in text for text in said)
 
 
 def test_a_maker_that_fails_stops_nobody(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ HELD = {"Q_calibrated": 0.5, "Q_with_effect": 0.2, "Q_floor": 0.1}
 def answer(name="point-mass", verdict="missing physics", code=0, **more):
     where = {"point_m": [0.03, 0.04, 0.0], "channels": ["7:+Z"]}
     effects = [{"name": name, "where": where}] if name else []
-    result = {"verdict": verdict, "effects": effects, "fit": {"held_out": HELD}, **more}
+    result = {"verdict": verdict, "effects": effects, "fit": {"held_out": HELD}} | more
     return Answer(code, 10.0, 0.5, "", result if code == 0 else {})
 
 
@@ -94,6 +94,13 @@ def test_intervals_of_parts_together_are_held_against_their_mean():
     ]
     covered = row(answer(calibrated=entries), told())["covered"]
     assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1]}
+
+
+def test_what_an_answer_leaves_open_is_no_crash():
+    """A null stands where a diagnosis has nothing to say."""
+    empty = dict.fromkeys(("adequate", "one_of", "notes", "calibrated", "fit"))
+    r = row(answer(None, "calibration only", **empty), told())
+    assert (r["outcome"], r["p"], r["gain_share"]) == ("none", None, None)
 
 
 def test_table_adds_up():

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.stats import kstest
 
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary
-from chladni.updating.adequacy import _drawn, _Linear, adequacy, ranked
+from chladni.updating.adequacy import _drawn, _Linear, adequacy, of_poles, ranked
 from chladni.updating.hypothesis_fit import Trial, fitted
+from chladni.updating.likelihood import Poles
 from chladni.updating.map_fit import Weighing, beside
 from chladni.updating.reduced_model import evaluate
 
@@ -59,8 +61,17 @@ def test_a_channel_of_another_structure_does_not_fit_and_is_named(bench, seen):
     assert found.where.endswith("on c")
 
 
-def test_poles_are_not_tested(bench, seen):
+def test_without_errors_of_form_there_is_nothing_to_test(bench, seen):
     data, effects = seen
     data = replace(data, values=data.model(evaluate(bench.model, effects, np.zeros(2))))
     fit = fitted(bench.model, effects, data, SCALES, np.zeros(2))
     assert adequacy(Trial(Effect(), fit, bench.model), SCALES, ()) is None
+
+
+def test_poles_fit_as_closely_as_models_do_or_not_at_all():
+    """The median spread is met by half of all models; six times that by hardly one."""
+    f = np.array([10.0, 20.0, 30.0])
+    poles = Poles(f, np.full(3, 1e-4), np.ones(3, bool), np.ones(3), (5.0, 40.0))
+    assert_allclose(of_poles(poles).p, 0.5)
+    assert of_poles(poles).passes
+    assert not of_poles(replace(poles, scale=6 * poles.scale)).passes

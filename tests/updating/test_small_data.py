@@ -16,8 +16,8 @@ from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
+from chladni.updating.measured_frequencies import widened
 from chladni.updating.reduced_model import _eigen
-from chladni.updating.test_frequencies import widened
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
 from .hypothesis_fit import Trial
-from .likelihood import Responses
+from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import Weighing, beside, unknowns
 
 LEAST = 0.01  # p below which an explanation does not fit
@@ -83,13 +84,15 @@ NAMES = (
 def adequacy(
     trial: Trial, weighing: Weighing | None, labels: tuple[str, ...], draws: int = DRAWS
 ) -> FitTest | None:
-    """The test of one explanation; None where poles were compared or errors have no place.
+    """The test of one explanation; None where errors of the model have no place.
 
     Parameters
     ----------
     labels : of the outputs, to say where
     """
     data, fit = trial.data, trial.fit
+    if isinstance(data, Poles):
+        return of_poles(data)
     if not isinstance(data, Responses) or data.error is None:
         return None
     r, J = data.scaled(fit.state, True)
@@ -102,6 +105,19 @@ def adequacy(
     p, least = ranked(seen, np.array(own))
     where = _where(data, square, labels)
     return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where)
+
+
+def of_poles(data: Poles) -> FitTest:
+    """Whether natural frequencies are met as closely as models of this kind meet them.
+
+    p is the prior chance of a spread of ln f at least as large as the one that was learned.
+    """
+    p = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    what = (
+        f"natural frequencies are met to {data.scale:.1%}; models of one structure differ by about "
+        f"{SCALE:.1%}"
+    )
+    return FitTest(p >= LEAST, p, what, "over all modes")
 
 
 def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:

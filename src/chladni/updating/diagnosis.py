@@ -20,12 +20,11 @@ from .adequacy import FitTest, adequacy
 from .candidates import candidates
 from .discrepancy import MEDIAN
 from .hypothesis_fit import ROUGH, Search, Trial, fitted
-from .likelihood import Data, Poles, Responses
+from .likelihood import Responses
 from .map_fit import Status
 from .reduced_model import evaluate
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing
-THRESHOLD_POLES = 25.0  # gain in -2 ln evidence below which poles name nothing
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
@@ -130,21 +129,19 @@ def _null(search: Search) -> tuple[Search, Trial]:
     return search, null
 
 
-def threshold(data: Data) -> float:
+def threshold() -> float:
     """The gain in -2 ln evidence that is needed to name anything.
 
     Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
     (Markov); the families share the chance of a false alarm.
     """
-    if isinstance(data, Poles):
-        return THRESHOLD_POLES
     return float(2 * np.log(len(families()) / FALSE_ALARM))
 
 
 def verdict(nominal: Trial, null: Trial, trials: Sequence[Trial]) -> str:
     """The public verdict."""
     best = trials[0] if trials else None
-    if best is not None and null.S - best.S > threshold(null.data):
+    if best is not None and null.S - best.S > threshold():
         return "measurement fault" if best.effect.kind == "test" else "missing physics"
     return "calibration only" if nominal.S - null.S > CHANGED else "nothing missing"
 

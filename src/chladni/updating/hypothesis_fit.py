@@ -8,7 +8,7 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
 from .discrepancy import MEDIAN, learned
-from .likelihood import SCALE, Data, Poles, Responses
+from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
 from .map_fit import Fit, Weighing, beside, fit, unknowns
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import Workbench
@@ -130,7 +130,6 @@ def _fit_responses(
 
 
 SCALES = np.geomspace(0.003, 0.2, 25)
-SCALE_SD = 0.6  # of ln(scale) about its prior median
 
 
 def _fit_poles(

@@ -157,6 +157,7 @@ def _real_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
+SCALE_SD = 0.6  # of its logarithm
 
 
 @dataclass(frozen=True, eq=False)

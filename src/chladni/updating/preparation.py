@@ -29,10 +29,10 @@ from .hypothesis_fit import Search
 from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
+from .measured_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
-from .test_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported

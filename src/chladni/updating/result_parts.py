@@ -57,12 +57,12 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
 
 def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
     """Why a hypothesis was not named, with a number."""
-    if not named and gain > threshold(trial.data):
+    if not named and gain > threshold():
         return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
     if not named:
         return (
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
-            f"{threshold(trial.data):.0f} are needed before anything is named"
+            f"{threshold():.0f} are needed before anything is named"
         )
     gap = (trial.S - best.S) / 2
     return (
@@ -86,7 +86,7 @@ def agreement(
         what,
         None if found is None else diagnosis.gain(found),
         max(gains, default=None),
-        threshold(last.data),
+        threshold(),
     )
 
 
