@@ -131,6 +131,22 @@ def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None
             workflow(case)
 
 
+def test_a_model_far_stiffer_than_what_was_measured_is_never_said_to_agree(tmp_path: Path) -> None:
+    """One mode at 4 Hz, the first flexible one of the model at 14 Hz (a beam with a bolted lap)."""
+    f = np.arange(3.0, 5.0, 0.02)
+    s, w = 2j * np.pi * f, 2 * np.pi * 4.0
+    H = (s**2 / (s**2 + 0.02 * w * s + w**2))[:, None, None]
+    noise = np.random.default_rng(0).normal(size=(2, *H.shape))
+    values = H * (1 + 0.01 * (noise[0] + 1j * noise[1]))
+    write_npz(tmp_path / "a.npz", FRF(values, f, ("8:+Z",), ("8:+Z",), "accelerance"))
+    case = load_case(case_of(tmp_path, "a.npz", plate_deck()))
+    assert len(correlate(case).pairs) == 0
+    assert calibrate(case).verdict != "nothing missing"
+    found = diagnose(case)
+    assert (found.verdict, found.effects) == ("not in catalogue", ())
+    assert found.distrust
+
+
 def test_poles_outside_of_the_band_are_refused(tmp_path: Path) -> None:
     folder = with_poles(tmp_path, plate_deck(), 11.0, 14.0)
     with (folder / "case.toml").open("a") as file:

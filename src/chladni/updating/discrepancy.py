@@ -147,6 +147,8 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
     The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs.
     """
     W = columns(data, state, form(state, float(data.s.imag.max())))
+    if not W.size:  # no flexible mode of the model is near what was measured
+        return Discrepancy(np.zeros((len(W), 0)), np.zeros(0))
     if len(W) <= MOST:
         s, U = sl.eigh(W @ W.T, overwrite_a=True, check_finite=False, driver="evd")
     else:
@@ -193,7 +195,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
         out[0, ..., p] = root[:, None, None] * both
         out[1, ..., p] = data.s[:, None] ** 2 * both
     out /= H * sd * np.log(10)
-    z = out[:, :, data.use].reshape(2 * len(i), -1).T
+    z = out[:, :, data.use].reshape(2 * len(i), int(data.use.sum()) * len(phi_i)).T
     return np.concatenate([z.real, z.imag])
 
 
