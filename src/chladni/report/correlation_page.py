@@ -49,7 +49,7 @@ def _shown(case: Case, found: Correlation) -> Shown:
         f = found.model.frequency
         test = case.frfs[0].sel(band=(float(f[0]), float(f[-1])))
         curves_of = {"test": test, "model": found.model}
-    if found.mac is not None:
+    if found.mac is not None and found.mac.size:
         mac_of = (found.mac.T, found.f_test, found.f_model)
     return Shown(
         surface(case.assembly),
