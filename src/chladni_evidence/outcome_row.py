@@ -21,7 +21,7 @@ ALSO = {  # names that are right as well
 }
 NEAR = {"tailgate": 0.150}  # a place this far off is right [m]; else ``CLOSE``
 CLOSE = 0.060
-VETO = re.compile(r"(\S+) gained .* in -2 ln evidence but left the held-out Q")
+VETO = re.compile(r"(\S+) gained .* in -2 ln evidence but left the data no fit saw")
 
 
 def row(answer: Answer, truth: Row) -> Row:

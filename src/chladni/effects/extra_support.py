@@ -68,4 +68,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return replace(article, assembly=held, truth=truth)
 
 
-FAMILY = Family(ExtraSupport, conceal, candidates=candidates, cards=("CELAS2",))
+FAMILY = Family(
+    ExtraSupport, conceal, candidates=candidates, cards=("CELAS2",),
+    settled_by="lift the structure off whatever touches it there, and measure again",
+)

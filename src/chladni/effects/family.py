@@ -66,6 +66,7 @@ class Family:
     candidates : what is worth a fit, where the place is unknown; of ``placed`` the best starts
     cards : of the deck that hold it
     no_cards : why none can
+    settled_by : the measurement that tells it from what looks like it, in words
     """
 
     effect: type[Effect]
@@ -74,6 +75,7 @@ class Family:
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
     cards: tuple[str, ...] = ()
     no_cards: str = ""
+    settled_by: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:

@@ -133,7 +133,7 @@ def orthotropic(
         unknown,
         f"all of {', '.join(names)}, axis 1 along {direction}",
         names,
-        replaces=tuple(f"{q} of {n}" for q in ("E", "t") for n in names),
+        replaces=("E of " + ", ".join(names),),
         E=material.E,
         nu=material.nu,
         positions=positions,
@@ -207,5 +207,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    OrthotropicMaterial, conceal, placed=material_axes, cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3")
+    OrthotropicMaterial,
+    conceal,
+    placed=material_axes,
+    cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3"),
+    settled_by="bend strips cut along the sheet and across it",
 )

@@ -58,4 +58,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return replace(article, assembly=with_masses(article.assembly, at, m), truth=truth)
 
 
-FAMILY = Family(PointMass, conceal, candidates=candidates, cards=("CONM2",))
+FAMILY = Family(
+    PointMass, conceal, candidates=candidates, cards=("CONM2",),
+    settled_by="weigh the structure with all that hangs on it",
+)

@@ -58,4 +58,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return replace(article, assembly=loaded, truth=truth, off_scale=each * len(article.outputs))
 
 
-FAMILY = Family(SensorMass, conceal, placed=sensor_mass, cards=("CONM2",))
+FAMILY = Family(
+    SensorMass, conceal, placed=sensor_mass, cards=("CONM2",),
+    settled_by="measure again with half of the sensors taken off",
+)

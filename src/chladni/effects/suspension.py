@@ -52,4 +52,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return replace(article, assembly=with_springs(article.assembly, at, up, K), truth=truth)
 
 
-FAMILY = Family(Suspension, conceal, placed=suspension, cards=("CELAS2",))
+FAMILY = Family(
+    Suspension, conceal, placed=suspension, cards=("CELAS2",),
+    settled_by="measure again on softer cords",
+)

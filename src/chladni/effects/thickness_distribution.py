@@ -215,4 +215,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
     return replace(article, assembly=thinned, truth=truth)
 
 
-FAMILY = Family(ThicknessDistribution, conceal, candidates=candidates, cards=("CQUAD4", "CTRIA3"))
+FAMILY = Family(
+    ThicknessDistribution, conceal, candidates=candidates, cards=("CQUAD4", "CTRIA3"),
+    settled_by="gauge the thickness of the sheet there",
+)

@@ -60,6 +60,8 @@ def sentence(result: DiagnosisResult) -> str:
     claims = "; ".join(e.claim for e in result.effects if e.claim)
     places = "; ".join(e.where.text for e in result.effects if e.where.text)
     what = f"{names}{f' ({claims})' if claims else ''}{f', {places}' if places else ''}"
+    if verdict == "missing physics" and result.one_of:
+        return f"The model lacks one of these, which the data cannot tell apart: {_tied(result)}."
     if verdict == "missing physics":
         return f"The model lacks {what}{gain}."
     if verdict == "measurement fault":
@@ -79,6 +81,14 @@ def sentence(result: DiagnosisResult) -> str:
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."
     return verdict
+
+
+def _tied(result: DiagnosisResult) -> str:
+    """What is tied, most probable first; the measurement that would settle it comes last."""
+    known = {e.name for e in result.effects} | {a.name for a in result.alternatives}
+    names = [name for name in result.one_of[0] if name in known]
+    checks = [word for word in result.one_of[0] if word not in known]
+    return ", ".join(names) + "".join(f"; to settle it, {check}" for check in checks)
 
 
 def sections(

@@ -19,6 +19,7 @@ from ..errors import ModelError
 from .adequacy import FitTest, adequacy
 from .candidates import candidates
 from .discrepancy import MEDIAN
+from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, Search, Trial, fitted
 from .likelihood import Responses
 from .map_fit import Status
@@ -46,6 +47,7 @@ class Diagnosis:
     written : the named effect as a deck can hold it, once the held-out data have been heard
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, where they are too few to name anything
+    heard : what data that no fit saw say of the leading effect
     """
 
     nominal: Trial
@@ -57,6 +59,7 @@ class Diagnosis:
     written: Trial | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
+    heard: HeldOutEvidence | None = None
 
     @property
     def found(self) -> Trial | None:

@@ -4,8 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.registry import families
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, tested, verdict
+from .adequacy import FitTest
+from .diagnosis import Diagnosis, tested, threshold, verdict
+from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import Search, Trial, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
@@ -70,31 +73,58 @@ def held_out(prepared: Prepared, winner: Trial) -> np.ndarray:
     return own if own.any() else held
 
 
-VETO = 0.8  # held-out Q, over that of plain calibration, above which nothing is named
+HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
 
 
 def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
-    """The verdict once the held-out data have been heard, and the named effect as written.
+    """The verdict once data that no fit saw have been heard, and the named effect as written.
 
-    An effect that fits but does not help on data the fit never saw is not named. A fault of a
-    channel must only not harm: it may be small beside what else is left there. Both sides are
-    compared on an infinitely fine mesh, else the mesh of the deck would hide what an effect does.
+    They refuse a name as surely as the fitted data must carry it: where they speak against it by
+    the gain that would be needed to name it, where less than that is left of all data together, or
+    where the deck with the effect does harm.  Data that cannot feel the effect are predicted alike
+    without it and have no vote.  Where all data together still want more than calibration, what is
+    missing is not in the catalogue.
     """
     if diagnosis.found is None:
         return diagnosis
-    lead = diagnosis.trials[0]
-    diagnosis = replace(diagnosis, written=as_written(lead, prepared.search.weighing))
+    lead, search = diagnosis.trials[0], prepared.search
+    heard = held_out_evidence(search, prepared.unseen, diagnosis.null, lead)
+    gain = diagnosis.gain(lead)
+    diagnosis = replace(diagnosis, written=as_written(lead, search.weighing), heard=heard)
     held = fitted_scores(prepared, diagnosis)[1]
-    if not held.effect > (1.0 if lead.effect.kind == "test" else VETO) * held.calibrated:
-        return diagnosis
+    together = gain + (heard.held_out or 0.0)
+    against = any(g < -threshold() for g in heard.votes.values())
+    if not against and together > threshold() and not held.effect > HARM * held.calibrated:
+        notes = (*diagnosis.notes, f"asked of {lead.effect.name}: {_said(heard)}")
+        return replace(diagnosis, notes=notes)
     note = (
-        f"{lead.effect.name} gained {diagnosis.gain(lead):.0f} in -2 ln evidence but left the "
-        f"held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, so it is not "
-        "named"
+        f"{lead.effect.name} gained {gain:.0f} in -2 ln evidence but left the data no fit saw "
+        f"worse explained ({_said(heard)}; held-out Q {held.calibrated:.3g} calibrated, "
+        f"{held.effect:.3g} with it), so it is not named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.search)
+    refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), search)
+    return refused if together <= threshold() else _unexplained(refused, lead, together)
+
+
+def _unexplained(diagnosis: Diagnosis, lead: Trial, together: float) -> Diagnosis:
+    """Calibration alone is refuted by all data together, and what refuted it is refused."""
+    p = float(min(1.0, len(families()) * np.exp(-together / 2)))
+    what = (
+        f"{lead.effect.name} explains all data e^{together / 2:.0f} times better than calibration "
+        "alone, yet not those that no fit saw"
+    )
+    fits = FitTest(False, p, what, lead.effect.text)
+    note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
+
+
+def _said(heard: HeldOutEvidence) -> str:
+    """The gains of data that were not fitted, in words."""
+    words = [f"{what} {gain:+.0f}" for what, gain in heard.votes.items()]
+    return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
 
 
 def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:

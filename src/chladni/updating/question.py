@@ -67,6 +67,7 @@ class Prepared:
     what : the held-out data in words
     notes : how the recording was read, and why
     nominal : the structure of the deck, its modes solved as far as anyone here asks
+    unseen : the held-out samples in the shape of ``search.data.use``
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
     """
 
@@ -80,3 +81,4 @@ class Prepared:
     identified: Identified | None = None
     too_little: str = ""  # why the data cannot bear a name
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
+    unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))

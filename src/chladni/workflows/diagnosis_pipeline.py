@@ -21,6 +21,7 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
+from ..updating.confusers import with_confusers
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
@@ -54,7 +55,7 @@ def answered(case: Case, search: bool, progress: Progress) -> DiagnosisResult:
         if search:
             found = withheld(prepared, found)
         found, distrust = _judged(asked, prepared, found)
-        if found.one_of:
+        if search and prepared.too_little:
             distrust = (f"nothing is named: {prepared.too_little}", *distrust)
         progress("the updated deck", 0.85)
         stages, lost = _updated(case, asked, prepared, found)
@@ -74,7 +75,7 @@ def _judged(
         found = replace(
             found, trials=(lead.trial, *found.trials[1:]), notes=(*found.notes, lead.note)
         )
-        found, distrust = judged(prepared, found), lead.distrust
+        found, distrust = with_confusers(judged(prepared, found)), lead.distrust
     if found.found is None:
         plain = renewed(asked, prepared, found.plain)
         found = replace(found, plain=plain.trial, notes=(*found.notes, plain.note))

@@ -1,0 +1,28 @@
+"""Effects that the data cannot tell apart, and the measurement that would."""
+
+from dataclasses import replace
+
+from ..effects.registry import family
+from .diagnosis import Diagnosis
+
+TIED = 10.0  # in -2 ln evidence, e^5: odds up to which two explanations are one answer
+
+
+def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with what explains the data as well as the named effect, if anything does."""
+    best = diagnosis.found
+    if best is None:
+        return diagnosis
+    tied = [t for t in diagnosis.trials if t.S - best.S < TIED]
+    if len(tied) < 2:
+        return diagnosis
+    names = tuple(t.effect.name for t in tied)
+    checks = [family(name).settled_by for name in names]
+    check = "; or ".join(c for c in checks if c)
+    odds = ", ".join(f"e^{(t.S - best.S) / 2:.0f} times {t.effect.name}" for t in tied[1:])
+    note = (
+        f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
+        f"probable as {odds}); what would settle it: {check}"
+    )
+    one_of = (*names, check) if check else names
+    return replace(diagnosis, one_of=one_of, notes=(*diagnosis.notes, note))

@@ -1,0 +1,150 @@
+"""What data that a fit did not see say of an effect: log predictive densities.
+
+An effect is asked twice, each time beside calibration alone and with the learned error of the
+model in both:
+
+- the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences;
+- folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. For
+  residuals r of covariance C, r_b given all others has the precision P = (C⁻¹)_bb and the mean
+  r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12), here with the
+  parameters linear about their fit.
+
+Data that cannot feel the effect are predicted alike with and without it and have no vote.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .discrepancy import MEDIAN
+from .hypothesis_fit import ROUGH, Search, Trial, fitted
+from .likelihood import Poles, Responses
+from .map_fit import unknowns
+
+BLOCKS = 8  # of neighbouring lines
+
+
+@dataclass(frozen=True)
+class HeldOutEvidence:
+    """Gains in 2 ln predictive density over calibration alone; positive speaks for the effect.
+
+    Attributes
+    ----------
+    held_out : of the data held out; None where nothing was
+    sensors, lines : sums over folds of the fitted data; None for natural frequencies
+    """
+
+    held_out: float | None = None
+    sensors: float | None = None
+    lines: float | None = None
+
+    @property
+    def votes(self) -> dict[str, float]:
+        """What was asked, in words, and its answer."""
+        every = {
+            "the data held out": self.held_out,
+            "sensors predicted from the others": self.sensors,
+            "lines predicted from the others": self.lines,
+        }
+        return {what: gain for what, gain in every.items() if gain is not None}
+
+
+def held_out_evidence(
+    search: Search, unseen: np.ndarray, null: Trial, trial: Trial
+) -> HeldOutEvidence:
+    """Ask data that the fits did not see.
+
+    Parameters
+    ----------
+    unseen : samples held out, in the shape of ``search.data.use``
+    """
+    held = None
+    if unseen.any():
+        together = _with_all(search, null, unseen)
+        held = together.gain(null, trial) - (null.S - trial.S)
+    if not isinstance(null.data, Responses) or null.data.error is None:
+        return HeldOutEvidence(held)
+    by_line = _folds_of_lines(null.data)
+    by_sensor = _folds_of_sensors(null.data)
+    gains = [
+        predictive(search, trial, folds) - predictive(search, null, folds)
+        for folds in (by_sensor, by_line)
+    ]
+    sensors = None if trial.effect.channels else gains[0]  # a fault concerns no other channel
+    return HeldOutEvidence(held, sensors, gains[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _All:
+    """Fitted and held-out data together."""
+
+    search: Search
+    data: Responses | Poles
+
+    def gain(self, null: Trial, trial: Trial) -> float:
+        """2 ln Bayes factor of a trial on all data, both fitted on from where they are."""
+        before, after = (self._evidence(t) for t in (null, trial))
+        return before - after
+
+    def _evidence(self, trial: Trial) -> float:
+        data = self.data.over(trial.model)
+        fit = trial.fit
+        return fitted(trial.model, fit.effects, data, self.search.weighing, fit.x, ROUGH).S
+
+
+def _with_all(search: Search, null: Trial, unseen: np.ndarray) -> _All:
+    data = null.data
+    assert isinstance(data, (Responses, Poles))
+    if isinstance(data, Poles):
+        return _All(search, data.only(data.use | unseen))
+    delta = MEDIAN if data.error is None else data.error.delta
+    every = data.only(data.use | unseen)
+    return _All(search, every.allowing_errors(null.fit.state, delta))
+
+
+def _folds_of_lines(data: Responses) -> np.ndarray:
+    """Which block each sample belongs to (n,), real and imaginary part together."""
+    lines = np.flatnonzero(data.use.any(axis=1))
+    block = np.full(len(data.use), -1)
+    for k, part in enumerate(np.array_split(lines, min(BLOCKS, len(lines)))):
+        block[part] = k
+    return _of_samples(data, np.broadcast_to(block[:, None], data.use.shape))
+
+
+def _folds_of_sensors(data: Responses) -> np.ndarray:
+    """Which output each sample belongs to (n,)."""
+    return _of_samples(data, np.broadcast_to(np.arange(data.use.shape[1]), data.use.shape))
+
+
+def _of_samples(data: Responses, fold: np.ndarray) -> np.ndarray:
+    """Folds (n_f, n_out) in the order of the residuals."""
+    one = np.repeat(fold[data.use], data.values.shape[2])
+    return np.concatenate([one, one])
+
+
+def predictive(search: Search, trial: Trial, folds: np.ndarray) -> float:
+    """2 ln predictive density of every fold given all others, summed, up to a constant."""
+    data, fit = trial.data, trial.fit
+    assert isinstance(data, Responses)
+    assert data.error is not None
+    r, J = data.scaled(fit.state, True)
+    known = unknowns(fit.effects)
+    mean, sd = np.array([p.mean for p in known]), np.array([p.sd for p in known])
+    error = data.error
+    shapes = error.U * (error.delta * np.sqrt(error.s))
+    weighing = search.weighing
+    if weighing is not None:
+        r = np.append(r, (fit.state.weight - weighing.mass) / weighing.sd)
+        J = np.concatenate([J, fit.state.dweight[None] / weighing.sd])
+        shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
+    r = r - J @ (fit.x - mean)
+    W = np.concatenate([J * sd, shapes], axis=1)
+    L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
+    B = np.linalg.solve(L, W.T).T  # C⁻¹ = I - B Bᵀ
+    z = r - B @ (B.T @ r)
+    total = 0.0
+    for k in np.unique(folds):
+        inside = np.flatnonzero(folds == k)
+        P = np.eye(len(inside)) - B[inside] @ B[inside].T
+        total += float(np.linalg.slogdet(P)[1] - z[inside] @ np.linalg.solve(P, z[inside]))
+    return total
