@@ -10,11 +10,11 @@ from chladni.updating.diagnosis import Diagnosis
 
 
 def found(*evidence, verdict="missing physics"):
-    trials = tuple(
-        SimpleNamespace(S=S, effect=SimpleNamespace(name=name))
+    hypotheses = tuple(
+        SimpleNamespace(neg2_log_evidence=S, effect=SimpleNamespace(name=name))
         for name, S in zip(("point-mass", "sensor-mass", "suspension"), evidence, strict=True)
     )
-    return with_confusers(Diagnosis(None, None, None, trials, verdict))
+    return with_confusers(Diagnosis(None, None, None, hypotheses, verdict))
 
 
 def test_near_ones_are_listed_with_what_would_settle_it():

@@ -10,16 +10,16 @@ from numpy.testing import assert_allclose
 from chladni.effects.ordinary import ordinary
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.updating.held_out_evidence import held_out_evidence, predictive
-from chladni.updating.hypothesis_fit import Trial, fitted
-from chladni.updating.map_fit import Weighing
+from chladni.updating.hypothesis_fit import HypothesisFit, fitted
+from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 
-SCALES = Weighing(1.413, 1.4e-3)
+SCALES = MassMeasurement(1.413, 1.4e-3)
 HELD = slice(20, 24)  # lines
 
 
 @pytest.fixture(scope="module")
-def seen(bench, responses):
+def seen(reduced, responses):
     """A plate seen with 8 % damping, its upper lines held out."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     use = np.ones((24, 4), bool)
@@ -28,27 +28,27 @@ def seen(bench, responses):
 
 
 def search_of(data):
-    return SimpleNamespace(data=data, weighing=SCALES)
+    return SimpleNamespace(data=data, mass_measurement=SCALES)
 
 
-def trial_of(bench, data, effects, x):
-    state = evaluate(bench.model, effects[:1], np.zeros(1))
-    fit = fitted(bench.model, effects, data.allowing_errors(state), SCALES, np.asarray(x))
-    return Trial(effects[-1], fit, bench.model)
+def trial_of(reduced, data, effects, x):
+    state = evaluate(reduced.model, effects[:1], np.zeros(1))
+    fit = fitted(reduced.model, effects, data.allowing_errors(state), SCALES, np.asarray(x))
+    return HypothesisFit(effects[-1], fit, reduced.model)
 
 
 @pytest.fixture(scope="module")
-def faulty(bench, seen):
+def faulty(reduced, seen):
     """A level of one channel 20 % high, on every line."""
-    E = ordinary(bench.groups, "E", [0])
-    H = seen.model(evaluate(bench.model, [E], np.array([0.02])))
+    E = ordinary(reduced.groups, "E", [0])
+    H = seen.model(evaluate(reduced.model, [E], np.array([0.02])))
     H[:, 2] *= 1.2
     data = replace(seen, values=H)
     fault = sensor_fault("c", 2, 4, 1, 0.2)
-    return data, trial_of(bench, data, [E], [0.0]), trial_of(bench, data, [E, fault], [0.0, 0.2])
+    return data, trial_of(reduced, data, [E], [0.0]), trial_of(reduced, data, [E, fault], [0.0, 0.2])
 
 
-def test_predictive_density_is_that_of_the_joint_gaussian(bench, faulty):
+def test_predictive_density_is_that_of_the_joint_gaussian(reduced, faulty):
     """Every fold given the others, from the covariance of all residuals."""
     data, null, _ = faulty
     fit, data = null.fit, null.data
@@ -103,10 +103,10 @@ def test_nothing_held_out_is_not_asked(faulty):
     assert "the data held out" not in heard.votes
 
 
-def test_an_effect_that_is_none_is_not_borne_out(bench, faulty):
+def test_an_effect_that_is_none_is_not_borne_out(reduced, faulty):
     """A fault of another channel predicts lines and held-out data no better."""
     data, null, _ = faulty
-    E = ordinary(bench.groups, "E", [0])
-    wrong = trial_of(bench, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
+    E = ordinary(reduced.groups, "E", [0])
+    wrong = trial_of(reduced, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
     heard = held_out_evidence(search_of(data), ~data.use, null, wrong)
     assert heard.lines < 5

@@ -7,41 +7,40 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect
-from chladni.effects.ordinary import ordinary, scatter
+from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
-from chladni.updating.hypothesis_fit import Trial, as_written
+from chladni.updating.hypothesis_fit import HypothesisFit, as_written
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")
-def trial(bench, responses):
-    effect = thickness_distribution(bench.groups, 0, 1)
-    effects = [ordinary(bench.groups, "E", [0]), scatter(bench.groups, "t", 0.05), effect]
+def hypothesis(reduced, responses):
+    effect = thickness_distribution(reduced.groups, 0, 1)
+    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05), effect]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
-    data = responses.over(bench.model)
-    return Trial(effect, fit(bench.model, effects, data, None, start), bench.model)
+    data = responses.over(reduced.model)
+    return HypothesisFit(effect, fit(reduced.model, effects, data, None, start), reduced.model)
 
 
-def test_scatter_is_gone_and_the_effect_stays(trial):
+def test_scatter_is_gone_and_the_effect_stays(hypothesis):
     """E is all that moves."""
-    deck = as_written(trial, None)
+    deck = as_written(hypothesis, None)
     assert [e.name for e in deck.fit.effects] == ["part-scale", "thickness-distribution"]
-    assert deck.fit.of(deck.effect) == pytest.approx(trial.fit.of(trial.effect), abs=5e-3)
+    assert deck.fit.of(deck.effect) == pytest.approx(hypothesis.fit.of(hypothesis.effect), abs=5e-3)
 
 
-def test_is_the_best_without_scatter(trial):
+def test_is_the_best_without_scatter(hypothesis):
     """Never worse than leaving the scatter out of what was found."""
-    deck = as_written(trial, None)
-    left = evaluate(
-        trial.model, deck.fit.effects,
-        np.concatenate([trial.fit.of(trial.fit.effects[0]), trial.fit.of(trial.effect)]), False,
-    )  # fmt: skip
-    r, _ = trial.data.residual(left, False)
+    deck = as_written(hypothesis, None)
+    own = hypothesis.fit
+    x = np.concatenate([own.of(own.effects[0]), own.of(hypothesis.effect)])
+    left = evaluate(hypothesis.model, deck.fit.effects, x, False)
+    r, _ = hypothesis.data.residual(left, False)
     assert deck.fit.misfit <= r @ r + 1e-6
 
 
@@ -61,7 +60,7 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
         (threshold() + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
     ],
 )
-def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, trial, ahead, heard, harm, called):
+def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, harm, called):
     """No name then, and nothing of it in the deck that is reported.
 
     Where all data together still refute calibration alone, something is missing all the same.
@@ -69,10 +68,10 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, trial, ahead, heard, har
     monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
     scores = FittedScores(1.0, harm, 1.0)
     monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: (scores, scores))
-    null = Trial(Effect(), replace(trial.fit, S=trial.S + ahead), trial.model)
-    found = Diagnosis(null, null, null, (trial,), "missing physics")
-    search = SimpleNamespace(weighing=None, labels=())
-    judged = outcome.judged(SimpleNamespace(search=search, unseen=None), found)
+    null = HypothesisFit(Effect(), replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead), hypothesis.model)
+    found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
+    problem = SimpleNamespace(mass_measurement=None, labels=())
+    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
     assert judged.verdict == called
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)

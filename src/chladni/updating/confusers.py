@@ -13,13 +13,13 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     best = diagnosis.found
     if best is None:
         return diagnosis
-    tied = [t for t in diagnosis.trials if t.S - best.S < TIED]
+    tied = [t for t in diagnosis.hypotheses if t.neg2_log_evidence - best.neg2_log_evidence < TIED]
     if len(tied) < 2:
         return diagnosis
     names = tuple(t.effect.name for t in tied)
     checks = [family(name).settled_by for name in names]
     check = "; or ".join(c for c in checks if c)
-    odds = ", ".join(f"e^{(t.S - best.S) / 2:.0f} times {t.effect.name}" for t in tied[1:])
+    odds = ", ".join(f"e^{(t.neg2_log_evidence - best.neg2_log_evidence) / 2:.0f} times {t.effect.name}" for t in tied[1:])
     note = (
         f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
         f"probable as {odds}); what would settle it: {check}"

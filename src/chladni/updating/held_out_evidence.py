@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .discrepancy import MEDIAN
-from .hypothesis_fit import ROUGH, Search, Trial, fitted
+from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Poles, Responses
 from .map_fit import unknowns
 
@@ -50,27 +50,27 @@ class HeldOutEvidence:
 
 
 def held_out_evidence(
-    search: Search, unseen: np.ndarray, null: Trial, trial: Trial
+    problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit
 ) -> HeldOutEvidence:
     """Ask data that the fits did not see.
 
     Parameters
     ----------
-    unseen : samples held out, in the shape of ``search.data.use``
+    unseen : samples held out, in the shape of ``problem.data.use``
     """
     held = None
     if unseen.any():
-        together = _with_all(search, null, unseen)
-        held = together.gain(null, trial) - (null.S - trial.S)
+        together = _with_all(problem, null, unseen)
+        held = together.gain(null, hypothesis) - (null.neg2_log_evidence - hypothesis.neg2_log_evidence)
     if not isinstance(null.data, Responses) or null.data.error is None:
         return HeldOutEvidence(held)
     by_line = _folds_of_lines(null.data)
     by_sensor = _folds_of_sensors(null.data)
     gains = [
-        predictive(search, trial, folds) - predictive(search, null, folds)
+        predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    sensors = None if trial.effect.channels else gains[0]  # a fault concerns no other channel
+    sensors = None if hypothesis.effect.channels else gains[0]  # a fault concerns no other channel
     return HeldOutEvidence(held, sensors, gains[1])
 
 
@@ -78,28 +78,28 @@ def held_out_evidence(
 class _All:
     """Fitted and held-out data together."""
 
-    search: Search
+    problem: UpdatingProblem
     data: Responses | Poles
 
-    def gain(self, null: Trial, trial: Trial) -> float:
-        """2 ln Bayes factor of a trial on all data, both fitted on from where they are."""
-        before, after = (self._evidence(t) for t in (null, trial))
+    def two_log_bayes_factor(self, null: HypothesisFit, hypothesis: HypothesisFit) -> float:
+        """2 ln Bayes factor of a hypothesis on all data, both fitted on from where they are."""
+        before, after = (self._evidence(t) for t in (null, hypothesis))
         return before - after
 
-    def _evidence(self, trial: Trial) -> float:
-        data = self.data.over(trial.model)
-        fit = trial.fit
-        return fitted(trial.model, fit.effects, data, self.search.weighing, fit.x, ROUGH).S
+    def _evidence(self, hypothesis: HypothesisFit) -> float:
+        data = self.data.over(hypothesis.model)
+        fit = hypothesis.fit
+        return fitted(hypothesis.model, fit.effects, data, self.problem.mass_measurement, fit.x, ROUGH).neg2_log_evidence
 
 
-def _with_all(search: Search, null: Trial, unseen: np.ndarray) -> _All:
+def _with_all(problem: UpdatingProblem, null: HypothesisFit, unseen: np.ndarray) -> _All:
     data = null.data
     assert isinstance(data, (Responses, Poles))
     if isinstance(data, Poles):
-        return _All(search, data.only(data.use | unseen))
+        return _All(problem, data.only(data.use | unseen))
     delta = MEDIAN if data.error is None else data.error.delta
     every = data.only(data.use | unseen)
-    return _All(search, every.allowing_errors(null.fit.state, delta))
+    return _All(problem, every.allowing_errors(null.fit.state, delta))
 
 
 def _folds_of_lines(data: Responses) -> np.ndarray:
@@ -122,9 +122,9 @@ def _of_samples(data: Responses, fold: np.ndarray) -> np.ndarray:
     return np.concatenate([one, one])
 
 
-def predictive(search: Search, trial: Trial, folds: np.ndarray) -> float:
+def predictive(problem: UpdatingProblem, hypothesis: HypothesisFit, folds: np.ndarray) -> float:
     """2 ln predictive density of every fold given all others, summed, up to a constant."""
-    data, fit = trial.data, trial.fit
+    data, fit = hypothesis.data, hypothesis.fit
     assert isinstance(data, Responses)
     assert data.error is not None
     r, J = data.scaled(fit.state, True)
@@ -132,10 +132,10 @@ def predictive(search: Search, trial: Trial, folds: np.ndarray) -> float:
     mean, sd = np.array([p.mean for p in known]), np.array([p.sd for p in known])
     error = data.error
     shapes = error.U * (error.delta * np.sqrt(error.s))
-    weighing = search.weighing
-    if weighing is not None:
-        r = np.append(r, (fit.state.weight - weighing.mass) / weighing.sd)
-        J = np.concatenate([J, fit.state.dweight[None] / weighing.sd])
+    mass_measurement = problem.mass_measurement
+    if mass_measurement is not None:
+        r = np.append(r, (fit.state.weight - mass_measurement.mass) / mass_measurement.sd)
+        J = np.concatenate([J, fit.state.dweight[None] / mass_measurement.sd])
         shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
     r = r - J @ (fit.x - mean)
     W = np.concatenate([J * sd, shapes], axis=1)

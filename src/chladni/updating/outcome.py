@@ -9,7 +9,7 @@ from ..model.assembly import Assembly
 from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, threshold, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
-from .hypothesis_fit import Search, Trial, as_written
+from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
@@ -36,10 +36,10 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     )
 
 
-def applied(assembly: Assembly, trial: Trial) -> Assembly:
-    """The assembly with the ordinary parameters and the effect of a trial in it."""
-    for effect in trial.fit.effects:
-        assembly = effect.apply(assembly, trial.fit.of(effect))
+def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
+    """The assembly with the ordinary parameters and the effect of a hypothesis in it."""
+    for effect in hypothesis.fit.effects:
+        assembly = effect.apply(assembly, hypothesis.fit.of(effect))
     return assembly
 
 
@@ -55,20 +55,20 @@ class FittedScores:
 def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScores, FittedScores]:
     """Q on the data that were fitted, and on those held out."""
     winner = diagnosis.found or diagnosis.null
-    stages = _states(prepared.search, diagnosis, winner)
+    stages = _states(prepared.problem, diagnosis, winner)
     out, real = [], real_poles(prepared, winner)
     for use in (prepared.score.use, held_out(prepared, winner)):
-        values = [prepared.score.over(trial.model).Q(state, use, real) for trial, state in stages]
+        values = [prepared.score.over(fit.model).Q(state, use, real) for fit, state in stages]
         out.append(FittedScores(*values))
     return out[0], out[1]
 
 
-def held_out(prepared: Prepared, winner: Trial) -> np.ndarray:
+def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
     """Samples the fit never saw; of a fault of one channel, that channel's alone."""
     held = prepared.held
     if not winner.effect.channels or held.ndim < 2:
         return held
-    mine = np.isin(prepared.search.labels, winner.effect.channels)
+    mine = np.isin(prepared.problem.labels, winner.effect.channels)
     own = held & mine
     return own if own.any() else held
 
@@ -87,10 +87,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """
     if diagnosis.found is None:
         return diagnosis
-    lead, search = diagnosis.trials[0], prepared.search
-    heard = held_out_evidence(search, prepared.unseen, diagnosis.null, lead)
-    gain = diagnosis.gain(lead)
-    diagnosis = replace(diagnosis, written=as_written(lead, search.weighing), heard=heard)
+    lead, problem = diagnosis.hypotheses[0], prepared.problem
+    heard = held_out_evidence(problem, prepared.unseen, diagnosis.null, lead)
+    gain = diagnosis.two_log_bayes_factor(lead)
+    diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
     held = fitted_scores(prepared, diagnosis)[1]
     together = gain + (heard.held_out or 0.0)
     against = any(g < -threshold() for g in heard.votes.values())
@@ -104,11 +104,11 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), search)
+    refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), problem)
     return refused if together <= threshold() else _unexplained(refused, lead, together)
 
 
-def _unexplained(diagnosis: Diagnosis, lead: Trial, together: float) -> Diagnosis:
+def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> Diagnosis:
     """Calibration alone is refuted by all data together, and what refuted it is refused."""
     p = float(min(1.0, len(families()) * np.exp(-together / 2)))
     what = (
@@ -127,7 +127,7 @@ def _said(heard: HeldOutEvidence) -> str:
     return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
 
 
-def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
+def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
     """Poles of the test that have a partner in the winning model; the rest are spurious."""
     if not isinstance(prepared.score, Poles):
         return None
@@ -139,10 +139,10 @@ def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
     return real
 
 
-def _as_given(search: Search, null: Trial) -> np.ndarray:
+def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
     """The deck's own values, mesh error and gain as the fit found them, no scatter."""
-    x, at = search.mean(), 0
-    for e in search.base:
+    x, at = problem.mean(), 0
+    for e in problem.base:
         n = len(e.parameters)
         if e.kind == "nuisance" and e.writable:
             x[at : at + n] = null.fit.of(e)
@@ -150,16 +150,18 @@ def _as_given(search: Search, null: Trial) -> np.ndarray:
     return x
 
 
-def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
+def _states(
+    problem: UpdatingProblem, diagnosis: Diagnosis, winner: HypothesisFit
+) -> list[tuple[HypothesisFit, State]]:
     """The calibrated and the updated deck, and all that the last fit had beside them."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
-        nominal = evaluate(null.model, search.base, _as_given(search, null), False)
+        nominal = evaluate(null.model, problem.base, _as_given(problem, null), False)
         return [(null, nominal), (null, nominal), (null, null.fit.state)]
     if diagnosis.found is None:
         state = plain.fit.state
         return [(plain, state), (plain, state), (null, null.fit.state)]
-    final = diagnosis.written or as_written(winner, search.weighing)
+    final = diagnosis.written or as_written(winner, problem.mass_measurement)
     return [
         (plain, plain.fit.state), (winner, final.fit.state), (winner, winner.fit.state)
     ]  # fmt: skip
