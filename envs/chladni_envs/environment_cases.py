@@ -7,7 +7,7 @@ import numpy as np
 from chladni.case import load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
-from chladni.planning import Linearised, Wishes, find_sensor_candidates
+from chladni.planning import Linearised, PlanSettings, find_sensor_candidates
 from chladni.planning.rattle import openings
 from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
@@ -38,7 +38,7 @@ def specimen(
     """
     model = load_model(Path(case), units)
     places = find_sensor_candidates(model.assembly, candidates, unit=model.unit)
-    target, _, _ = target_modes(model.structure, Wishes(modes=modes))
+    target, _, _ = target_modes(model.structure, PlanSettings(modes=modes))
     mounts, moving = mounts_at(places), motion(model.structure, target)
     labels, seen = mounts.labels[: len(places)], model.seen
     gaps = openings(model.assembly, moving)

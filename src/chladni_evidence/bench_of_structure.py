@@ -14,7 +14,7 @@ from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
-from chladni.planning import Wishes, plan
+from chladni.planning import PlanSettings, plan
 from chladni.planning.measurement_lines import TABLE_3, even_lines, stage_lines
 from chladni_specimens.forms import FORMS
 from chladni_specimens.holed_plate import holed_plate
@@ -117,9 +117,9 @@ def panel_bench(name: str, seed: int) -> Bench:
         outputs=every.only(_spread(every, spec.sensors, rng)),
         drive=every.only(_driven(deck, every, moving, rng)),
         hangers=_hung(every),
-        lines=np.arange(4.0, spec.top, 0.25),
+        lines=np.arange(4.0, spec.f_max, 0.25),
         fit=spec.fit,
-        held=(spec.fit[1], spec.top - 10),
+        held=(spec.fit[1], spec.f_max - 10),
         first=float(modes.frequency[6]),
         sheets=tuple(p.name for p in deck.parts),
         rolled=tuple(p.name for p in deck.parts),
@@ -130,7 +130,7 @@ def panel_bench(name: str, seed: int) -> Bench:
 def tailgate_bench() -> Bench:
     """The tailgate at 20 mm: sensors, shaker and cords as planned, the thesis' lines."""
     deck = tailgate(TailgateDesign(size=0.020))
-    found = plan(deck, Wishes(sensors=30))
+    found = plan(deck, PlanSettings(sensors=30))
     m = found.mounts
     sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
 

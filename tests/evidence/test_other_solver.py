@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.bench.article import Front, measured
+from chladni.bench.article import MeasurementChain, measured
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
 from chladni.model.properties import Orthotropic
@@ -79,8 +79,9 @@ def written(name, effect, seed, folder):
     zeta = 0.007 * np.exp(0.3 * rng.normal(size=len(f)))
     modal = ModalModel(np.where(f < 2, 0, f), zeta, np.zeros((1, len(f))), np.zeros((1, 2), int))
     phi_o, phi_i = U[:, deck.rows(outputs), 2].T, U[:, deck.rows(np.array([drive])), 2].T
-    labels, line = tuple(f"{g}:+Z" for g in outputs), np.arange(4.0, spec.top, 0.25)
-    frf = measured(modal, phi_o, phi_i, line, Front(0.01, 0.001), rng, labels, (f"{drive}:+Z",))
+    labels, line = tuple(f"{g}:+Z" for g in outputs), np.arange(4.0, spec.f_max, 0.25)
+    chain = MeasurementChain(0.01, 0.001)
+    frf = measured(modal, phi_o, phi_i, line, chain, rng, labels, (f"{drive}:+Z",))
     mass = mass_properties(made(deck, article))[0]
     case = concealed.Concealed(spec, deck, frf, mass, hangers, {})
     concealed.write(case, folder / "case", folder / "sealed.json")

@@ -67,8 +67,8 @@ def with_responses(folder: Path, outputs: int, modes: int) -> Path:
     (folder / "deck.bdf").write_text(plate_deck())
     built = structure(assembly(read_deck(folder / "deck.bdf"), UNITS["SI"]))
     modal = normal_modes(built.system, 30)
-    top = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
-    f = np.arange(0.5 * modal.frequency[6], 1.02 * top, 0.02)
+    f_max = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
+    f = np.arange(0.5 * modal.frequency[6], 1.02 * f_max, 0.02)
     grids = [3, 12, 16, 22, 30][:outputs]
     a = built.rows(np.array([(g, 3) for g in grids])) @ modal.shapes
     b = built.rows(np.array([(8, 3)])) @ modal.shapes

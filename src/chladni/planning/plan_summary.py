@@ -89,8 +89,8 @@ def _actuator(found: Plan, i: int) -> dict[str, Any]:
 def _rattle(found: Plan) -> dict[str, Any]:
     """What the mesh says of clearances, whichever place is shaken."""
     return {
-        "force_n": found.wishes.force,
-        "places_vetoed": int((found.rattle.force < found.wishes.force).sum()),
+        "force_n": found.settings.force,
+        "places_vetoed": int((found.rattle.force < found.settings.force).sum()),
         "without_a_straight_way": int((~found.places.straight).sum()),
         "open_places": len(found.openings.clearance),
         "least_clearance_m": float(found.openings.clearance.min(initial=np.inf))
@@ -108,7 +108,7 @@ def _modes(found: Plan) -> list[dict[str, Any]]:
             "visibility": found.visible[k],
             "visibility_before": found.visible_before[k],
             "seen_by_normals": bool(found.aimed[k]),
-            "seen": bool(found.visible[k] >= found.wishes.floor),
+            "seen": bool(found.visible[k] >= found.settings.floor),
             "with_sensor_mass_hz": found.loaded[k],
         }
         for k, f in enumerate(found.modal.frequency)
@@ -155,7 +155,7 @@ def sensors_csv(found: Plan) -> str:
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
     write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
-    rows = [(int(i), "output", found.wishes.mass) for i in found.layout]
+    rows = [(int(i), "output", found.settings.mass) for i in found.layout]
     for i, role, mass in [*rows, *((int(i), "input", 0.0) for i in found.together)]:
         m = _mount(found, i)
         place = [""] * 3 if m["grid"] is not None else [f"{x:.7g}" for x in m["point_m"]]

@@ -54,7 +54,7 @@ class Accuracy:
 
 
 def accuracy(
-    bench: Workbench, model: Reduced, effects: Sequence[Effect], x: np.ndarray, top: float
+    bench: Workbench, model: Reduced, effects: Sequence[Effect], x: np.ndarray, f_max: float
 ) -> Accuracy:
     """Error of the reduced model's frequencies at x.
 
@@ -64,11 +64,11 @@ def accuracy(
     ----------
     bench : the structure and the factor of its K + σM
     model : its reduced model, over whatever basis
-    top : highest frequency of interest [Hz]
+    f_max : highest frequency of interest [Hz]
     """
     state = evaluate(model, effects, x, gradient=False)
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-    at = np.flatnonzero((f > RIGID * top) & (f <= top))
+    at = np.flatnonzero((f > RIGID * f_max) & (f <= f_max))
     q = model.basis @ state.phi[:, at]
     Kq, Mq = products(model, effects, x, q)
     missing = np.asarray(bench.factor.solve(Kq - state.lam[at] * Mq))

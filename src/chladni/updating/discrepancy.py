@@ -98,10 +98,10 @@ class Form:
         return np.stack(np.triu_indices(len(self.lam)), axis=1)
 
 
-def form(state: State, top: float) -> Form:
+def form(state: State, f_max: float) -> Form:
     """No change yet, in the flexible modes up to ``REACH`` times the highest line [rad/s]."""
     omega = np.sqrt(np.maximum(state.lam, 0))
-    modes = np.flatnonzero((omega > RIGID * top) & (omega < REACH * top))
+    modes = np.flatnonzero((omega > RIGID * f_max) & (omega < REACH * f_max))
     k = len(modes)
     return Form(np.linalg.inv(state.phi)[modes], state.lam[modes], np.zeros((2, k, k)))
 

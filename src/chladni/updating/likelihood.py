@@ -206,10 +206,10 @@ class Poles:
         if not len(poles):
             return poles, poles, 0.0
         f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-        top = self.frequency[poles[-1]]
-        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * top))
+        f_max = self.frequency[poles[-1]]
+        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * f_max))
         missed = price_missed(self.visibility(state, modes))
-        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], top * (1 + 1e-9)))
+        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], f_max * (1 + 1e-9)))
         test, model, lonely = paired(
             self.frequency[poles], f[modes], self.spread()[poles], self._alone()[poles],
             np.where(ends, 0.0, missed),

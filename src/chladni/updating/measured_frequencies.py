@@ -63,7 +63,7 @@ def _peaks(found: Identified) -> np.ndarray:
 
 
 def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
-    """Poles of the band that matter: clear gain, usual damping, the strongest at its resonance."""
+    """Poles of the band that matter: a clear share of χ², usual damping, strongest of its peak."""
     f, peak = found.frequency, _peaks(found)
     keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
     if not keep.any():

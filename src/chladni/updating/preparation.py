@@ -61,43 +61,43 @@ def _by_responses(question: Question) -> Prepared:
     assert frf is not None
     low, high = band_of(question, frf)
     held_band = question.held_band or _upper_part(question, low, high)
-    fit_top = min(high, held_band[0]) if question.held_band is None else high
+    fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
-    top = reach[1]
-    if question.held_band is None and not _modes_seen(found, low, fit_top):
-        held_band, fit_top = (high, high), high  # all modes lie where the band was to be held out
-    seen = _modes_seen(found, low, fit_top)
+    f_max = reach[1]
+    if question.held_band is None and not _modes_seen(found, low, fit_max):
+        held_band, fit_max = (high, high), high  # all modes lie where the band was to be held out
+    seen = _modes_seen(found, low, fit_max)
     if not seen:
         raise FileError(
-            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
+            f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
-    nominal = modelled(question.tested(question.assembly), SOLVED * top)
+    nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    bench = workbench(nominal, top, sp.csr_array(sp.vstack([rows_o, rows_i])))
-    bench = carrying(bench, freed_by(question, bench, top))
+    bench = workbench(nominal, f_max, sp.csr_array(sp.vstack([rows_o, rows_i])))
+    bench = carrying(bench, freed_by(question, bench, f_max))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     data = []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
-        use = _training(f, low, fit_top, held_sensors)
+        use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
         read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
         data.append(read.over(bench.model))
-    nuisance = nuisances(bench, nominal, top, jittered=False)
+    nuisance = nuisances(bench, nominal, f_max, jittered=False)
     if not question.gain_known:
         nuisance.append(gain(len(question.outputs.labels), 1.0))
-    search = searched(question, bench, data[0], nuisance, top)
+    search = searched(question, bench, data[0], nuisance, f_max)
     swapped = (
         held_sensors if isinstance(question.held_sensors, tuple) else _swapped(search, held_sensors)
     )
     if not np.array_equal(swapped, held_sensors):
         held_sensors = swapped
         data = [
-            d.only(_training(f, low, fit_top, swapped)) for d, f in zip(data, lines, strict=True)
+            d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
         ]
         search = replace(search, data=data[0])
     f = lines[1]
@@ -210,12 +210,12 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
 
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
-    top = float(frequency[-1]) * 1.15
-    highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
-    nominal = modelled(question.tested(question.assembly), max(FAR * top, SOLVED * highest))
+    f_max = float(frequency[-1]) * 1.15
+    highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
+    nominal = modelled(question.tested(question.assembly), max(FAR * f_max, SOLVED * highest))
     built = nominal.structure
-    bench = workbench(nominal, top, groups=48, reach=FAR)
-    bench = carrying(bench, freed_by(question, bench, top))
+    bench = workbench(nominal, f_max, groups=48, reach=FAR)
+    bench = carrying(bench, freed_by(question, bench, f_max))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -228,15 +228,15 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
     ).over(bench.model)  # fmt: skip
-    nuisance = nuisances(bench, nominal, top)
-    search = searched(question, bench, data, nuisance, top)
+    nuisance = nuisances(bench, nominal, f_max)
+    search = searched(question, bench, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
     few = too_little(len(frequency), 0)
     return Prepared(search, data, held, what, notes, nominal, None, found, few, ~held)
 
 
-def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = True) -> list[Effect]:
+def nuisances(bench: Workbench, model: Modelled, f_max: float, jittered: bool = True) -> list[Effect]:
     """Scatter within parts, mesh error, jitter: what calibration cannot remove.
 
     Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
@@ -245,10 +245,10 @@ def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = Tr
     out: list[Effect] = [
         scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
     ]  # fmt: skip
-    if (mesh := mesh_error(model, top)) is not None:
+    if (mesh := mesh_error(model, f_max)) is not None:
         out.append(mesh)
     if jittered:
-        return [*out, jitter(model, top, mesh)]
+        return [*out, jitter(model, f_max, mesh)]
     return [*out, *model_families(model.structure)]
 
 
@@ -257,42 +257,42 @@ def searched(
     bench: Workbench,
     data: Responses | Poles,
     nuisance: list[Effect],
-    top: float,
+    f_max: float,
 ) -> Search:
     """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
-    base = [*freed_by(question, bench, top), *nuisance]
+    base = [*freed_by(question, bench, f_max), *nuisance]
     return Search(
         bench, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
-        setup_of(question, top), question.outputs.labels,
+        setup_of(question, f_max), question.outputs.labels,
     )  # fmt: skip
 
 
-def setup_of(question: Question, top: float) -> Setup:
+def setup_of(question: Question, f_max: float) -> Setup:
     """What the effects may know of the test."""
     weight = mass_properties(question.assembly)[0]
     sensors = question.outputs.shares(question.assembly)
-    return Setup(sensors, question.hangers, weight, top)
+    return Setup(sensors, question.hangers, weight, f_max)
 
 
-def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
+def freed_by(question: Question, bench: Workbench, f_max: float) -> list[Effect]:
     """What the user frees, or E and rho of every material and t of every part of shells.
 
     Without shells, E and rho of every material of solids and beams.
     """
     if question.parameters:
-        return [_freed(question, bench, top, p) for p in question.parameters]
+        return [_freed(question, bench, f_max, p) for p in question.parameters]
     if len(bench.groups):
         return list(defaults(bench.groups))
     return [freed(bench.groups, p) for p in defaults_without_shells(question.assembly)]
 
 
-def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -> Effect:
+def _freed(question: Question, bench: Workbench, f_max: float, p: FreeParameter) -> Effect:
     """One number, or an effect whose place is known, of the parts named."""
     if p.field in UNITS:
         return freed(bench.groups, p)
     placed = family(p.field).placed
     assert placed is not None
-    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup_of(question, top))
+    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup_of(question, f_max))
     names = {question.assembly.parts[k].name for k in p.positions}
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:

@@ -68,7 +68,7 @@ def renewed(question: Question, prepared: Prepared, trial: Trial) -> Renewal:
 
 
 def _accuracy(search: Search, trial: Trial) -> Accuracy:
-    return accuracy(search.bench, trial.model, trial.fit.effects, trial.fit.x, search.setup.top)
+    return accuracy(search.bench, trial.model, trial.fit.effects, trial.fit.x, search.setup.f_max)
 
 
 def _said(found: Accuracy) -> str:
@@ -83,18 +83,18 @@ def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Se
     effect = trial.effect
     x = trial.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
-    data, top = old.data, old.setup.top
-    model = modelled(changed.tested(changed.assembly), SOLVED * top)
+    data, f_max = old.data, old.setup.f_max
+    model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     bench = workbench(
-        model, top, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48
+        model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48
     )
     of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
     fresh = searched(
         changed,
         bench,
         data.over(bench.model),
-        [*nuisances(bench, model, top, not rows), *of_test],
-        top,
+        [*nuisances(bench, model, f_max, not rows), *of_test],
+        f_max,
     )
     return fresh, fresh.trial(effect.with_reference_state(x), x, fresh.mean())

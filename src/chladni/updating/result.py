@@ -91,7 +91,7 @@ class Agreement:
     what : the held-out data in words
     gain : of the named effect over calibration, in -2 ln evidence; None: none is named
     largest_gain : of any effect that was tried
-    threshold : the gain from which an effect is named
+    threshold : of 2 ln Bayes factor, from which an effect is named
     """
 
     fitted: Scores = Scores()

@@ -37,7 +37,7 @@ def written_Q(
 
     Where the gain is unknown, the mean level over the fitted samples is taken out as well.
     """
-    data, state = seen(question, prepared.score, model, prepared.search.setup.top)
+    data, state = seen(question, prepared.score, model, prepared.search.setup.f_max)
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
@@ -52,10 +52,10 @@ def written_Q(
 
 
 def seen(
-    question: Question, score: Responses | Poles, model: Modelled, top: float
+    question: Question, score: Responses | Poles, model: Modelled, f_max: float
 ) -> tuple[Responses | Poles, State]:
     """The data with this structure's rows in its own modes, and those modes."""
-    built, modes = model.structure, model.up_to(REACH * top)
+    built, modes = model.structure, model.up_to(REACH * f_max)
     basis = modes.shapes
     if isinstance(score, Poles):
         lam = (2 * np.pi * modes.frequency) ** 2
@@ -64,8 +64,8 @@ def seen(
             score = replace(score, a=a, b=b)
         return score, _state(lam, np.eye(len(lam)))
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    flexible = modes.frequency[modes.frequency > 0.02 * top]
-    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
+    flexible = modes.frequency[modes.frequency > 0.02 * f_max]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
     still = attachments(
         shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
     )
