@@ -46,7 +46,7 @@ class Bench:
     fit, held : (low, high)    bands to fit and to hold out [Hz]
     first : float              first elastic mode of the deck [Hz]
     sheets : tuple of str      parts an effect may sit on
-    grain, rolled              direction of rolling, parts that may be orthotropic
+    material_axis, rolled      direction of rolling, parts that may be orthotropic
     """
 
     name: str
@@ -60,7 +60,7 @@ class Bench:
     held: tuple[float, float]
     first: float
     sheets: tuple[str, ...]
-    grain: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    material_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
     rolled: tuple[str, ...] = ()
 
     @property
@@ -93,7 +93,7 @@ def form_bench(name: str, seed: int) -> Bench:
         held=(float(ends[1]), float(ends[2])),
         first=float(f[0]),
         sheets=tuple(p.name for p in deck.parts if p.name in every.parts),
-        grain=form.grain,
+        material_axis=form.material_axis,
         rolled=form.rolled,
     )
 
@@ -157,7 +157,7 @@ def tailgate_bench() -> Bench:
         held=(200.0, 300.0),
         first=float(found.modal.frequency[0]),
         sheets=tuple(s for s in sheets if s in ("inner", "outer upper", "outer lower")),
-        grain=(0.0, 1.0, 0.0),
+        material_axis=(0.0, 1.0, 0.0),
         rolled=sheets,
     )
 

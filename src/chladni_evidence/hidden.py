@@ -30,7 +30,7 @@ class Site:
     mass : float           [kg]
     first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
     sheets : tuple of str  parts an effect may sit on
-    grain, rolled :        direction of rolling, and the parts that may be orthotropic
+    material_axis, rolled :direction of rolling, and the parts that may be orthotropic
     """
 
     article: Assembly
@@ -40,7 +40,7 @@ class Site:
     first: float
     f_max: float
     sheets: tuple[str, ...]
-    grain: np.ndarray
+    material_axis: np.ndarray
     rolled: tuple[str, ...]
 
     @property

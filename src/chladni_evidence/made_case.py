@@ -140,7 +140,7 @@ def _site(bench: Bench, article: Assembly) -> Site:
         bench.first,
         bench.fit[1],
         bench.sheets,
-        np.array(bench.grain),
+        np.array(bench.material_axis),
         bench.rolled,
     )
 

@@ -15,7 +15,7 @@ from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed
 from chladni.effects.model_families import model_families
-from chladni.effects.ordinary import gain, ordinary, scatter
+from chladni.effects.ordinary import channel_gain, ordinary, scatter
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
@@ -76,7 +76,7 @@ def cases(bench):
         "rho": (ordinary(groups, "rho", [0]), [-0.05], [0]),
         "t": (ordinary(groups, "t", [0]), [0.04], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
-        "gain": (gain(CHANNELS, 0.5), [0.3], [0]),
+        "gain": (channel_gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
         "point-mass": (PointMass.near(where, k), [0.2, 0.1, -0.1], [-20, 0, 0]),
         "extra-support": (ExtraSupport.near(where, k), [-1, 0, 0], [-20, 0, 0]),

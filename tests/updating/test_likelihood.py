@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.ordinary import gain, ordinary
+from chladni.effects.ordinary import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.effects.surroundings import Setup, Surroundings
@@ -23,7 +23,7 @@ def effects(bench):
     return [
         ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "t", [0]),
         PointMass.near(where, spot), ExtraSupport.near(where, spot + 12),
-        gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
+        channel_gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
     ]  # fmt: skip
 
 
@@ -80,7 +80,7 @@ def test_nothing_is_left_at_the_truth(bench, responses, poles):
 
 
 def test_a_gain_is_its_logarithm_on_every_line(bench, responses):
-    stiffer, level = ordinary(bench.groups, "E", [0]), gain(4, 0.5)
+    stiffer, level = ordinary(bench.groups, "E", [0]), channel_gain(4, 0.5)
     state = evaluate(bench.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
     assert_allclose(responses.deviation(state), np.log10(2.0), atol=1e-9)
 
@@ -106,5 +106,5 @@ def test_stiffness_scales_every_frequency_by_its_root(bench, poles):
 
 def test_noise_widens_the_spread_in_squares(responses):
     noise = np.full(responses.values.shape, 0.02)
-    wider = replace(responses, noise=noise).spread()
-    assert_allclose(wider**2, responses.spread() ** 2 + 0.02**2)
+    wider = replace(responses, noise=noise).std()
+    assert_allclose(wider**2, responses.std() ** 2 + 0.02**2)

@@ -14,7 +14,7 @@ from chladni_specimens.plates import plate
 
 MEAN, SD = np.array([0.5, -1.0, 0.2]), np.array([0.3, 2.0, 1.0])
 NOISE = np.array([0.1, 0.4, 0.2, 0.3, 0.1, 0.25])
-EXACT = {"gain": 1e-14, "max_steps": 60}
+EXACT = {"tol": 1e-14, "max_steps": 60}
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +105,8 @@ def test_difference_of_evidence_is_the_ratio_of_marginal_likelihoods(model):
 def test_places_tried_are_paid_for(model):
     A, w, y = problem(1)
     one, ten = (
-        fit(model, [linear(A, w, places)], Offsets(y), None, np.zeros(3), **EXACT).S
-        for places in (1, 10)
+        fit(model, [linear(A, w, trials_factor)], Offsets(y), None, np.zeros(3), **EXACT).S
+        for trials_factor in (1, 10)
     )
     assert_allclose(ten - one, 2 * np.log(10))
 
@@ -125,5 +125,5 @@ def test_effects_split_in_two_are_the_same_fit(model):
 
 def test_too_few_steps_are_owned_up_to(model):
     A, w, y = problem(3)
-    found = fit(model, [linear(A, w)], Offsets(y), None, np.full(3, 50.0), max_steps=1, gain=1e-14)
+    found = fit(model, [linear(A, w)], Offsets(y), None, np.full(3, 50.0), max_steps=1, tol=1e-14)
     assert found.status is Status.OUT_OF_STEPS

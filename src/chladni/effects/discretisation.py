@@ -87,8 +87,8 @@ def jitter(model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.
         b = mesh.rows @ modes.shapes
         own = 0.5 * np.abs((b.T * mesh.change) @ b).diagonal() / (2 * lam)
     unknown = tuple(
-        Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(spread), kind="linear", step=0.02)
-        for r, spread in enumerate(np.hypot(sd, own))
+        Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(std), kind="linear", step=0.02)
+        for r, std in enumerate(np.hypot(sd, own))
     )
     rows = sp.csr_array((model.structure.system.M @ modes.shapes).T)
     return Jitter(unknown, "every mode", rows=rows, lam=lam)

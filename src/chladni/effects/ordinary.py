@@ -183,7 +183,7 @@ def _functions(
 
 
 @dataclass(frozen=True, eq=False)
-class Gain(Effect):
+class ChannelGain(Effect):
     """One real factor common to all channels is unknown."""
 
     name = "gain"
@@ -197,6 +197,7 @@ class Gain(Effect):
         return ChannelChange(x[0] * one.astype(complex), one[:, None].astype(complex))
 
 
-def gain(n_outputs: int, sd: float) -> Gain:
+def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
     """The unknown gain, a factor e^x."""
-    return Gain((Parameter("gain", "-", 0.0, sd, step=1.0),), "every channel", n_outputs=n_outputs)
+    unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
+    return ChannelGain((unknown,), "every channel", n_outputs=n_outputs)

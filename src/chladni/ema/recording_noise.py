@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..dynamics.frf import FRF
-from .identification import DERIVATIVES, Identified, spread
+from .identification import DERIVATIVES, Identified, frf_variance
 from .pole_fitting import basis, linear, residual_terms, stacked
 
 LN10 = np.log(10.0)
@@ -32,7 +32,7 @@ def equalised_noise(
     low, high = identified.band
     keep = use & (frf.frequency >= low) & (frf.frequency <= high) & (frf.frequency > 0)
     omega_max, q = 2 * np.pi * high, DERIVATIVES[identified.quantity]
-    sigma = identified.chi * np.sqrt(spread(frf, averages)[keep] / 2)
+    sigma = identified.chi * np.sqrt(frf_variance(frf, averages)[keep] / 2)
     w = omega_max**q / sigma.reshape(len(sigma), -1)
     p = identified.poles / omega_max
     R = identified.residues.reshape(len(p), -1) / omega_max

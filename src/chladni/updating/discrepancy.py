@@ -54,7 +54,7 @@ class Lines(Protocol):
     def model(self, state: State) -> np.ndarray:
         """H of the model."""
 
-    def spread(self) -> np.ndarray:
+    def std(self) -> np.ndarray:
         """Standard deviation of log10 H."""
 
     def only(self, use: np.ndarray) -> Self:
@@ -168,7 +168,7 @@ def curvature(data: Lines, state: State) -> np.ndarray:
     """
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
-    sd = every.spread() * np.log(10) * USUAL
+    sd = every.std() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
     return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
 
@@ -181,7 +181,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     """
     i, j = about.pairs.T
     phi_o, phi_i, d = data.modal(state)
-    H, sd = data.model(state), data.spread()
+    H, sd = data.model(state), data.std()
     T = about.rows @ state.phi
     a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
     a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)

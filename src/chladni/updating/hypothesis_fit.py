@@ -172,7 +172,7 @@ def _likely_scale(data: Poles, state: State) -> float:
 def neg2_log_mixture(data: Poles, state: State) -> float:
     """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
     r, _ = data.residual(state, False)
-    widths = 2 * np.log(data.spread()[data.use]).sum()
+    widths = 2 * np.log(data.std()[data.use]).sum()
     return float(r @ r + widths) + _scale_prior(data.scale)
 
 

@@ -100,14 +100,14 @@ def fit(
     start: np.ndarray,
     *,
     max_steps: int = 30,
-    gain: float = 0.05,
+    tol: float = 0.05,
 ) -> Fit:
     """Most probable x from one start, and the evidence there.
 
     Parameters
     ----------
     start : (n_p,)      where to begin
-    gain : float        stop when a step improves -2 ln posterior by less
+    tol : float        stop when a step improves -2 ln posterior by less
     """
     priors = unknowns(effects)
     sd = np.array([p.sd for p in priors])
@@ -131,7 +131,7 @@ def fit(
         improved, x, damping = found
         r, J, state = objective(x, True)
         cost = float(r @ r)
-        if improved < gain:
+        if improved < tol:
             status = Status.CONVERGED
             break
     A = J.T @ J
@@ -142,7 +142,7 @@ def fit(
 
 
 def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]
-    """One accepted Levenberg-Marquardt step: (gain, new x, new damping), or None."""
+    """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
     A, g = J.T @ J, J.T @ r
     for _ in range(8):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)

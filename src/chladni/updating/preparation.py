@@ -16,10 +16,10 @@ from ..effects.discretisation import jitter, mesh_error
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
 from ..effects.model_families import model_families
-from ..effects.ordinary import defaults, gain, scatter
+from ..effects.ordinary import channel_gain, defaults, scatter
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
-from ..ema.identification import Identified, equalised, identify, spread
+from ..ema.identification import Identified, equalised, frf_variance, identify
 from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -29,7 +29,7 @@ from .hypothesis_fit import Search
 from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
-from .measured_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
+from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import Workbench, workbench
@@ -89,7 +89,7 @@ def _by_responses(question: Question) -> Prepared:
         data.append(read.over(bench.model))
     nuisance = nuisances(bench, nominal, f_max, jittered=False)
     if not question.gain_known:
-        nuisance.append(gain(len(question.outputs.labels), 1.0))
+        nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     search = searched(question, bench, data[0], nuisance, f_max)
     swapped = (
         held_sensors if isinstance(question.held_sensors, tuple) else _swapped(search, held_sensors)
@@ -129,7 +129,7 @@ def _by_responses(question: Question) -> Prepared:
 def _modes_seen(found: Identified, low: float, high: float) -> int:
     """How many poles that stand out lie between two frequencies."""
     inside = (found.frequency >= low) & (found.frequency <= high)
-    return int((inside & (found.gain > LEAST_GAIN)).sum())
+    return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
 
 
 def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
@@ -144,7 +144,7 @@ def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
 
     The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
     """
-    sd = np.sqrt(spread(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    sd = np.sqrt(frf_variance(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
     f, own = s.imag / (2 * np.pi), frf.frequency
     near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
     lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))

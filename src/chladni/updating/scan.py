@@ -103,7 +103,7 @@ def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     delta = np.log(H * scale) / LN10
     if state.offset is not None:
         delta = delta + state.offset[:, None]
-    z = (wrapped(delta) / data.spread())[:, data.use].reshape(len(H), -1)
+    z = (wrapped(delta) / data.std())[:, data.use].reshape(len(H), -1)
     return np.concatenate([z.real, z.imag], axis=1).T
 
 
