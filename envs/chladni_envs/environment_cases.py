@@ -67,13 +67,13 @@ class Recorded:
 
     def __init__(self, case: str) -> None:
         self.prepared = prepared(load_case(case))
-        search = self.prepared.search
+        problem = self.prepared.problem
         score = self.prepared.score
         if not isinstance(score, Responses):
             raise FileError(f"{case}: these environments compare FRFs; the case has none that can")
         self.score = score
         self.effects: tuple[Effect, ...] = tuple(
-            e for e in search.base if not any(e is n for n in search.nuisance)
+            e for e in problem.base if not any(e is n for n in problem.nuisance)
         )
         pairs = [(e, p) for e in self.effects for p in e.parameters]
         self.names = tuple(_name(e, p) for e, p in pairs)
@@ -82,7 +82,7 @@ class Recorded:
 
     def state(self, theta: np.ndarray, gradient: bool = False) -> State:
         """The reduced model at x = mean + sd θ."""
-        model = self.prepared.search.bench.model
+        model = self.prepared.problem.reduced.model
         return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
 
     def linearised(self) -> Linearised:

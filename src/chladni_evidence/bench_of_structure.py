@@ -202,8 +202,8 @@ def _label(grid: int, direction: np.ndarray) -> str:
 
 def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
     """Places far from each other, shaken a little by the seed."""
-    jitter = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
-    return farthest_point_sample(every.points + jitter, count)
+    noise = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
+    return farthest_point_sample(every.points + noise, count)
 
 
 def _driven(

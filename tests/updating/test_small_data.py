@@ -170,12 +170,13 @@ def test_least_data(modes: int, channels: int, enough: bool) -> None:
 
 
 def test_a_name_is_withheld_with_what_it_cannot_be_told_from() -> None:
-    def trial(name: str, S: float) -> SimpleNamespace:
-        return SimpleNamespace(effect=SimpleNamespace(name=name), S=S)
+    def hypothesis(name: str, S: float) -> SimpleNamespace:
+        return SimpleNamespace(effect=SimpleNamespace(name=name), neg2_log_evidence=S)
 
-    trials = (trial("point-mass", 10.0), trial("suspension", 90.0), trial("sensor-fault", 130.0))
-    null = trial("nothing", 100.0)
-    found = Diagnosis(null, null, null, trials, "missing physics")  # type: ignore[arg-type]
+    ends = {"point-mass": 10.0, "suspension": 90.0, "sensor-fault": 130.0}
+    hypotheses = tuple(hypothesis(name, S) for name, S in ends.items())
+    null = hypothesis("nothing", 100.0)
+    found = Diagnosis(null, null, null, hypotheses, "missing physics")  # type: ignore[arg-type]
     few = SimpleNamespace(too_little="3 modes cannot bear a name")
     kept = withheld(SimpleNamespace(too_little=""), found)  # type: ignore[arg-type]
     assert kept is found

@@ -33,7 +33,7 @@ class MeshError(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class Jitter(Effect):
+class ModalDiscrepancy(Effect):
     """Every mode's stiffness may be off a little on its own."""
 
     name = "jitter"
@@ -75,7 +75,9 @@ def mesh_error(model: Modelled, f_max: float) -> MeshError | None:
     return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
 
 
-def jitter(model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
+def modal_discrepancy(
+    model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.0015
+) -> ModalDiscrepancy:
     """Independent scatter of each modal frequency up to ``f_max``.
 
     Standard deviation of ln f: ``sd``, and half of what the finer mesh changes in that mode.
@@ -91,7 +93,7 @@ def jitter(model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.
         for r, std in enumerate(np.hypot(sd, own))
     )
     rows = sp.csr_array((model.structure.system.M @ modes.shapes).T)
-    return Jitter(unknown, "every mode", rows=rows, lam=lam)
+    return ModalDiscrepancy(unknown, "every mode", rows=rows, lam=lam)
 
 
 def _flexible(modes: ModalModel, f_max: float) -> ModalModel:

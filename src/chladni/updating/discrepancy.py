@@ -205,11 +205,11 @@ class Learned:
 
     Attributes
     ----------
-    S : float                -2 ln evidence, δ integrated out
+    neg2_log_evidence : float  -2 ln evidence, δ integrated out
     delta : float            its most probable value
     """
 
-    S: float
+    neg2_log_evidence: float
     delta: float
 
 

@@ -77,7 +77,7 @@ def _paired(
         at[pairs.test] = pairs.model
         return at, value
     only = Modelled(model.structure, modes, model.band)
-    score, state = seen(question, prepared.score, only, prepared.search.setup.f_max)
+    score, state = seen(question, prepared.score, only, prepared.problem.setup.f_max)
     assert isinstance(score, Poles)
     _, mode = score.forced(state, np.ones(n, bool) if real is None else real)
     return mode, value

@@ -22,7 +22,7 @@ REACH = 2.5  # the basis holds modes up to this many times the highest frequency
 
 
 @dataclass(frozen=True, eq=False)
-class Workbench:
+class ReducedProblem:
     """One structure, its reduced model, and where unknown things may sit.
 
     Attributes
@@ -65,10 +65,10 @@ class Workbench:
         return model.split_for(effect, x)
 
 
-def workbench(
+def reduced_problem(
     model: Modelled | Assembly, f_max: float, rows: sp.csr_array | None = None, *, most: int = 200,
     groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
-) -> Workbench:  # fmt: skip
+) -> ReducedProblem:  # fmt: skip
     """Make a structure ready.
 
     Parameters
@@ -98,7 +98,7 @@ def workbench(
     shells = shell_groups(built, groups)
     grids = shell_grids(shells)
     chosen = grids.only(farthest_point_sample(grids.point, most))
-    return Workbench(
+    return ReducedProblem(
         built,
         shells,
         reduce(shells, basis),

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..fem.modelled import Modelled, node_points
-from .hypothesis_fit import Trial
+from .hypothesis_fit import HypothesisFit
 from .likelihood import LN10, Poles, Responses
 from .question import Prepared, Question
 from .reduced_model import State
@@ -25,7 +25,7 @@ def written_Q(
     model: Modelled,
     sets: tuple[np.ndarray, ...],
     real: np.ndarray | None = None,
-    fault: Trial | None = None,
+    fault: HypothesisFit | None = None,
 ) -> tuple[float, ...]:
     """Q of a structure on each of these sets of samples.
 
@@ -37,7 +37,7 @@ def written_Q(
 
     Where the gain is unknown, the mean level over the fitted samples is taken out as well.
     """
-    data, state = seen(question, prepared.score, model, prepared.search.setup.f_max)
+    data, state = seen(question, prepared.score, model, prepared.problem.setup.f_max)
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
