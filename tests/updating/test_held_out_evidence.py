@@ -31,7 +31,7 @@ def search_of(data):
     return SimpleNamespace(data=data, mass_measurement=SCALES)
 
 
-def trial_of(reduced, data, effects, x):
+def fit_of(reduced, data, effects, x):
     state = evaluate(reduced.model, effects[:1], np.zeros(1))
     fit = fitted(reduced.model, effects, data.allowing_errors(state), SCALES, np.asarray(x))
     return HypothesisFit(effects[-1], fit, reduced.model)
@@ -45,7 +45,8 @@ def faulty(reduced, seen):
     H[:, 2] *= 1.2
     data = replace(seen, values=H)
     fault = sensor_fault("c", 2, 4, 1, 0.2)
-    return data, trial_of(reduced, data, [E], [0.0]), trial_of(reduced, data, [E, fault], [0.0, 0.2])
+    null = fit_of(reduced, data, [E], [0.0])
+    return data, null, fit_of(reduced, data, [E, fault], [0.0, 0.2])
 
 
 def test_predictive_density_is_that_of_the_joint_gaussian(reduced, faulty):
@@ -107,6 +108,6 @@ def test_an_effect_that_is_none_is_not_borne_out(reduced, faulty):
     """A fault of another channel predicts lines and held-out data no better."""
     data, null, _ = faulty
     E = ordinary(reduced.groups, "E", [0])
-    wrong = trial_of(reduced, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
+    wrong = fit_of(reduced, data, [E, sensor_fault("a", 0, 4, 1, 0.0)], [0.0, 0.0])
     heard = held_out_evidence(search_of(data), ~data.use, null, wrong)
     assert heard.lines < 5

@@ -68,7 +68,11 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
     scores = FittedScores(1.0, harm, 1.0)
     monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: (scores, scores))
-    null = HypothesisFit(Effect(), replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead), hypothesis.model)
+    null = HypothesisFit(
+        Effect(),
+        replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead),
+        hypothesis.model,
+    )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
     problem = SimpleNamespace(mass_measurement=None, labels=())
     judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)

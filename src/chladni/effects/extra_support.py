@@ -69,6 +69,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    ExtraSupport, conceal, candidates=candidates, cards=("CELAS2",),
+    ExtraSupport,
+    conceal,
+    candidates=candidates,
+    cards=("CELAS2",),
     settled_by="lift the structure off whatever touches it there, and measure again",
 )

@@ -59,6 +59,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    PointMass, conceal, candidates=candidates, cards=("CONM2",),
+    PointMass,
+    conceal,
+    candidates=candidates,
+    cards=("CONM2",),
     settled_by="weigh the structure with all that hangs on it",
 )

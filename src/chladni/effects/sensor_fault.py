@@ -90,6 +90,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    SensorFault, conceal, candidates=candidates, no_cards="a fault of the test is not in the deck",
+    SensorFault,
+    conceal,
+    candidates=candidates,
+    no_cards="a fault of the test is not in the deck",
     settled_by="put another sensor there",
 )

@@ -59,6 +59,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    SensorMass, conceal, placed=sensor_mass, cards=("CONM2",),
+    SensorMass,
+    conceal,
+    placed=sensor_mass,
+    cards=("CONM2",),
     settled_by="measure again with half of the sensors taken off",
 )

@@ -53,6 +53,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    Suspension, conceal, placed=suspension, cards=("CELAS2",),
+    Suspension,
+    conceal,
+    placed=suspension,
+    cards=("CELAS2",),
     settled_by="measure again on softer cords",
 )

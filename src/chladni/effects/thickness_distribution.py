@@ -216,6 +216,9 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 FAMILY = Family(
-    ThicknessDistribution, conceal, candidates=candidates, cards=("CQUAD4", "CTRIA3"),
+    ThicknessDistribution,
+    conceal,
+    candidates=candidates,
+    cards=("CQUAD4", "CTRIA3"),
     settled_by="gauge the thickness of the sheet there",
 )

@@ -13,13 +13,15 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     best = diagnosis.found
     if best is None:
         return diagnosis
-    tied = [t for t in diagnosis.hypotheses if t.neg2_log_evidence - best.neg2_log_evidence < TIED]
-    if len(tied) < 2:
+    behind = {
+        t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
+        for t in diagnosis.hypotheses
+    }
+    names = tuple(name for name, gap in behind.items() if 2 * gap < TIED)
+    if len(names) < 2:
         return diagnosis
-    names = tuple(t.effect.name for t in tied)
-    checks = [family(name).settled_by for name in names]
-    check = "; or ".join(c for c in checks if c)
-    odds = ", ".join(f"e^{(t.neg2_log_evidence - best.neg2_log_evidence) / 2:.0f} times {t.effect.name}" for t in tied[1:])
+    check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)
+    odds = ", ".join(f"e^{behind[name]:.0f} times {name}" for name in names[1:])
     note = (
         f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
         f"probable as {odds}); what would settle it: {check}"

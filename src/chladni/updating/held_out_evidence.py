@@ -60,8 +60,9 @@ def held_out_evidence(
     """
     held = None
     if unseen.any():
-        together = _with_all(problem, null, unseen)
-        held = together.gain(null, hypothesis) - (null.neg2_log_evidence - hypothesis.neg2_log_evidence)
+        both = _with_all(problem, null, unseen)
+        fitted_alone = null.neg2_log_evidence - hypothesis.neg2_log_evidence
+        held = both.two_log_bayes_factor(null, hypothesis) - fitted_alone
     if not isinstance(null.data, Responses) or null.data.error is None:
         return HeldOutEvidence(held)
     by_line = _folds_of_lines(null.data)
@@ -87,9 +88,11 @@ class _All:
         return before - after
 
     def _evidence(self, hypothesis: HypothesisFit) -> float:
-        data = self.data.over(hypothesis.model)
-        fit = hypothesis.fit
-        return fitted(hypothesis.model, fit.effects, data, self.problem.mass_measurement, fit.x, ROUGH).neg2_log_evidence
+        model, fit = hypothesis.model, hypothesis.fit
+        mass = self.problem.mass_measurement
+        return fitted(
+            model, fit.effects, self.data.over(model), mass, fit.x, ROUGH
+        ).neg2_log_evidence
 
 
 def _with_all(problem: UpdatingProblem, null: HypothesisFit, unseen: np.ndarray) -> _All:

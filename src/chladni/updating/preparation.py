@@ -99,9 +99,7 @@ def _by_responses(question: Question) -> Prepared:
             d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
         ]
         problem = replace(problem, data=data[0])
-    unseen, held = (
-        _left_out(d, held_band, reach, held_sensors) for d in (data[0], data[1])
-    )
+    unseen, held = (_left_out(d, held_band, reach, held_sensors) for d in (data[0], data[1]))
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
     what = _held_in_words(names, held_band)
     notes = [
