@@ -3,7 +3,8 @@
 An effect is asked twice, each time beside calibration alone and with the learned error of the
 model in both:
 
-- the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences;
+- the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences about the
+  fit that is there;
 - folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. For
   residuals r of covariance C, r_b given all others has the precision P = (C⁻¹)_bb and the mean
   r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12), here with the
@@ -12,14 +13,15 @@ model in both:
 Data that cannot feel the effect are predicted alike with and without it and have no vote.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .discrepancy import MEDIAN
-from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
+from .discrepancy import learned
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
-from .map_fit import unknowns
+from .map_fit import beside, unknowns
+from .reduced_model import evaluate
 
 BLOCKS = 8  # of neighbouring lines
 
@@ -60,9 +62,10 @@ def held_out_evidence(
     """
     held = None
     if unseen.any():
-        both = _with_all(problem, null, unseen)
-        fitted_alone = null.neg2_log_evidence - hypothesis.neg2_log_evidence
-        held = both.two_log_bayes_factor(null, hypothesis) - fitted_alone
+        data = null.data
+        assert isinstance(data, (Responses, Poles))
+        both = data.using(data.use | unseen)
+        held = _news(problem, null, both) - _news(problem, hypothesis, both)
     if not isinstance(null.data, Responses) or null.data.error is None:
         return HeldOutEvidence(held)
     by_line = _folds_of_lines(null.data)
@@ -75,34 +78,33 @@ def held_out_evidence(
     return HeldOutEvidence(held, sensors, gains[1])
 
 
-@dataclass(frozen=True, eq=False)
-class _All:
-    """Fitted and held-out data together."""
+def _news(problem: UpdatingProblem, hypothesis: HypothesisFit, both: Responses | Poles) -> float:
+    """-2 ln p(held out | fitted), the parameters linear about their fit, up to a constant.
 
-    problem: UpdatingProblem
-    data: Responses | Poles
-
-    def two_log_bayes_factor(self, null: HypothesisFit, hypothesis: HypothesisFit) -> float:
-        """2 ln Bayes factor of a hypothesis on all data, both fitted on from where they are."""
-        before, after = (self._evidence(t) for t in (null, hypothesis))
-        return before - after
-
-    def _evidence(self, hypothesis: HypothesisFit) -> float:
-        model, fit = hypothesis.model, hypothesis.fit
-        mass = self.problem.mass_measurement
-        return fitted(
-            model, fit.effects, self.data.over(model), mass, fit.x, ROUGH
-        ).neg2_log_evidence
-
-
-def _with_all(problem: UpdatingProblem, null: HypothesisFit, unseen: np.ndarray) -> _All:
-    data = null.data
+    ``both`` are the fitted data and those held out.
+    """
+    data = hypothesis.data
     assert isinstance(data, (Responses, Poles))
-    if isinstance(data, Poles):
-        return _All(problem, data.only(data.use | unseen))
-    delta = MEDIAN if data.error is None else data.error.delta
-    every = data.only(data.use | unseen)
-    return _All(problem, every.allowing_errors(null.fit.state, delta))
+    both = both.over(hypothesis.model)
+    if isinstance(both, Poles) and isinstance(data, Poles):
+        both = replace(both, scale=data.scale)
+    return _evidence(problem, hypothesis, both) - _evidence(problem, hypothesis, data)
+
+
+def _evidence(
+    problem: UpdatingProblem, hypothesis: HypothesisFit, data: Responses | Poles
+) -> float:
+    """-2 ln evidence of some data, the parameters linear about the fit that is there."""
+    fit = hypothesis.fit
+    state = evaluate(hypothesis.model, fit.effects, fit.x)
+    r, J = data.scaled(state, True)
+    r0, J0 = beside(fit.effects, problem.mass_measurement, fit.x, state)
+    if isinstance(data, Responses) and data.error is not None:
+        return learned(data.error, r, J, r0, J0).neg2_log_evidence
+    A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
+    cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)
+    widths = 2 * np.log(data.std()[data.use]).sum()
+    return float(cost + np.linalg.slogdet(A)[1] + widths)
 
 
 def _folds_of_lines(data: Responses) -> np.ndarray:

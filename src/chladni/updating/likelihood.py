@@ -59,6 +59,7 @@ class Responses:
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
+    about: State | None = None  # from which the errors of form spread
 
     @property
     def power(self) -> int:
@@ -98,12 +99,20 @@ class Responses:
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
         """The same responses of a model whose form is off by about δ, as seen from a state."""
         plain = self.exactly()
-        data = replace(plain, bent=curvature(plain, state))
+        data = replace(plain, bent=curvature(plain, state), about=state)
         return replace(data, error=discrepancy(data, state).with_delta(delta))
 
     def exactly(self) -> Self:
         """The same responses of a model that is right but for its parameters."""
-        return replace(self, bent=None, error=None)
+        return replace(self, bent=None, error=None, about=None)
+
+    def using(self, use: np.ndarray) -> Self:
+        """Other lines and channels, with the same errors of the model's form."""
+        data = replace(self, use=use)
+        if self.error is None or self.about is None:
+            return data
+        error = discrepancy(data, self.about).with_delta(self.error.delta)
+        return replace(data, error=error)
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread, with the errors of the model's form whitened out."""
@@ -258,6 +267,8 @@ class Poles:
     def only(self, use: np.ndarray) -> Self:
         """The same poles, others in use."""
         return replace(self, use=use)
+
+    using = only  # poles are independent
 
     def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """ln(f_model / f_test) and the model mode of every real pole (n,): none is left alone."""
