@@ -14,8 +14,6 @@ from .result import (
     NamedEffect,
     Remainder,
     Scores,
-    estimate,
-    location,
 )
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
@@ -24,13 +22,12 @@ STRUCTURED = 5.0  # times the spread of the recording: more than that is not noi
 def named_effect(trial: Trial) -> NamedEffect:
     """The effect of a trial, where it is and how large."""
     effect, x = trial.effect, trial.fit.of(trial.effect)
-    rows = effect.reported(x, trial.fit.sd(effect))
     return NamedEffect(
         effect.name,
         effect.claim,
         -trial.S / 2,
-        location(effect.location(x)),
-        tuple(estimate(row) for row in rows),
+        effect.location(x),
+        effect.reported(x, trial.fit.sd(effect)),
     )
 
 
@@ -43,7 +40,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             trial.effect.name,
             -trial.S / 2,
             why_not(trial, best, found is not None, diagnosis.gain(trial)),
-            location(trial.effect.location(trial.fit.of(trial.effect))),
+            trial.effect.location(trial.fit.of(trial.effect)),
         )
         for trial in diagnosis.trials
         if trial is not found
@@ -99,8 +96,8 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         for parameter, row in zip(effect.parameters, rows, strict=True):
             given = parameter.value(parameter.mean)
             called = getattr(effect, "called", "")  # by the user
-            where = f"{called}: {effect.text}" if called not in ("", row["name"]) else effect.text
-            out.append(CalibratedParameter(where, estimate(row), given))
+            where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
+            out.append(CalibratedParameter(where, row, given))
     return tuple(out)
 
 
