@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from ...errors import FileError
+from .uff_sets import FunctionSet, UnitsSet
 
 # code of dataset 164: (metre per file length, newton per file force)
 _POUND, _KILOGRAM_FORCE = 4.4482216152605, 9.80665
@@ -39,12 +40,12 @@ class Meaning:
     factor: float
 
 
-def file_units(header: dict) -> FileUnits:
+def file_units(header: UnitsSet) -> FileUnits:
     """Dataset 164: the named system, or for a user's own (code 9) the factors written there."""
-    known = _SYSTEMS.get(int(header["units_code"]))
+    known = _SYSTEMS.get(header.system)
     if known:
         return FileUnits(*known)
-    return FileUnits(1 / (header["length"] or 1.0), 1 / (header["force"] or 1.0))
+    return FileUnits(1 / (header.length or 1.0), 1 / (header.force or 1.0))
 
 
 def _bare(label: str) -> str:
@@ -93,7 +94,7 @@ def ratio(label: str) -> tuple[str | None, float | None, float | None]:
     return None, None, None
 
 
-def meaning(record: dict, units: FileUnits, where: str) -> Meaning:
+def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
     """Quantity and SI factor of an FRF record: unit labels first, then data types and dataset 164.
 
     Raises
@@ -101,17 +102,17 @@ def meaning(record: dict, units: FileUnits, where: str) -> Meaning:
     FileError
         If the label and the data type contradict each other.
     """
-    typed = _RESPONSE.get(record["ordinate_spec_data_type"])
-    motion_below = record["orddenom_spec_data_type"] in _RESPONSE
-    if record["func_type"] == 5 or (typed and motion_below):
+    typed = _RESPONSE.get(record.ordinate.kind)
+    motion_below = record.denominator.kind in _RESPONSE
+    if record.function == 5 or (typed and motion_below):
         return Meaning("transmissibility", 1.0)
-    said, length, force = ratio(record["ordinate_axis_units_lab"])
+    said, length, force = ratio(record.ordinate.unit)
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
             f"{where}: the data type says {typed}, the unit label "
-            f"{record['ordinate_axis_units_lab']!r} says {said}; state the quantity in the case"
+            f"{record.ordinate.unit!r} says {said}; state the quantity in the case"
         )
-    below = _FORCE.get(_bare(record["orddenom_axis_units_lab"]))
+    below = _FORCE.get(_bare(record.denominator.unit))
     if said == "transmissibility":
         return Meaning(said, length / force if length and force else 1.0)
     force = force or below or units.force
