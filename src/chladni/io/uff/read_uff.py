@@ -28,10 +28,11 @@ from .uff_sets import (
     typed,
 )
 from .uff_source import readable
-from .uff_units import Meaning, file_units, meaning
+from .uff_units import Meaning, check_calibrated, file_units, hertz, meaning
 from .write_uff import write_uff as write_uff
 
 _KINDS = {1: "time", 2: "auto spectrum", 3: "cross spectrum", 9: "psd", 12: "spectrum"}
+_SPECTRA = (2, 3, 9, 12)
 
 
 def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
@@ -47,7 +48,8 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     ------
     FileError
         One sentence with file and dataset number: missing, truncated or empty file, not-a-number,
-        frequency axes that differ, records that repeat each other.
+        frequency axes that differ, records that repeat each other, an abscissa that is no
+        frequency, values in volts.
     """
     path = Path(path)
     pile = Pile(path)
@@ -159,8 +161,13 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
     else:
         named = _KINDS.get(kind, f"function type {kind}")
         reference = input if node else ""
+        try:
+            x = hertz(record, where) if kind in _SPECTRA else record.x
+        except FileError as error:  # nothing compares it: the rest of the file is of use
+            pile.notes.append(f"left out: {error}")
+            return
         unit = record.ordinate.unit
-        pile.functions.append(Function(named, output, reference, record.x, record.y, unit))
+        pile.functions.append(Function(named, output, reference, x, record.y, unit))
 
 
 def _complete(record: FunctionSet, where: str) -> FunctionSet:
@@ -188,6 +195,7 @@ def _take_frf(pile: Pile, record: FunctionSet, dofs: Pair, quantity: str | None)
             f"{where}: repeats {dofs[0]} / {dofs[1]} of dataset {pile.frf[dofs].number}; "
             "put each run into a file of its own"
         )
+    check_calibrated(record, where)
     try:
         said = meaning(record, pile.units, where)
     except FileError:
@@ -199,17 +207,8 @@ def _take_frf(pile: Pile, record: FunctionSet, dofs: Pair, quantity: str | None)
             f"{where}: neither data type nor unit label says what was measured; "
             "state quantity = receptance, mobility, accelerance or transmissibility"
         )
-    f = _hertz(record)
+    f = hertz(record, where)
     pile.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
-
-
-def _hertz(record: FunctionSet) -> np.ndarray:
-    unit = record.abscissa.unit.strip().lower()
-    factor = {"rad/s": 1 / (2 * np.pi), "khz": 1e3}.get(unit, 1.0)
-    f = np.asarray(record.x, float) * factor
-    if np.any(f < 0):
-        raise FileError(f"a frequency of {f.min():g} Hz is negative")
-    return f
 
 
 def _take_nodes(pile: Pile, one: NodeSet) -> None:

@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...errors import FileError
 from .uff_sets import FunctionSet, UnitsSet
 
@@ -22,6 +24,16 @@ _LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.02
 _FORCE = {"n": 1.0, "mn": 1e-3, "kn": 1e3, "lbf": _POUND, "lb": _POUND, "kgf": _KILOGRAM_FORCE}
 _RESPONSE = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _GRAVITY = 9.80665
+_HERTZ = {
+    **dict.fromkeys(("", "hz", "hertz", "1/s", "cps"), 1.0),
+    "khz": 1e3,
+    **dict.fromkeys(("rad/s", "radians/s"), 1 / (2 * np.pi)),
+    **dict.fromkeys(("1/min", "cpm", "rpm", "r/min", "rev/min", "u/min"), 1 / 60),
+}
+_SPEED = ("rpm", "r/min", "rev/min", "u/min")  # a frequency only where the data type says so
+_FREQUENCY = 18  # specific data type; 0 and 1 leave it open
+_ABSCISSA = {17: "time", 19: "rpm", 20: "order"}
+_ELECTRICAL = re.compile(r"[kmunµ]?v|k?volts?|millivolts?|counts?|lsb|p?coulomb|pc")
 
 
 @dataclass(frozen=True)
@@ -117,3 +129,41 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
         return Meaning(said, length / force if length and force else 1.0)
     force = force or below or units.force
     return Meaning(said or typed, (length or units.length) / force)
+
+
+def hertz(record: FunctionSet, where: str) -> np.ndarray:
+    """The abscissa as frequencies [Hz]; of revolutions only where they are said to be a frequency.
+
+    Raises
+    ------
+    FileError
+        If it is something else (a speed, an order, a time), or in a unit that is not known.
+    """
+    kind, unit = record.abscissa.kind, _bare(record.abscissa.unit)
+    needed = f"a function of frequency has data type {_FREQUENCY} and is in Hz, kHz, rad/s or rpm"
+    is_frequency = kind == _FREQUENCY or (kind in (0, 1) and unit not in _SPEED)
+    if unit not in _HERTZ or not is_frequency:
+        named = _ABSCISSA.get(kind)
+        typed = f"data type {kind}" + (f" ({named})" if named else "")
+        raise FileError(f"{where}: its abscissa, {typed}, is in {record.abscissa.unit!r}; {needed}")
+    f = np.asarray(record.x, float) * _HERTZ[unit]
+    if np.any(f < 0):
+        raise FileError(f"{where}: a frequency of {f.min():g} Hz is negative")
+    return f
+
+
+def check_calibrated(record: FunctionSet, where: str) -> None:
+    """Refuse what a front end measured but nobody calibrated.
+
+    Raises
+    ------
+    FileError
+        If the ordinate or its denominator is in volts, counts or a charge.
+    """
+    for axis in (record.ordinate, record.denominator):
+        if any(_ELECTRICAL.fullmatch(part) for part in _bare(axis.unit).split("/")):
+            raise FileError(
+                f"{where}: its values are in {axis.unit!r} and the file holds no calibration; "
+                "export them in units of motion and force (m, mm/s, m/s^2 or g over N or lbf), or "
+                'give them as .npz with their quantity and state gain = "unknown" in the case'
+            )
