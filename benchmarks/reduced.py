@@ -26,7 +26,7 @@ from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import REACH, workbench
+from chladni.updating.reduced_problem import REACH, reduced_problem
 from chladni_specimens.plates import folded_panel
 
 TOP = 380.0  # Hz
@@ -43,16 +43,16 @@ def best(method, repeats):
     return min(times)
 
 
-def effects(bench):
+def effects(reduced):
     """Ten parameters, none of which leaves the model as it is."""
-    places = bench.candidates
+    places = reduced.candidates
     one, other = (places.rows[k : k + 1] for k in (3, 7))
     grids = tuple(int(places.grids[k]) for k in (3, 7))
     mass = strength("m", "kg", 0.05, 1.0, (0.0,))
     spring = strength("k", "N/m", 5e3, 1.0, (0.0,))
-    thin = thickness_distribution(bench.groups, 0, 1)
+    thin = thickness_distribution(reduced.groups, 0, 1)
     return [
-        *(ordinary(bench.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
+        *(ordinary(reduced.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
         MassEffect((mass,), "", grids=grids[:1], rows=one),
         Suspension((spring,), "", grids=grids[1:], rows=other, directions=np.eye(3)[2:]),
         thin,
@@ -63,19 +63,19 @@ def row(name, edge):
     """One line of the table."""
     assembly = folded_panel(0.6, 0.3, 0.04, 0.01, edge, 1e-3)
     begin = time.process_time()
-    bench = workbench(assembly, TOP)
+    reduced = reduced_problem(assembly, TOP)
     ready = time.process_time() - begin
-    chosen = effects(bench)
+    chosen = effects(reduced)
     x = np.full(count(chosen), 0.05)
-    plain = best(lambda: evaluate(bench.model, chosen, x, gradient=False), 10)
-    full_gradient = best(lambda: evaluate(bench.model, chosen, x), 10)
+    plain = best(lambda: evaluate(reduced.model, chosen, x, gradient=False), 10)
+    full_gradient = best(lambda: evaluate(reduced.model, chosen, x), 10)
 
     def solve():
         normal_modes(structure(assembly).system, band=TOP)
 
     full = best(solve, 2 if len(assembly.points) < 10_000 else 1)
-    error = best(lambda: accuracy(bench, bench.model, chosen, x, TOP), 1)
-    n, r = bench.model.basis.shape
+    error = best(lambda: accuracy(reduced, reduced.model, chosen, x, TOP), 1)
+    n, r = reduced.model.basis.shape
     ratios = f"{full / full_gradient:.0f} | {(1 + count(chosen)) * full / full_gradient:.0f}"
     times = (
         f"{1e3 * plain:.1f} | {1e3 * full_gradient:.1f} | {full:.2f} | {error:.2f} | {ready:.1f}"

@@ -7,7 +7,7 @@ import numpy as np
 from chladni.case import load_case
 from chladni.effects.effect import Effect, Parameter
 from chladni.errors import FileError
-from chladni.planning import Linearised, Wishes, find_sensor_candidates
+from chladni.planning import Linearised, PlanSettings, find_sensor_candidates
 from chladni.planning.rattle import openings
 from chladni.planning.whole_plan import motion, mounts_at, seen_at, target_modes
 from chladni.updating.likelihood import Responses
@@ -38,7 +38,7 @@ def specimen(
     """
     model = load_model(Path(case), units)
     places = find_sensor_candidates(model.assembly, candidates, unit=model.unit)
-    target, _, _ = target_modes(model.structure, Wishes(modes=modes))
+    target, _, _ = target_modes(model.structure, PlanSettings(modes=modes))
     mounts, moving = mounts_at(places), motion(model.structure, target)
     labels, seen = mounts.labels[: len(places)], model.seen
     gaps = openings(model.assembly, moving)
@@ -67,13 +67,13 @@ class Recorded:
 
     def __init__(self, case: str) -> None:
         self.prepared = prepared(load_case(case))
-        search = self.prepared.search
+        problem = self.prepared.problem
         score = self.prepared.score
         if not isinstance(score, Responses):
             raise FileError(f"{case}: these environments compare FRFs; the case has none that can")
         self.score = score
         self.effects: tuple[Effect, ...] = tuple(
-            e for e in search.base if not any(e is n for n in search.nuisance)
+            e for e in problem.base if not any(e is n for n in problem.nuisance)
         )
         pairs = [(e, p) for e in self.effects for p in e.parameters]
         self.names = tuple(_name(e, p) for e, p in pairs)
@@ -82,7 +82,7 @@ class Recorded:
 
     def state(self, theta: np.ndarray, gradient: bool = False) -> State:
         """The reduced model at x = mean + sd θ."""
-        model = self.prepared.search.bench.model
+        model = self.prepared.problem.reduced.model
         return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
 
     def linearised(self) -> Linearised:

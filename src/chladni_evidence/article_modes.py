@@ -48,7 +48,7 @@ def article_modes(
     assembly: Assembly,
     rows: np.ndarray,
     loaded: np.ndarray,
-    top: float,
+    f_max: float,
     solver: Solver = "chladni",
     cache: Path | None = None,
     residual_bending: bool = True,
@@ -59,14 +59,14 @@ def article_modes(
     ----------
     rows : points whose motion is wanted
     loaded : points forces act on: ours are exact for static loads there
-    top : highest frequency recorded [Hz]
+    f_max : highest frequency recorded [Hz]
     residual_bending : of our shells; False is another formulation
     """
     rows = np.unique(np.concatenate([rows.ravel(), loaded.ravel()]))
-    ours = _kept((assembly, rows, loaded, top, residual_bending), cache)
+    ours = _kept((assembly, rows, loaded, f_max, residual_bending), cache)
     if solver == "chladni":
         return ours
-    return _completed(*calculix_modes(assembly, BY_CALCULIX, rows, cache), ours, top)
+    return _completed(*calculix_modes(assembly, BY_CALCULIX, rows, cache), ours, f_max)
 
 
 def _kept(
@@ -77,34 +77,34 @@ def _kept(
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
             return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
-    assembly, rows, loaded, top, bending = asked
-    found = _ours(structure(assembly, residual_bending=bending), rows, loaded, top)
+    assembly, rows, loaded, f_max, bending = asked
+    found = _ours(structure(assembly, residual_bending=bending), rows, loaded, f_max)
     if kept is not None:
         write_npz(kept, **{f.name: getattr(found, f.name) for f in fields(ArticleModes)})
     return found
 
 
 def _completed(
-    frequency: np.ndarray, shapes: np.ndarray, ours: ArticleModes, top: float
+    frequency: np.ndarray, shapes: np.ndarray, ours: ArticleModes, f_max: float
 ) -> ArticleModes:
     """CalculiX' modes, and in place of those it was not asked for our own above them.
 
     Without them the flexibility of the higher modes at the shaker would be missing.
     """
-    n = min(len(frequency), int((ours.frequency <= ABOVE * top).sum()))
+    n = min(len(frequency), int((ours.frequency <= ABOVE * f_max).sum()))
     f = np.where(frequency < RIGID, 0.0, frequency)[:n]
     f = np.concatenate([f, ours.frequency[n:]])
     both = np.concatenate([shapes[..., :n], ours.shapes[..., n:]], axis=-1)
     return ArticleModes(f, ours.rows, both, np.zeros((len(f), len(f))))
 
 
-def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, top: float) -> ArticleModes:
+def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, f_max: float) -> ArticleModes:
     """Normal modes and static responses to forces at the loaded points, by Rayleigh and Ritz."""
     system = built.system
     X = built.assembly.points[built.assembly.rows(system.dofs[:, 0])]
-    modes = normal_modes(system, band=ABOVE * top, points=X)
+    modes = normal_modes(system, band=ABOVE * f_max, points=X)
     translations = (6 * np.unique(loaded)[:, None] + np.arange(3)).ravel()
-    extra = attachments(shifted(system, top / 4, X), built.T[translations])
+    extra = attachments(shifted(system, f_max / 4, X), built.T[translations])
     basis = orthonormal(system.M, [modes.shapes, extra], kept=len(modes))
     lam, Q = eigh(basis.T @ (system.K @ basis))
     shapes = basis @ Q

@@ -14,7 +14,7 @@ from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
-from chladni.planning import Wishes, plan
+from chladni.planning import PlanSettings, plan
 from chladni.planning.measurement_lines import TABLE_3, even_lines, stage_lines
 from chladni_specimens.forms import FORMS
 from chladni_specimens.holed_plate import holed_plate
@@ -46,7 +46,7 @@ class Bench:
     fit, held : (low, high)    bands to fit and to hold out [Hz]
     first : float              first elastic mode of the deck [Hz]
     sheets : tuple of str      parts an effect may sit on
-    grain, rolled              direction of rolling, parts that may be orthotropic
+    material_axis, rolled      direction of rolling, parts that may be orthotropic
     """
 
     name: str
@@ -60,7 +60,7 @@ class Bench:
     held: tuple[float, float]
     first: float
     sheets: tuple[str, ...]
-    grain: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    material_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
     rolled: tuple[str, ...] = ()
 
     @property
@@ -93,7 +93,7 @@ def form_bench(name: str, seed: int) -> Bench:
         held=(float(ends[1]), float(ends[2])),
         first=float(f[0]),
         sheets=tuple(p.name for p in deck.parts if p.name in every.parts),
-        grain=form.grain,
+        material_axis=form.material_axis,
         rolled=form.rolled,
     )
 
@@ -117,9 +117,9 @@ def panel_bench(name: str, seed: int) -> Bench:
         outputs=every.only(_spread(every, spec.sensors, rng)),
         drive=every.only(_driven(deck, every, moving, rng)),
         hangers=_hung(every),
-        lines=np.arange(4.0, spec.top, 0.25),
+        lines=np.arange(4.0, spec.f_max, 0.25),
         fit=spec.fit,
-        held=(spec.fit[1], spec.top - 10),
+        held=(spec.fit[1], spec.f_max - 10),
         first=float(modes.frequency[6]),
         sheets=tuple(p.name for p in deck.parts),
         rolled=tuple(p.name for p in deck.parts),
@@ -130,7 +130,7 @@ def panel_bench(name: str, seed: int) -> Bench:
 def tailgate_bench() -> Bench:
     """The tailgate at 20 mm: sensors, shaker and cords as planned, the thesis' lines."""
     deck = tailgate(TailgateDesign(size=0.020))
-    found = plan(deck, Wishes(sensors=30))
+    found = plan(deck, PlanSettings(sensors=30))
     m = found.mounts
     sheets = tuple(p.name for p in deck.parts if isinstance(p.section, ShellSection))
 
@@ -157,7 +157,7 @@ def tailgate_bench() -> Bench:
         held=(200.0, 300.0),
         first=float(found.modal.frequency[0]),
         sheets=tuple(s for s in sheets if s in ("inner", "outer upper", "outer lower")),
-        grain=(0.0, 1.0, 0.0),
+        material_axis=(0.0, 1.0, 0.0),
         rolled=sheets,
     )
 
@@ -202,8 +202,8 @@ def _label(grid: int, direction: np.ndarray) -> str:
 
 def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
     """Places far from each other, shaken a little by the seed."""
-    jitter = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
-    return farthest_point_sample(every.points + jitter, count)
+    noise = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
+    return farthest_point_sample(every.points + noise, count)
 
 
 def _driven(

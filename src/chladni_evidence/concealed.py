@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.article import Front, measured
+from chladni.bench.article import MeasurementChain, measured
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.effects import registry
@@ -50,7 +50,7 @@ class Specimen:
 
     name: str
     build: Callable[[int], Assembly]
-    top: float  # highest recorded frequency [Hz]
+    f_max: float  # highest recorded frequency [Hz]
     fit: tuple[float, float]  # band to fit [Hz]
     sensors: int = 20
 
@@ -161,17 +161,17 @@ def _recording(
     built: Structure, article: Article, drive: int, specimen: Specimen, rng: np.random.Generator,
 ) -> FRF:  # fmt: skip
     """Accelerance with noise at the deck's sensor grids."""
-    modes = normal_modes(built.system, band=2.5 * specimen.top)
+    modes = normal_modes(built.system, band=2.5 * specimen.f_max)
     zeta = 0.007 * np.exp(0.3 * rng.normal(size=len(modes.frequency)))
     outputs = article.outputs
     ids = np.array(article.grids_at(outputs))
     at = np.array(article.grids_at(np.array([drive])))
     phi_o = built.along(ids, np.tile([0.0, 0, 1], (len(ids), 1))) @ modes.shapes
     phi_i = built.along(at, np.array([[0.0, 0, 1]])) @ modes.shapes
-    f = np.arange(4.0, specimen.top, 0.25)
-    front = Front(noise=0.01, floor=0.001)
+    f = np.arange(4.0, specimen.f_max, 0.25)
+    chain = MeasurementChain(noise=0.01, floor=0.001)
     labels = tuple(f"{g}:+Z" for g in outputs)
-    return measured(modes.with_damping(zeta), phi_o, phi_i, f, front, rng, labels, (f"{drive}:+Z",))
+    return measured(modes.with_damping(zeta), phi_o, phi_i, f, chain, rng, labels, (f"{drive}:+Z",))
 
 
 def _case(specimen: Specimen, mass: float, hangers: np.ndarray) -> str:
@@ -192,5 +192,5 @@ fit = [{low}, {high}]
 
 [held_out]
 sensors = 4
-band = [{high}, {specimen.top - 10}]
+band = [{high}, {specimen.f_max - 10}]
 """

@@ -28,9 +28,9 @@ class Site:
     outputs : Spots        where it is measured
     hangers : (k, 3)       places of the cords [m]
     mass : float           [kg]
-    first, top : float     first elastic mode, highest frequency of the fitted band [Hz]
+    first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
     sheets : tuple of str  parts an effect may sit on
-    grain, rolled :        direction of rolling, and the parts that may be orthotropic
+    material_axis, rolled :direction of rolling, and the parts that may be orthotropic
     """
 
     article: Assembly
@@ -38,9 +38,9 @@ class Site:
     hangers: np.ndarray
     mass: float
     first: float
-    top: float
+    f_max: float
     sheets: tuple[str, ...]
-    grain: np.ndarray
+    material_axis: np.ndarray
     rolled: tuple[str, ...]
 
     @property

@@ -97,9 +97,9 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
         m = _sheet(a, p)
         G = m.shear_modulus * shear
         E1, E2 = m.E * np.exp(ratio / 2), m.E * np.exp(-ratio / 2)
-        grain = Orthotropic(E1, E2, m.nu * np.sqrt(E1 / E2), G, m.shear_modulus, m.shear_modulus,
-                            m.rho)  # fmt: skip
-        parts[p] = parts[p].with_section(membrane=grain, bending=grain)
+        Gz, nu12 = m.shear_modulus, m.nu * np.sqrt(E1 / E2)
+        orthotropic = Orthotropic(E1, E2, nu12, G, Gz, Gz, m.rho)
+        parts[p] = parts[p].with_section(membrane=orthotropic, bending=orthotropic)
     first = _sheet(a, rolled[0])
     truth = {
         "E1": first.E * np.exp(ratio / 2),
@@ -108,9 +108,9 @@ def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
         "parts": list(site.rolled),
     }
     mine = np.isin(a.shells.part, rolled) & (
-        np.abs(cell_normals(a.points, a.shells.nodes) @ site.grain) < STEEP
+        np.abs(cell_normals(a.points, a.shells.nodes) @ site.material_axis) < STEEP
     )
-    shells = replace(a.shells, axis=np.where(mine[:, None], site.grain, a.shells.axis))
+    shells = replace(a.shells, axis=np.where(mine[:, None], site.material_axis, a.shells.axis))
     return Hidden(replace(a.with_parts(tuple(parts)), shells=shells), truth)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.article import Front, recorded
+from chladni.bench.article import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.effects.ordinary import value
 from chladni.errors import ModelError
@@ -36,7 +36,7 @@ TWICE = 2.0  # an effect moves the responses at least this many times as far as 
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
 NOTHING = 0.02  # an effect that moves less is none: a bad draw [rms decades]
 GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
-FRONT = Front(noise=0.01, floor=0.001)
+CHAIN = MeasurementChain(noise=0.01, floor=0.001)
 DAMPING_SPREAD = 0.3  # of ln ζ between modes
 LIGHT = 5e-4  # error of the balance, relative
 
@@ -104,7 +104,7 @@ def made_case(bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None 
     hidden, effect, size = _sized(rig, site, kind, [seed, *kind.encode()], own, scatter, band)
     solver: Solver = "calculix" if mesh == "calculix" else "chladni"
     H, modes = rig.responses(hidden, bench.lines, solver)
-    frf = recorded(H, bench.lines, FRONT, noise, bench.outputs.labels, bench.drive.labels)
+    frf = recorded(H, bench.lines, CHAIN, noise, bench.outputs.labels, bench.drive.labels)
     frf = _spoiled(frf, hidden)
     weight = mass_properties(hidden.article)[0] - hidden.unweighed
     truth = {
@@ -140,7 +140,7 @@ def _site(bench: Bench, article: Assembly) -> Site:
         bench.first,
         bench.fit[1],
         bench.sheets,
-        np.array(bench.grain),
+        np.array(bench.material_axis),
         bench.rolled,
     )
 

@@ -52,7 +52,7 @@ def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     row, rows = _patch(site, rng)
     n = point_normals(site.article.points, site.article.shells.nodes)[rows]
     k = 0.03 * site.scale * size
-    relaxed, tau = float(rng.uniform(4.0, 8.0)), 1 / (2 * np.pi * np.sqrt(site.first * site.top))
+    relaxed, tau = float(rng.uniform(4.0, 8.0)), 1 / (2 * np.pi * np.sqrt(site.first * site.f_max))
 
     def stiffness(s: np.ndarray) -> np.ndarray:
         each = k / len(rows) * (1 + relaxed * s * tau / (1 + s * tau))
@@ -73,7 +73,7 @@ def resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     row = site.row(rng)
     n = site.normal(row)
     m = float(rng.uniform(0.005, 0.01)) * site.mass * size
-    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.top))))
+    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
     k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
 
     def stiffness(s: np.ndarray) -> np.ndarray:

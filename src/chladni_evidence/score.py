@@ -37,7 +37,7 @@ def scored(found: DiagnosisResult, truth: Row) -> Row:
         "place_mm": place,
         "ratio": _over(held.with_effect, held.calibrated),
         "fine": _over(held.with_mesh_error, held.calibrated_with_mesh_error),
-        "gain": agreement.largest_gain or 0.0,
+        "gain": agreement.largest_two_log_bayes_factor or 0.0,
         "covered": covered,
     }
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.bench.article import Front, measured
+from chladni.bench.article import MeasurementChain, measured
 from chladni.dynamics.frf import transfer
 from chladni.dynamics.modes import ModalModel
 
@@ -15,9 +15,9 @@ OUT = np.array([[1.0, -0.5, 0.8], [0.2, 0.9, -1.1]])
 IN = np.array([[0.7, 0.4, 0.3]])
 
 
-def recorded(front, seed=0):
+def recorded(chain, seed=0):
     rng = np.random.default_rng(seed)
-    return measured(MODES, OUT, IN, F, front, rng, ("1:+Z", "2:+Z"), ("1:+Z",))
+    return measured(MODES, OUT, IN, F, chain, rng, ("1:+Z", "2:+Z"), ("1:+Z",))
 
 
 def exact():
@@ -31,7 +31,7 @@ def exact():
 
 
 def test_without_noise_it_is_the_response():
-    found = recorded(Front(0.0, 0.0))
+    found = recorded(MeasurementChain(0.0, 0.0))
     s = 2j * np.pi * F
     due = transfer(MODES, OUT, IN, s) * s[:, None, None] ** 2
     np.testing.assert_allclose(found.values, due, rtol=1e-12)
@@ -40,10 +40,13 @@ def test_without_noise_it_is_the_response():
     np.testing.assert_array_equal(found.variance, 0.0)
 
 
-@pytest.mark.parametrize("front", [Front(0.02, 0.0), Front(0.0, 0.01), Front(0.01, 0.003)])
-def test_noise_is_what_it_says(front):
+@pytest.mark.parametrize(
+    "chain",
+    [MeasurementChain(0.02, 0.0), MeasurementChain(0.0, 0.01), MeasurementChain(0.01, 0.003)],
+)
+def test_noise_is_what_it_says(chain):
     """E|e|² is the variance given: over 8000 numbers their mean ratio is 1 within 5 sigma."""
-    found = recorded(front)
+    found = recorded(chain)
     ratio = np.abs(found.values - exact()) ** 2 / found.variance
     assert ratio.mean() == pytest.approx(1.0, abs=5 / np.sqrt(ratio.size))
 
@@ -52,11 +55,11 @@ def test_noise_levels():
     """``noise`` of each line's magnitude, ``floor`` of the channel's rms."""
     H = exact()
     np.testing.assert_allclose(
-        np.sqrt(recorded(Front(0.02, 0.0)).variance), 0.02 * np.abs(H), rtol=1e-9
+        np.sqrt(recorded(MeasurementChain(0.02, 0.0)).variance), 0.02 * np.abs(H), rtol=1e-9
     )
     rms = np.sqrt((np.abs(H) ** 2).mean(axis=0, keepdims=True))
     np.testing.assert_allclose(
-        np.sqrt(recorded(Front(0.0, 0.01)).variance),
+        np.sqrt(recorded(MeasurementChain(0.0, 0.01)).variance),
         np.broadcast_to(0.01 * rms, H.shape),
         rtol=1e-9,
     )
@@ -64,7 +67,7 @@ def test_noise_levels():
 
 def test_noise_has_no_preferred_phase():
     """Real and imaginary part of the noise share its variance and are uncorrelated."""
-    found = recorded(Front(0.01, 0.003))
+    found = recorded(MeasurementChain(0.01, 0.003))
     e = ((found.values - exact()) / np.sqrt(found.variance)).ravel()
     bound = 5 / np.sqrt(e.size)
     assert abs(np.mean(e**2)) < 1.5 * bound
@@ -72,5 +75,5 @@ def test_noise_has_no_preferred_phase():
 
 
 def test_seeds_differ():
-    a, b = recorded(Front(), 0), recorded(Front(), 1)
+    a, b = recorded(MeasurementChain(), 0), recorded(MeasurementChain(), 1)
     assert np.all(a.values != b.values)

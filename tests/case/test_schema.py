@@ -153,17 +153,18 @@ def asked(folder: Path, text: str, sensors: str = SENSORS) -> str:
         ready = prepare(question(case))
     except ChladniError as error:
         return f"refused: {error}"
-    search, mark = ready.search, hashlib.sha256()
-    for array in (search.bench.model.K0, search.bench.model.M0, search.bench.frequency):
+    problem, mark = ready.problem, hashlib.sha256()
+    for array in (problem.reduced.model.K0, problem.reduced.model.M0, problem.reduced.frequency):
         mark.update(np.ascontiguousarray(array).tobytes())
-    for data in (search.data, ready.score):
+    for data in (problem.data, ready.score):
         for array in vars(data).values():
             if isinstance(array, np.ndarray):
                 mark.update(np.ascontiguousarray(array).tobytes())
-    for effect in search.base:
+    for effect in problem.base:
         if effect.kind == "ordinary" or effect.name == "gain":
             mark.update(effect_bytes(effect))
-    mark.update(repr((search.weighing, search.setup.hangers, search.setup.sensors)).encode())
+    known = (problem.mass_measurement, problem.setup.hangers, problem.setup.sensors)
+    mark.update(repr(known).encode())
     mark.update(repr((ready.held.tolist(), ready.what, ready.notes)).encode())
     mark.update(repr([case.said(c) for c in COMMANDS]).encode())
     model = modelled(case.tested(case.assembly), 200.0)

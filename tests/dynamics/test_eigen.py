@@ -92,9 +92,9 @@ def test_a_cut_through_equal_modes_is_no_error():
 
 
 def test_band_finds_all_below(shell_box):
-    top = 0.5 * np.sum(normal_modes(shell_box, 20).frequency[[14, 15]])
-    assert len(normal_modes(shell_box, band=top)) == 15
-    assert len(normal_modes(shell_box, 9, band=top)) == 9
+    f_max = 0.5 * np.sum(normal_modes(shell_box, 20).frequency[[14, 15]])
+    assert len(normal_modes(shell_box, band=f_max)) == 15
+    assert len(normal_modes(shell_box, 9, band=f_max)) == 9
     at_a_mode = normal_modes(shell_box, 20).frequency[14]
     assert len(normal_modes(shell_box, band=at_a_mode)) == 15
     assert len(normal_modes(line(900, free=False), band=1e-3)) == 0

@@ -15,7 +15,7 @@ from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed
 from chladni.effects.model_families import model_families
-from chladni.effects.ordinary import gain, ordinary, scatter
+from chladni.effects.ordinary import channel_gain, ordinary, random_field
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
@@ -29,7 +29,7 @@ from chladni.geometry.refine import refined
 from chladni.model.assembly import Assembly
 from chladni.model.free_parameter import FreeParameter
 from chladni.updating.reduced_model import Reduced, evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
@@ -53,22 +53,22 @@ class Case:
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return workbench(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
+def reduced():
+    return reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
 
 
 @pytest.fixture(scope="module")
-def cases(bench):
-    groups = bench.groups
+def cases(reduced):
+    groups = reduced.groups
     corners = (1, 7, 57, 63)
     setup = Setup(tuple(((g, 1.0),) for g in corners), (7, 63), float(groups.weight.sum()), TOP)
-    where = Surroundings(groups, bench.grids, bench.candidates, setup)
-    k = bench.grids.position(25)
+    where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
+    k = reduced.grids.position(25)
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
     ortho = material_axes(where)[0]
-    over = mesh.mesh_error(solved(bench.structure, 2 * TOP), TOP)
-    own = mesh.jitter(solved(bench.structure, 2 * TOP), TOP, over)
-    waves = scatter(groups, "t", 0.03)
+    over = mesh.mesh_error(solved(reduced.structure, 2 * TOP), TOP)
+    own = mesh.modal_discrepancy(solved(reduced.structure, 2 * TOP), TOP, over)
+    waves = random_field(groups, "t", 0.03)
     n = len(waves.parameters)
     means = np.array([p.mean for p in ortho.parameters])
     found = {
@@ -76,7 +76,7 @@ def cases(bench):
         "rho": (ordinary(groups, "rho", [0]), [-0.05], [0]),
         "t": (ordinary(groups, "t", [0]), [0.04], [0]),
         "scatter": (waves, np.cos(1 + np.arange(n)), np.zeros(n)),
-        "gain": (gain(CHANNELS, 0.5), [0.3], [0]),
+        "gain": (channel_gain(CHANNELS, 0.5), [0.3], [0]),
         "orthotropic-material": (ortho, [0.18, -0.22, 0.1, means[3] + 0.1], means),
         "point-mass": (PointMass.near(where, k), [0.2, 0.1, -0.1], [-20, 0, 0]),
         "extra-support": (ExtraSupport.near(where, k), [-1, 0, 0], [-20, 0, 0]),
@@ -89,12 +89,12 @@ def cases(bench):
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
-    found["family"] = (model_families(bench.structure)[0], [0.3], [0])
+    found["family"] = (model_families(reduced.structure)[0], [0.3], [0])
     number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
     found["freed"] = (freed(groups, number), [0.2], [0])
     return {
         name: Case(
-            e, np.array(x, float), np.array(idle, float), bench.model_for(e, np.array(x, float))
+            e, np.array(x, float), np.array(idle, float), reduced.model_for(e, np.array(x, float))
         )
         for name, (e, x, idle) in found.items()
     }
@@ -180,10 +180,10 @@ WRITTEN = [n for n in NAMES if n not in IDLE]
 
 
 @pytest.mark.parametrize("name", WRITTEN)
-def test_reduced_agrees_with_the_full_structure(name, cases, bench):
+def test_reduced_agrees_with_the_full_structure(name, cases, reduced):
     case = cases[name]
     got = hertz(evaluate(case.model, [case.effect], case.x, False).lam[FLEXIBLE])
-    expected = full(case.effect.apply(bench.structure.assembly, case.x))
+    expected = full(case.effect.apply(reduced.structure.assembly, case.x))
     within = 0.005 if name == "orthotropic-material" else 0.003
     assert_allclose(got, expected, rtol=within)
 
@@ -198,33 +198,33 @@ def test_support_between_grids_keeps_its_sum_and_its_place(cases):
         assert_allclose(centre, support.patch.size * np.array(at), atol=1e-12)
 
 
-def test_scatter_agrees_with_the_same_thickness_in_every_shell(cases, bench):
-    case, shells = cases["scatter"], bench.structure.assembly.shells
-    factor = np.exp(case.effect.functions @ case.x)[bench.groups.group]
+def test_scatter_agrees_with_the_same_thickness_in_every_shell(cases, reduced):
+    case, shells = cases["scatter"], reduced.structure.assembly.shells
+    factor = np.exp(case.effect.functions @ case.x)[reduced.groups.group]
     thick = replace(shells, thickness=shells.thickness * factor[:, None])
     got = hertz(evaluate(case.model, [case.effect], case.x, False).lam[FLEXIBLE])
-    assert_allclose(got, full(replace(bench.structure.assembly, shells=thick)), rtol=0.003)
+    assert_allclose(got, full(replace(reduced.structure.assembly, shells=thick)), rtol=0.003)
 
 
-def test_whole_mesh_error_leads_to_the_refined_frequencies(cases, bench):
+def test_whole_mesh_error_leads_to_the_refined_frequencies(cases, reduced):
     case = cases["mesh-error"]
     got = hertz(evaluate(case.model, [case.effect], np.ones(1), False).lam[FLEXIBLE])
-    assert_allclose(got, full(refined(bench.structure.assembly)), rtol=0.003)
+    assert_allclose(got, full(refined(reduced.structure.assembly)), rtol=0.003)
 
 
-def test_jitter_moves_every_mode_by_itself(cases):
+def test_modal_discrepancy_moves_every_mode_by_itself(cases):
     case = cases["jitter"]
     state = evaluate(case.model, [case.effect], case.x, False)
     n = len(case.x)
     assert_allclose(np.sort(case.effect.lam * (1 + case.x)), state.lam[6 : 6 + n], rtol=1e-8)
 
 
-def test_weight_is_what_the_written_structure_weighs(cases, bench):
+def test_weight_is_what_the_written_structure_weighs(cases, reduced):
     for name in ("rho", "t", "point-mass", "extra-support", "orthotropic-material"):
         case = cases[name]
-        system = structure(case.effect.apply(bench.structure.assembly, case.x)).system
-        d = structure(bench.structure.assembly).along(
-            bench.structure.assembly.ids, np.tile([0, 0, 1.0], (63, 1))
+        system = structure(case.effect.apply(reduced.structure.assembly, case.x)).system
+        d = structure(reduced.structure.assembly).along(
+            reduced.structure.assembly.ids, np.tile([0, 0, 1.0], (63, 1))
         )
         rigid = d.T @ np.ones(63)
         weight = evaluate(case.model, [case.effect], case.x, False).weight
@@ -256,8 +256,8 @@ def test_reversed_channel_is_reported_with_its_sign(cases):
     assert_allclose(fault.outputs(np.zeros(1)).value[1], 1j * np.pi / np.log(10))
 
 
-def test_groups_hold_all_of_the_shells(bench):
-    groups = shell_groups(bench.structure, 16)
+def test_groups_hold_all_of_the_shells(reduced):
+    groups = shell_groups(reduced.structure, 16)
     assert len(groups) == 16
     assert_allclose(groups.area.sum(), 0.12)
     assert_allclose(groups.weight.sum(), 7850 * 0.12 * 1.5e-3)

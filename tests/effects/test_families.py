@@ -12,7 +12,7 @@ from chladni.effects import registry
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.family import Article
-from chladni.effects.ordinary import ordinary, scatter
+from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.surroundings import Setup
 from chladni.fem.assemble import structure
@@ -21,10 +21,10 @@ from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
 from chladni.units import UNITS
 from chladni.updating.candidates import UpdatingContext
-from chladni.updating.hypothesis_fit import Search, Trial, fitted
+from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
@@ -47,8 +47,8 @@ def deck():
 
 
 @pytest.fixture(scope="module")
-def bench(deck):
-    return workbench(deck, TOP)
+def reduced(deck):
+    return reduced_problem(deck, TOP)
 
 
 @pytest.fixture(scope="module")
@@ -56,33 +56,33 @@ def setup(deck):
     return Setup(tuple(((int(g), 1.0),) for g in SENSORS), (7, 63), mass_properties(deck)[0], TOP)
 
 
-def searched(bench, data, setup):
+def updating_context(reduced, data, setup):
     """A search with E free, and its null."""
-    base = (ordinary(bench.groups, "E", [0]), scatter(bench.groups, "t", 0.01))
+    base = (ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01))
     labels = tuple(f"{g}:+Z" for g in SENSORS)
-    search = Search(bench, data, None, base, (), setup, labels)
-    fit = fitted(bench.model, base, data, None, search.mean())
-    return UpdatingContext(search, Trial(Effect(), fit, bench.model))
+    problem = UpdatingProblem(reduced, data, None, base, (), setup, labels)
+    fit = fitted(reduced.model, base, data, None, problem.mean())
+    return UpdatingContext(problem, HypothesisFit(Effect(), fit, reduced.model))
 
 
 @pytest.fixture(scope="module")
-def by_responses(bench, setup):
+def by_responses(reduced, setup):
     """A plate 4 % stiffer than the model, with one corner sensor at half its level."""
-    rows = bench.grids.rows[[bench.grids.position(g) for g in SENSORS]]
+    rows = reduced.grids.rows[[reduced.grids.position(g) for g in SENSORS]]
     s = 2 * np.pi * np.linspace(30, TOP, 50) * (0.05 + 1j)
     use = np.ones((50, len(SENSORS)), bool)
     empty = Responses(np.ones((50, len(SENSORS), 1), complex), s, rows, rows[[4]], use)
-    data = empty.over(bench.model)
-    stiffer = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.04]))
+    data = empty.over(reduced.model)
+    stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
     gains = np.where(np.arange(len(SENSORS)) == 2, 0.5, 1.0)[:, None]
-    return searched(bench, replace(data, values=data.model(stiffer) * gains), setup)
+    return updating_context(reduced, replace(data, values=data.model(stiffer) * gains), setup)
 
 
 @pytest.fixture(scope="module")
-def by_poles(bench, setup):
-    f = bench.frequency[FLEXIBLE] * 1.02
+def by_poles(reduced, setup):
+    f = reduced.frequency[FLEXIBLE] * 1.02
     every = np.ones(len(f), bool)
-    return searched(bench, Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP)), setup)
+    return updating_context(reduced, Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP)), setup)
 
 
 @pytest.fixture(params=NAMES)
@@ -139,7 +139,7 @@ def test_candidates_begin_at_the_nominal_and_at_the_calibrated_model(by_response
 
 
 @pytest.mark.parametrize("kind", [PointMass, ExtraSupport])
-def test_begins_anew_where_it_moved_to(bench, by_responses, kind):
+def test_begins_anew_where_it_moved_to(reduced, by_responses, kind):
     """Half a patch off its start it stays; a grid off, it begins at the grid it moved to."""
     where = by_responses.where
     effect = kind.near(where, where.grids.position(25))
@@ -152,15 +152,15 @@ def test_begins_anew_where_it_moved_to(bench, by_responses, kind):
     again, start = effect.recentred(x, where)
     assert again.grids == (26,)
     assert again.trials_factor == len(where.places)
-    model = bench.model_for(effect, x)
+    model = reduced.model_for(effect, x)
     moved, anew, old = lam(model, effect, x), lam(model, again, start), np.array([0.3, 0.0, 0.0])
     assert np.abs(anew - moved).max() < 0.5 * np.abs(lam(model, effect, old) - moved).max()
 
 
-def test_does_nothing_at_its_nominal_parameters(bench, proposed):
+def test_does_nothing_at_its_nominal_parameters(reduced, proposed):
     for c in proposed:
         idle = np.array([p.nominal for p in c.effect.parameters])
-        model = bench.model_for(c.effect, c.start)
+        model = reduced.model_for(c.effect, c.start)
         state = evaluate(model, [c.effect], idle, False)
         without = evaluate(model, [], np.zeros(0), False)
         assert_allclose(state.lam[FLEXIBLE], without.lam[FLEXIBLE], rtol=1e-6)
@@ -170,18 +170,18 @@ def test_does_nothing_at_its_nominal_parameters(bench, proposed):
             assert_allclose(state.offset, 0, atol=1e-12)
 
 
-def test_acts_elsewhere(bench, proposed):
+def test_acts_elsewhere(reduced, proposed):
     for c in proposed:
-        model, x = bench.model_for(c.effect, c.start), acting(c)
+        model, x = reduced.model_for(c.effect, c.start), acting(c)
         moved = np.abs(lam(model, c.effect, x) / lam(model, Effect(), x[:0]) - 1).max() > 1e-4
         change = c.effect.outputs(x)
         assert moved != (change is not None and bool(np.abs(change.value).max() > 0.01))
 
 
-def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(bench, proposed):
+def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(reduced, proposed):
     rng = np.random.default_rng(3)
     c = proposed[0]
-    model = bench.model_for(c.effect, c.start)
+    model = reduced.model_for(c.effect, c.start)
     mean, sd = (np.array([getattr(p, q) for p in c.effect.parameters]) for q in ("mean", "sd"))
     for _ in range(20):
         x = mean + sd * rng.uniform(-3, 3, len(sd))
@@ -189,10 +189,10 @@ def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(bench, pr
         assert state.lam[0] > -1e-6 * state.lam[FLEXIBLE][0]
 
 
-def test_slopes_leave_a_remainder_of_second_order(bench, proposed):
+def test_slopes_leave_a_remainder_of_second_order(reduced, proposed):
     """|λ(x + hd) - λ(x) - h λ'd| falls as h²."""
     for c in proposed:
-        model, x = bench.model_for(c.effect, c.start), acting(c)
+        model, x = reduced.model_for(c.effect, c.start), acting(c)
         d = np.cos(2 + np.arange(len(x)))
         state = evaluate(model, [c.effect], x)
         slope = np.einsum("prr,p->r", state.dK - state.lam * state.dM, d)[FLEXIBLE]
@@ -206,11 +206,11 @@ def test_slopes_leave_a_remainder_of_second_order(bench, proposed):
         assert left[0] / left[1] == pytest.approx(4, rel=0.15)
 
 
-def test_what_remakes_the_structure_is_idle_where_it_has_been_remade(bench, proposed):
+def test_what_remakes_the_structure_is_idle_where_it_has_been_remade(reduced, proposed):
     for c in proposed:
         if c.effect.remakes_structure:
             x = acting(c)
-            model = bench.model_for(c.effect, x)
+            model = reduced.model_for(c.effect, x)
             again = c.effect.with_reference_state(x)
             assert_allclose(lam(model, again, x), lam(model, Effect(), x[:0]), rtol=1e-12)
 

@@ -16,7 +16,7 @@ from chladni.model.free_parameter import FreeParameter
 from chladni.model.properties import BeamSection, Isotropic, Part, SolidSection
 from chladni.updating.accuracy import products
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 200.0
@@ -63,37 +63,37 @@ KINDS = {
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return workbench(jointed(), TOP, groups=4)
+def reduced():
+    return reduced_problem(jointed(), TOP, groups=4)
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_linear_numbers_are_exact(bench, name):
+def test_linear_numbers_are_exact(reduced, name):
     """K(x) q, M(x) q and the weight are those of the structure written with e^x."""
-    effect = freed(bench.groups, FreeParameter(name, sd=0.3, **KINDS[name]))
+    effect = freed(reduced.groups, FreeParameter(name, sd=0.3, **KINDS[name]))
     x = np.array([0.4])
-    q = np.random.default_rng(0).normal(size=(len(bench.model.basis), 2))
+    q = np.random.default_rng(0).normal(size=(len(reduced.model.basis), 2))
     made = effect.apply(jointed(), x)
     system = structure(made).system
-    Kq, Mq = products(bench.model, [effect], x, q)
+    Kq, Mq = products(reduced.model, [effect], x, q)
     before = structure(jointed()).system
     moved = np.abs((system.K - before.K) @ q).max() + np.abs((system.M - before.M) @ q).max()
     assert moved > 0
     assert_allclose(Kq, system.K @ q, atol=1e-9 * np.abs(system.K @ q).max())
     assert_allclose(Mq, system.M @ q, atol=1e-9 * np.abs(system.M @ q).max())
-    weight = evaluate(bench.model, [effect], x, False).weight
+    weight = evaluate(reduced.model, [effect], x, False).weight
     assert_allclose(weight, mass_properties(made)[0], rtol=1e-9)
 
 
 @pytest.mark.parametrize("part", [0, 1])
-def test_what_is_left_out_of_poissons_ratio_is_of_third_order(bench, part):
+def test_what_is_left_out_of_poissons_ratio_is_of_third_order(reduced, part):
     """Halving the change makes the error of K(nu) q eight times smaller."""
-    effect = freed(bench.groups, FreeParameter("nu", "nu", positions=(part,)))
-    q = np.random.default_rng(1).normal(size=(len(bench.model.basis), 2))
+    effect = freed(reduced.groups, FreeParameter("nu", "nu", positions=(part,)))
+    q = np.random.default_rng(1).normal(size=(len(reduced.model.basis), 2))
 
     def error(x):
         due = structure(effect.apply(jointed(), x)).system.K @ q
-        return np.abs(products(bench.model, [effect], x, q)[0] - due).max()
+        return np.abs(products(reduced.model, [effect], x, q)[0] - due).max()
 
     assert_allclose(error(np.array([0.01])) / error(np.array([0.005])), 8, rtol=0.1)
     change = np.abs((structure(effect.apply(jointed(), np.array([0.02]))).system.K
@@ -101,9 +101,9 @@ def test_what_is_left_out_of_poissons_ratio_is_of_third_order(bench, part):
     assert error(np.array([0.02])) < 0.01 * change
 
 
-def test_bounds_are_never_passed_and_do_not_bend_the_deck(bench):
+def test_bounds_are_never_passed_and_do_not_bend_the_deck(reduced):
     """y' = 1 at the deck's value, y within (ln low, ln high) wherever x is."""
-    effect = freed(bench.groups, FreeParameter("E", "E", low=0.8, high=1.1, positions=(0,)))
+    effect = freed(reduced.groups, FreeParameter("E", "E", low=0.8, high=1.1, positions=(0,)))
     assert effect.y(np.zeros(1)) == (np.zeros(1), 1.0)
     E = STEEL.E
     for x, bound in ((9.0, 1.1), (-9.0, 0.8)):
@@ -115,15 +115,15 @@ def test_bounds_are_never_passed_and_do_not_bend_the_deck(bench):
     assert_allclose(here.value, E * np.exp(0.01), rtol=1e-3)
 
 
-def test_one_value_is_given_as_it_is_and_several_as_a_factor(bench):
-    one = freed(bench.groups, FreeParameter("E", "E", positions=(1,)))
-    both = freed(bench.groups, FreeParameter("E", "E", positions=(0, 1)))
+def test_one_value_is_given_as_it_is_and_several_as_a_factor(reduced):
+    one = freed(reduced.groups, FreeParameter("E", "E", positions=(1,)))
+    both = freed(reduced.groups, FreeParameter("E", "E", positions=(0, 1)))
     assert (one.parameters[0].scale, one.parameters[0].unit) == (GLUE.E, "Pa")
     assert (both.parameters[0].scale, both.parameters[0].unit) == (1.0, "of the deck's")
 
 
-def test_pickles(bench):
-    effect = freed(bench.groups, FreeParameter("K", "K", springs=(0,), bushes=(0,)))
+def test_pickles(reduced):
+    effect = freed(reduced.groups, FreeParameter("K", "K", springs=(0,), bushes=(0,)))
     again = pickle.loads(pickle.dumps(effect))
     made = again.apply(jointed(), np.array([0.5]))
     assert_allclose(made.bushes.stiffness, np.exp(0.5) * jointed().bushes.stiffness)

@@ -14,7 +14,7 @@ from chladni.fem.derivative import by_part, by_radius, by_spring, with_radius
 from chladni.model.assembly import Average, Masses
 from chladni.updating.accuracy import accuracy, products
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel, plate
 
 TOP = 200.0
@@ -27,20 +27,20 @@ def written(assembly, value):
 
 def test_spring_constant():
     made = with_springs(plate(0.4, 0.3, 4, 3, 1.5e-3), (1,), np.eye(3)[2:], 5e3)
-    bench = workbench(made, TOP)
-    effect = linear_scale("spring 1", "k", "N/m", 5e3, by_spring(bench.structure, 0), written)
+    reduced = reduced_problem(made, TOP)
+    effect = linear_scale("spring 1", "k", "N/m", 5e3, by_spring(reduced.structure, 0), written)
     x, h = np.array([0.4]), 1e-4
-    q = np.random.default_rng(0).normal(size=(len(bench.model.basis), 2))
+    q = np.random.default_rng(0).normal(size=(len(reduced.model.basis), 2))
     K = structure(effect.apply(made, x)).system.K
-    got = products(bench.model, [effect], x, q)[0]
+    got = products(reduced.model, [effect], x, q)[0]
     assert_allclose(got, K @ q, atol=1e-9 * np.abs(K @ q).max())
-    state = evaluate(bench.model, [effect], x)
+    state = evaluate(reduced.model, [effect], x)
     slope = np.einsum("prr->pr", state.dK)[0]
-    up, down = (evaluate(bench.model, [effect], x + s, False).lam for s in (h, -h))
+    up, down = (evaluate(reduced.model, [effect], x + s, False).lam for s in (h, -h))
     scale = np.abs(slope).max()
     assert_allclose(slope, (up - down) / (2 * h), atol=1e-5 * scale)
     assert scale > 0
-    assert accuracy(bench, bench.model, [effect], 0 * x, TOP).worst < 1e-9
+    assert accuracy(reduced, reduced.model, [effect], 0 * x, TOP).worst < 1e-9
 
 
 R = 0.21
@@ -72,13 +72,13 @@ def test_reduced_slope_is_that_of_every_mode_of_the_structure(name):
     """Poisson's ratio of a part, the radius of a spider: dλ/dp of the affine reduced model."""
     whole, spider = carried()
     here = with_radius(whole, 0, R)
-    bench = workbench(here, TOP, groups=12)
+    reduced = reduced_problem(here, TOP, groups=12)
     value, change, slope = {
-        "nu": (0.3, lambda v: with_nu(here, v), by_part(bench.structure, 0, "nu")),
-        "R": (R, lambda v: with_radius(whole, 0, v), by_radius(bench.structure, spider, R)),
+        "nu": (0.3, lambda v: with_nu(here, v), by_part(reduced.structure, 0, "nu")),
+        "R": (R, lambda v: with_radius(whole, 0, v), by_radius(reduced.structure, spider, R)),
     }[name]
     effect = linear_scale(name, name, "-", value, slope)
-    state = evaluate(bench.model, [effect], np.zeros(1))
+    state = evaluate(reduced.model, [effect], np.zeros(1))
     dK, dM = (np.diag(d[0]) for d in (state.dK, state.dM))
     h = 1e-4 * value
     up, down = (

@@ -7,22 +7,23 @@ import scipy.sparse as sp
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.4, -1.0, -1.3])
 def test_the_reported_factor_explains_the_recording(factor: float) -> None:
     """Two channels of a plate, the second recorded ``factor`` times too high: nothing is left."""
-    bench = workbench(plate(0.4, 0.3, 8, 6, 1.5e-3), 150.0)
+    reduced = reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), 150.0)
     up = np.tile([0.0, 0.0, 1.0], (2, 1))
-    rows = sp.csr_array(bench.structure.along(np.array([1, 30]), up))
+    rows = sp.csr_array(reduced.structure.along(np.array([1, 30]), up))
     s = 2 * np.pi * np.array([20.0, 45.0, 90.0]) * (0.08 + 1j)
     use = np.ones((3, 2), bool)
-    data = Responses(np.ones((3, 2, 1), complex), s, rows, rows[[0]], use).over(bench.model)
-    exact = data.model(evaluate(bench.model, [], np.zeros(0), False))
-    off = Responses(exact * np.array([[1.0], [factor]]), s, rows, rows[[0]], use).over(bench.model)
+    data = Responses(np.ones((3, 2, 1), complex), s, rows, rows[[0]], use).over(reduced.model)
+    exact = data.model(evaluate(reduced.model, [], np.zeros(0), False))
+    wrong = exact * np.array([[1.0], [factor]])
+    off = Responses(wrong, s, rows, rows[[0]], use).over(reduced.model)
     x = np.array([np.log(abs(factor))])
     fault = sensor_fault("30:+Z", 1, 2, int(np.sign(factor)), 0.0)
     assert fault.reported(x, np.array([0.1]))[0].value == pytest.approx(factor)
-    assert off.deviation(evaluate(bench.model, [fault], x, False)) == pytest.approx(0, abs=1e-9)
+    assert off.deviation(evaluate(reduced.model, [fault], x, False)) == pytest.approx(0, abs=1e-9)

@@ -169,10 +169,10 @@ def test_slope_is_the_derivative() -> None:
     """Jᵀr against central differences of χ²: variable projection, exact at the optimum of x."""
     truth = a_truth(6, 4, 3)
     H = truth.frf(EVEN, "mobility", 1e-6)
-    top = 2 * np.pi * EVEN[-1]
+    omega_max = 2 * np.pi * EVEN[-1]
     y, w = H.values.reshape(500, -1), 1 / np.sqrt(H.variance.reshape(500, -1))  # type: ignore[union-attr]
-    data = fitting.PoleData(2j * np.pi * EVEN / top, y / top, w * top, 1)
-    p = truth.poles / top * (1 + 1e-4)
+    data = fitting.PoleData(2j * np.pi * EVEN / omega_max, y / omega_max, w * omega_max, 1)
+    p = truth.poles / omega_max * (1 + 1e-4)
     _, slope = fitting.solve(data, p, slope=True)
     assert slope is not None
     for k in range(4):
@@ -189,13 +189,13 @@ def test_vector_fitting_finds_poles_from_afar() -> None:
     """Without noise a few relocations lead to machine precision on a log grid."""
     truth = a_truth(7, 6, 3)
     H = truth.frf(LOG, "receptance", 0.0)
-    top = 2 * np.pi * LOG[-1]
+    omega_max = 2 * np.pi * LOG[-1]
     y = H.values.reshape(500, -1)
-    data = fitting.PoleData(2j * np.pi * LOG / top, y, 1 / np.abs(y), 0)
+    data = fitting.PoleData(2j * np.pi * LOG / omega_max, y, 1 / np.abs(y), 0)
     p = np.linspace(0.15, 0.95, 6) * (-0.01 + 1j)
     for _ in range(15):
         p = fitting.relocated(data, p)
-    np.testing.assert_allclose(np.sort(p.imag), np.sort(truth.poles.imag) / top, rtol=1e-8)
+    np.testing.assert_allclose(np.sort(p.imag), np.sort(truth.poles.imag) / omega_max, rtol=1e-8)
 
 
 def test_a_band_without_lines_is_refused() -> None:

@@ -56,11 +56,11 @@ def test_shapes_are_mass_normalised():
 @pytest.mark.parametrize("degrees", [0.0, 30.0])
 def test_a_grain_lies_where_our_elements_have_it(degrees):
     """Elastic modes of a sheet with E1 = 4 E2 within 1 %, the grain along an edge or across it."""
-    grain = Orthotropic(40e9, 10e9, 0.3, 6e9, 6e9, 6e9, 1500.0)
+    orthotropic = Orthotropic(40e9, 10e9, 0.3, 6e9, 6e9, 6e9, 1500.0)
     turn = np.radians(degrees)
 
     def grained(n):
-        a = square(n, material=grain)
+        a = square(n, material=orthotropic)
         axis = np.tile([np.cos(turn), np.sin(turn), 0.0], (len(a.shells), 1))
         return replace(a, shells=replace(a.shells, axis=axis))
 

@@ -43,8 +43,8 @@ def test_nothing_is_found_where_nothing_is_missing(tmp_path, evidence):
     found, truth = blind("nothing", tmp_path)
     assert found.verdict in ("nothing missing", "calibration only")
     assert found.effects == ()
-    assert found.agreement.largest_gain < found.agreement.threshold
-    assert found.agreement.gain is None
+    assert found.agreement.largest_two_log_bayes_factor < found.agreement.threshold
+    assert found.agreement.two_log_bayes_factor is None
     assert all(a.why_not for a in found.alternatives)
     assert evidence(found, truth)["right"]
 

@@ -28,8 +28,8 @@ def site():
     )  # fmt: skip
     mass = mass_properties(a)[0]
     names = ("panel", "flanges")
-    grain = np.array([1.0, 0, 0])
-    return Site(a, spots, a.points[at[:2]], mass, 30.0, TOP, names, grain, names)
+    material_axis = np.array([1.0, 0, 0])
+    return Site(a, spots, a.points[at[:2]], mass, 30.0, TOP, names, material_axis, names)
 
 
 def response(site, hidden, damping=0.01):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.bench.article import Front, measured
+from chladni.bench.article import MeasurementChain, measured
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
 from chladni.model.properties import Orthotropic
@@ -28,7 +28,7 @@ class Article:
 
     effect: str
     E: float = STEEL.E
-    grain: tuple[float, float, float] | None = None  # E1, E2, G12
+    moduli: tuple[float, float, float] | None = None  # E1, E2, G12
     thin: tuple[int, float, float] | None = None  # row of the centre, share, radius
     lump: tuple[int, float] | None = None  # row, mass
 
@@ -36,8 +36,8 @@ class Article:
 def made(deck, article):
     """The article on the deck's own corners."""
     steel = replace(STEEL, E=article.E)
-    if article.grain is not None:
-        E1, E2, G = article.grain
+    if article.moduli is not None:
+        E1, E2, G = article.moduli
         steel = Orthotropic(E1, E2, STEEL.nu * np.sqrt(E1 / E2), G, G, G, STEEL.rho)
     a = deck.with_parts(tuple(p.with_section(membrane=steel, bending=steel) for p in deck.parts))
     axis = np.broadcast_to([1.0, 0, 0], a.shells.axis.shape)
@@ -71,7 +71,7 @@ def written(name, effect, seed, folder):
     article = {
         "nothing": Article(effect, E),
         "calibration": Article(effect, 1.06 * STEEL.E),
-        "orthotropic-material": Article(effect, grain=(1.1 * STEEL.E, 0.9 * STEEL.E, 8e10)),
+        "orthotropic-material": Article(effect, moduli=(1.1 * STEEL.E, 0.9 * STEEL.E, 8e10)),
         "thickness-distribution": Article(effect, E, thin=(at, 0.2, 0.07)),
         "point-mass": Article(effect, E, lump=(at, 0.04 * mass_properties(deck)[0])),
     }[effect]
@@ -79,8 +79,9 @@ def written(name, effect, seed, folder):
     zeta = 0.007 * np.exp(0.3 * rng.normal(size=len(f)))
     modal = ModalModel(np.where(f < 2, 0, f), zeta, np.zeros((1, len(f))), np.zeros((1, 2), int))
     phi_o, phi_i = U[:, deck.rows(outputs), 2].T, U[:, deck.rows(np.array([drive])), 2].T
-    labels, line = tuple(f"{g}:+Z" for g in outputs), np.arange(4.0, spec.top, 0.25)
-    frf = measured(modal, phi_o, phi_i, line, Front(0.01, 0.001), rng, labels, (f"{drive}:+Z",))
+    labels, line = tuple(f"{g}:+Z" for g in outputs), np.arange(4.0, spec.f_max, 0.25)
+    chain = MeasurementChain(0.01, 0.001)
+    frf = measured(modal, phi_o, phi_i, line, chain, rng, labels, (f"{drive}:+Z",))
     mass = mass_properties(made(deck, article))[0]
     case = concealed.Concealed(spec, deck, frf, mass, hangers, {})
     concealed.write(case, folder / "case", folder / "sealed.json")

@@ -12,7 +12,7 @@ from chladni import planning as pretest
 from chladni.fem.assemble import structure
 from chladni.fem.locate import rows_at
 from chladni.geometry.nearest import ShellSurface
-from chladni.planning import Wishes, plan
+from chladni.planning import PlanSettings, plan
 from chladni.planning.drawn_models import drawn, ensemble
 from chladni.planning.whole_plan import recovered, seen_at, target_modes
 from chladni_specimens.tailgate.design import TailgateDesign
@@ -20,7 +20,7 @@ from chladni_specimens.tailgate.tailgate import tailgate
 
 pytestmark = pytest.mark.slow
 
-WISHES = Wishes(sensors=30, modes=15)
+SETTINGS = PlanSettings(sensors=30, modes=15)
 SIZE, DRAWS = 0.020, 20
 
 
@@ -33,21 +33,21 @@ def deck():
 @pytest.fixture(scope="module")
 def robust(deck):
     assembly, built = deck
-    return plan(assembly, Wishes(sensors=30, modes=15, draws=DRAWS), built=built)
+    return plan(assembly, PlanSettings(sensors=30, modes=15, draws=DRAWS), built=built)
 
 
 @pytest.fixture(scope="module")
 def plain(deck):
     """By log det alone, on the nominal model alone: what the textbook does."""
     assembly, built = deck
-    return plan(assembly, Wishes(sensors=30, modes=15, alike=1.0), built=built)
+    return plan(assembly, PlanSettings(sensors=30, modes=15, alike=1.0), built=built)
 
 
 @pytest.fixture(scope="module")
 def told(deck):
     """On the nominal model alone, modes told apart as in the robust plan."""
     assembly, built = deck
-    return plan(assembly, WISHES, built=built)
+    return plan(assembly, SETTINGS, built=built)
 
 
 def alike(phi):
@@ -76,7 +76,7 @@ def test_the_modes_of_the_real_hem_are_told_apart(robust, plain, size):
     """
     article = tailgate(TailgateDesign(size=size, hem="real"))
     built = structure(article)
-    modal, _, _ = target_modes(built, WISHES)
+    modal, _, _ = target_modes(built, SETTINGS)
     worst = []
     for planned in (robust, plain):
         at = planned.mounts.points[planned.layout]

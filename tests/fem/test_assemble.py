@@ -135,14 +135,14 @@ def test_supports_and_labels():
 def test_points_without_stiffness_are_left_out():
     """A free grid, and the rotations of a membrane without drilling, do not make K singular."""
     shape = plate(0.4, 0.3, 4, 3, 1e-3)
-    lonely = replace(
+    unattached = replace(
         shape,
         ids=np.append(shape.ids, 99),
         points=np.vstack([shape.points, [1.0, 1, 1]]),
         masses=Masses(np.array([1]), np.array([20]), np.eye(6)[None]),
     )
-    assert 99 not in structure(lonely).system.dofs[:, 0]
-    assert 99 in structure(replace(lonely, auto_spc=False)).system.dofs[:, 0]
+    assert 99 not in structure(unattached).system.dofs[:, 0]
+    assert 99 in structure(replace(unattached, auto_spc=False)).system.dofs[:, 0]
     sheet = tuple(p.with_section(bending=None) for p in shape.parts)
     assert set(structure(shape.with_parts(sheet)).system.dofs[:, 1]) == {1, 2, 6}
 

@@ -104,11 +104,11 @@ def test_sheet(made, name, coupled):
 
 @pytest.mark.parametrize("name", ["E1", "E2", "G12", "nu12"])
 def test_grain(made, name):
-    grain = Orthotropic(2e10, 8e9, 0.28, 5e9, 4e9, 3e9, 700.0)
+    orthotropic = Orthotropic(2e10, 8e9, 0.28, 5e9, 4e9, 3e9, 700.0)
     parts = list(made.parts)
-    parts[1] = parts[1].with_section(membrane=grain, bending=grain, shear=None)
+    parts[1] = parts[1].with_section(membrane=orthotropic, bending=orthotropic, shear=None)
     made = made.with_parts(tuple(parts))
-    value = getattr(grain, name)
+    value = getattr(orthotropic, name)
     slope = derivative.by_part(structure(made), 1, name)
     order = remainder_order(
         lambda step: with_material(made, 1, **{name: value + step}), slope, value

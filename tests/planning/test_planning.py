@@ -12,7 +12,7 @@ from chladni.fem.assemble import structure
 from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.tables.sensor_table import read_sensors
 from chladni.model.assembly import Scalars
-from chladni.planning import Wishes, find_sensor_candidates, plan, sensors_csv, summary
+from chladni.planning import PlanSettings, find_sensor_candidates, plan, sensors_csv, summary
 from chladni.planning.whole_plan import target_modes
 from chladni_specimens.plates import box, folded_panel, plate
 
@@ -31,7 +31,7 @@ def built(panel):
 
 @pytest.fixture(scope="module")
 def found(panel, built):
-    return plan(panel, Wishes(sensors=14, modes=10, candidates=150), built=built)
+    return plan(panel, PlanSettings(sensors=14, modes=10, candidates=150), built=built)
 
 
 def test_places_keep_off_edges_and_folds(panel):
@@ -128,7 +128,7 @@ def test_a_strip_without_inner_grids_has_places_at_its_centres(tmp_path):
     np.testing.assert_allclose(places.points[:, 1], 0.01)
     linear = strip.points @ np.array([1.0, 2.0, 3.0])
     np.testing.assert_allclose(places.moving(linear), places.points @ np.array([1.0, 2.0, 3.0]))
-    planned = plan(strip, Wishes(sensors=6, modes=3, floor=0.05))
+    planned = plan(strip, PlanSettings(sensors=6, modes=3, floor=0.05))
     (tmp_path / "sensors.csv").write_text(sensors_csv(planned))
     for sensor, i in zip(read_sensors(tmp_path / "sensors.csv"), planned.layout, strict=False):
         assert sensor.grid is None
@@ -145,8 +145,8 @@ def test_a_wide_sheet_has_places_at_grids(panel):
 
 def test_modes_are_told_apart(panel, built):
     """The AutoMAC at the sensors obeys the ceiling, or is lower than without one."""
-    wishes = Wishes(sensors=12, modes=10, candidates=150)
-    told, plain = (plan(panel, replace(wishes, alike=a), built=built) for a in (0.1, 1.0))
+    settings = PlanSettings(sensors=12, modes=10, candidates=150)
+    told, plain = (plan(panel, replace(settings, alike=a), built=built) for a in (0.1, 1.0))
     off = [(p.auto_mac - np.eye(10)).max() for p in (told, plain)]
     assert off[0] <= max(0.12, 0.5 * off[1])
     assert "with modes told apart" not in plain.log_det
@@ -155,7 +155,7 @@ def test_modes_are_told_apart(panel, built):
 def test_shakers_are_vetoed_by_rattle_and_access(found):
     result = summary(found)
     for a in result.actuators:
-        low = a.rattles_from_n is not None and a.rattles_from_n < found.wishes.force
+        low = a.rattles_from_n is not None and a.rattles_from_n < found.settings.force
         assert a.vetoed == (low or not a.straight_way_to_it)
     assert found.actuators.allowed[found.together].all()
 
@@ -171,13 +171,13 @@ def test_spread_covers():
 
 
 def test_target_modes_are_flexible(built):
-    modal, above, first = target_modes(built, Wishes(modes=5))
+    modal, above, first = target_modes(built, PlanSettings(modes=5))
     assert first == 6
     assert len(modal) == 5
     assert modal.frequency[0] > 1
     assert above.frequency[5] > modal.frequency[-1]
     with pytest.raises(ModelError, match="no flexible mode below 1 Hz"):
-        target_modes(built, Wishes(top=1.0))
+        target_modes(built, PlanSettings(f_max=1.0))
 
 
 def test_the_plan_is_that_of_the_methods(found):
@@ -226,7 +226,7 @@ def test_an_in_plane_mode_is_seen_with_a_block():
         damping=np.zeros(4),
     )
     held = replace(sheet, springs=springs)
-    planned = plan(held, Wishes(sensors=10, modes=7))
+    planned = plan(held, PlanSettings(sensors=10, modes=7))
     due = np.sqrt(4 * 100.0 / (0.4 * 0.3 * 1e-3 * 7850)) / (2 * np.pi)
     assert planned.modal.frequency[0] == pytest.approx(due, rel=1e-3)
     np.testing.assert_array_equal(planned.aimed, 2 * [False] + 5 * [True])  # shift, turn in plane
@@ -252,7 +252,8 @@ def test_hang_points_are_quiet_and_apart(found):
 
 
 def test_spacing_is_kept(panel, built):
-    planned = plan(panel, Wishes(sensors=12, modes=8, candidates=120, spacing=0.08), built=built)
+    settings = PlanSettings(sensors=12, modes=8, candidates=120, spacing=0.08)
+    planned = plan(panel, settings, built=built)
     x = planned.mounts.points[planned.layout]
     apart = np.linalg.norm(x[:, None] - x, axis=2)[np.triu_indices(12, 1)]
     assert apart.min() >= 0.08
@@ -260,16 +261,16 @@ def test_spacing_is_kept(panel, built):
 
 def test_a_layout_for_an_ensemble(panel, built):
     """Drawn models move the layout; it serves their mean better than the nominal one does."""
-    wishes = Wishes(sensors=10, modes=8, candidates=60)
-    nominal = plan(panel, wishes, built=built)
-    robust = plan(panel, replace(wishes, draws=3, spread=0.2), built=built)
+    settings = PlanSettings(sensors=10, modes=8, candidates=60)
+    nominal = plan(panel, settings, built=built)
+    robust = plan(panel, replace(settings, draws=3, spread=0.2), built=built)
     assert robust.log_det["with exchange"] != nominal.log_det["with exchange"]
     assert "pivoted QR" not in robust.log_det  # it knows of one model only
 
 
 def test_fewer_sensors_than_modes_is_refused(panel, built):
     with pytest.raises(ShapeError, match="4 sensors cannot tell 6 modes"):
-        plan(panel, Wishes(sensors=4, modes=6, candidates=60), built=built)
+        plan(panel, PlanSettings(sensors=4, modes=6, candidates=60), built=built)
 
 
 def test_the_table_of_sensors_can_be_read_back(found, tmp_path):

@@ -92,7 +92,7 @@ def test_strip_and_grid():
 @settings(max_examples=60, deadline=None)
 @given(st.integers(2, 9), st.integers(0, 10**6))
 def test_matching_is_largest(n, seed):
-    """Edmonds' search from every lonely vertex leaves no larger matching."""
+    """Edmonds' search from every unmatched vertex leaves no larger matching."""
     rng = random.Random(seed)
     edges = [e for e in itertools.combinations(range(n), 2) if rng.random() < 0.35]
     near = [[] for _ in range(n)]

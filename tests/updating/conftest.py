@@ -8,24 +8,24 @@ import pytest
 from chladni.effects.ordinary import ordinary
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 200.0
 
 
 @pytest.fixture(scope="session")
-def bench():
-    return workbench(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
+def reduced():
+    return reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), TOP)
 
 
 @pytest.fixture(scope="session")
-def responses(bench):
+def responses(reduced):
     """Two shakers and four sensors on a plate 4 % stiffer than the model, level up to 200 Hz."""
-    outputs, inputs = bench.grids.rows[[0, 6, 20, 45]], bench.grids.rows[[0, 33]]
+    outputs, inputs = reduced.grids.rows[[0, 6, 20, 45]], reduced.grids.rows[[0, 33]]
     s = 2 * np.pi * np.linspace(25, TOP, 40) * (0.03 + 1j)
     use = np.ones((40, 4), bool)
     use[5:9, 1] = False
-    empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).over(bench.model)
-    stiffer = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.04]))
+    empty = Responses(np.ones((40, 4, 2), complex), s, outputs, inputs, use).over(reduced.model)
+    stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
     return replace(empty, values=empty.model(stiffer))

@@ -14,7 +14,7 @@ from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy, products
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel
 
 TOP = 300.0
@@ -22,18 +22,18 @@ NAMES = ("thickness", "thinner", "stiffer", "thinning", "mass", "masses", "sprin
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return workbench(folded_panel(h=0.06), TOP, groups=24)
+def reduced():
+    return reduced_problem(folded_panel(h=0.06), TOP, groups=24)
 
 
 @pytest.fixture(scope="module")
-def changes(bench):
+def changes(reduced):
     """Effect and x of each kind of change."""
-    groups = bench.groups
-    sensors = tuple(bench.candidates.grids[[3, 9]].tolist())
+    groups = reduced.groups
+    sensors = tuple(reduced.candidates.grids[[3, 9]].tolist())
     setup = Setup(tuple(((int(g), 1.0),) for g in sensors), (), float(groups.weight.sum()), TOP)
-    where = Surroundings(groups, bench.grids, bench.candidates, setup)
-    k = bench.grids.position(int(bench.candidates.grids[5]))
+    where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
+    k = reduced.grids.position(int(reduced.candidates.grids[5]))
     start = np.array([0.5, np.log(0.15), 0.1, 0.0])
     return {
         "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
@@ -46,9 +46,9 @@ def changes(bench):
     }  # fmt: skip
 
 
-def true_error(bench, effect, x):
+def true_error(reduced, effect, x):
     """Relative frequency error of the reduced model against its own operators in full."""
-    model = bench.model
+    model = reduced.model
     K, M = products(model, [effect], x, np.eye(len(model.basis)))
     lam = evaluate(model, [effect], x, False).lam
     at = (np.sqrt(np.maximum(lam, 0)) > 0.04 * np.pi * TOP) & (lam <= (2 * np.pi * TOP) ** 2)
@@ -58,21 +58,21 @@ def true_error(bench, effect, x):
 
 
 @pytest.mark.parametrize("name", ["thickness", "stiffer", "mass"])
-def test_nothing_is_missing_at_the_basis_own_parameters(bench, changes, name):
+def test_nothing_is_missing_at_the_basis_own_parameters(reduced, changes, name):
     effect, x = changes[name]
     idle = np.array([-30.0, 0, 0]) if name == "mass" else 0 * x
-    found = accuracy(bench, bench.model, [effect], idle, TOP)
+    found = accuracy(reduced, reduced.model, [effect], idle, TOP)
     assert len(found.error) > 5
     assert found.worst < 1e-9
     assert found.serves()
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_estimate_lies_between_four_fifths_of_the_error_and_the_error(bench, changes, name):
+def test_estimate_lies_between_four_fifths_of_the_error_and_the_error(reduced, changes, name):
     """4 κ / (1 + κ)² of Kantorovich is 0.8 at κ = 2.6, more than any of these changes makes."""
     effect, x = changes[name]
-    due = true_error(bench, effect, x)
-    got = accuracy(bench, bench.model, [effect], x, TOP).error
+    due = true_error(reduced, effect, x)
+    got = accuracy(reduced, reduced.model, [effect], x, TOP).error
     assert due.max() > 1e-5
     assert_allclose(len(got), len(due))
     assert np.all(got <= due + 1e-9)
@@ -81,52 +81,52 @@ def test_estimate_lies_between_four_fifths_of_the_error_and_the_error(bench, cha
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_renewed_basis_leaves_a_fraction_of_the_error(bench, changes, name):
+def test_renewed_basis_leaves_a_fraction_of_the_error(reduced, changes, name):
     effect, x = changes[name]
-    before = accuracy(bench, bench.model, [effect], x, TOP)
-    model = before.renewed(bench.model)
-    after = accuracy(bench, model, [effect], x, TOP)
+    before = accuracy(reduced, reduced.model, [effect], x, TOP)
+    model = before.renewed(reduced.model)
+    after = accuracy(reduced, model, [effect], x, TOP)
     n = len(before.error)
     assert after.worst < 0.2 * before.worst
     assert_allclose(after.frequency[:n], before.frequency / (1 + before.error), rtol=1e-6)
 
 
-def test_error_falls_with_the_square_of_the_change(bench, changes):
+def test_error_falls_with_the_square_of_the_change(reduced, changes):
     """Galerkin's eigenvalues err in second order of what the basis lacks."""
     effect, x = changes["thickness"]
     h = np.array([0.1, 0.05, 0.025])
-    error = [accuracy(bench, bench.model, [effect], x * s / 0.2, TOP).worst for s in h]
+    error = [accuracy(reduced, reduced.model, [effect], x * s / 0.2, TOP).worst for s in h]
     order = np.log2(np.array(error[:-1]) / error[1:])
     assert_allclose(order, 2, atol=0.15)
 
 
-def test_attachments_of_the_place_make_a_mass_accurate(bench, changes):
-    """What Search.trial adds to the basis is what the estimate asks for."""
+def test_attachments_of_the_place_make_a_mass_accurate(reduced, changes):
+    """What UpdatingProblem.fitted_with adds to the basis is what the estimate asks for."""
     for name in ("mass", "spring"):
         effect, x = changes[name]
-        with_them = bench.model_for(effect, x)
-        bare = accuracy(bench, bench.model, [effect], x, TOP)
-        carried = accuracy(bench, with_them, [effect], x, TOP)
+        with_them = reduced.model_for(effect, x)
+        bare = accuracy(reduced, reduced.model, [effect], x, TOP)
+        carried = accuracy(reduced, with_them, [effect], x, TOP)
         assert carried.worst < 0.1 * bare.worst
         assert carried.serves()
 
 
 @pytest.mark.parametrize("name", ["stiffer", "masses"])
-def test_products_are_those_of_the_changed_structure(bench, changes, name):
+def test_products_are_those_of_the_changed_structure(reduced, changes, name):
     effect, x = changes[name]
-    q = np.random.default_rng(1).normal(size=(len(bench.model.basis), 3))
-    system = structure(effect.apply(bench.structure.assembly, x)).system
+    q = np.random.default_rng(1).normal(size=(len(reduced.model.basis), 3))
+    system = structure(effect.apply(reduced.structure.assembly, x)).system
     for got, due in zip(
-        products(bench.model, [effect], x, q), (system.K @ q, system.M @ q), strict=True
+        products(reduced.model, [effect], x, q), (system.K @ q, system.M @ q), strict=True
     ):
         assert_allclose(got, due, atol=1e-9 * np.abs(due).max())
 
 
-def test_components_give_the_same_products(bench, changes):
+def test_components_give_the_same_products(reduced, changes):
     effect, x = changes["thickness"]
-    split = bench.model.with_components()
-    q = np.random.default_rng(2).normal(size=(len(bench.model.basis), 3))
+    split = reduced.model.with_components()
+    q = np.random.default_rng(2).normal(size=(len(reduced.model.basis), 3))
     for got, due in zip(
-        products(split, [effect], x, q), products(bench.model, [effect], x, q), strict=True
+        products(split, [effect], x, q), products(reduced.model, [effect], x, q), strict=True
     ):
         assert_allclose(got, due, atol=1e-9 * np.abs(due).max())

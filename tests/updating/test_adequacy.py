@@ -10,32 +10,32 @@ from scipy.stats import kstest
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, of_poles, ranked
-from chladni.updating.hypothesis_fit import Trial, fitted
+from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.likelihood import Poles
-from chladni.updating.map_fit import Weighing, beside
+from chladni.updating.map_fit import MassMeasurement, beside
 from chladni.updating.reduced_model import evaluate
 
-SCALES = Weighing(1.413, 1.4e-3)
+SCALES = MassMeasurement(1.413, 1.4e-3)
 
 
 @pytest.fixture(scope="module")
-def seen(bench, responses):
+def seen(reduced, responses):
     """A plate seen with 8 % damping, and E and rho free."""
     s = 2 * np.pi * np.linspace(25, 200, 24) * (0.08 + 1j)
     empty = replace(responses, s=s, use=np.ones((24, 4), bool), values=np.ones((24, 4, 2), complex))
-    effects = [ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "rho", [0])]
+    effects = [ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "rho", [0])]
     return empty, effects
 
 
-def answered(bench, data, effects):
-    state = evaluate(bench.model, effects, np.zeros(2))
-    fit = fitted(bench.model, effects, data.allowing_errors(state), SCALES, np.zeros(2))
-    return adequacy(Trial(Effect(), fit, bench.model), SCALES, tuple("abcd"), 100)
+def answered(reduced, data, effects):
+    state = evaluate(reduced.model, effects, np.zeros(2))
+    fit = fitted(reduced.model, effects, data.allowing_errors(state), SCALES, np.zeros(2))
+    return adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, tuple("abcd"), 100)
 
 
-def test_draws_of_the_model_itself_have_uniform_p(bench, seen):
+def test_draws_of_the_model_itself_have_uniform_p(reduced, seen):
     data, effects = seen
-    state = evaluate(bench.model, effects, np.zeros(2))
+    state = evaluate(reduced.model, effects, np.zeros(2))
     data = replace(data, values=data.model(state)).allowing_errors(state)
     _, J = data.scaled(state, True)
     r0, J0 = beside(effects, SCALES, np.zeros(2), state)
@@ -46,26 +46,26 @@ def test_draws_of_the_model_itself_have_uniform_p(bench, seen):
     assert kstest(p, "uniform").statistic < 1.63 * np.sqrt(2 / 300)  # 1 %, both samples random
 
 
-def test_a_model_that_is_right_fits(bench, seen):
+def test_a_model_that_is_right_fits(reduced, seen):
     data, effects = seen
-    truth = evaluate(bench.model, effects, np.array([0.03, 0.0]))
-    assert answered(bench, replace(data, values=data.model(truth)), effects).passes
+    truth = evaluate(reduced.model, effects, np.array([0.03, 0.0]))
+    assert answered(reduced, replace(data, values=data.model(truth)), effects).passes
 
 
-def test_a_channel_of_another_structure_does_not_fit_and_is_named(bench, seen):
+def test_a_channel_of_another_structure_does_not_fit_and_is_named(reduced, seen):
     data, effects = seen
-    H = data.model(evaluate(bench.model, effects, np.zeros(2)))
+    H = data.model(evaluate(reduced.model, effects, np.zeros(2)))
     H[:, 2] *= np.exp(2j * np.sin(np.arange(24)))[:, None]
-    found = answered(bench, replace(data, values=H), effects)
+    found = answered(reduced, replace(data, values=H), effects)
     assert not found.passes
     assert found.where.endswith("on c")
 
 
-def test_without_errors_of_form_there_is_nothing_to_test(bench, seen):
+def test_without_errors_of_form_there_is_nothing_to_test(reduced, seen):
     data, effects = seen
-    data = replace(data, values=data.model(evaluate(bench.model, effects, np.zeros(2))))
-    fit = fitted(bench.model, effects, data, SCALES, np.zeros(2))
-    assert adequacy(Trial(Effect(), fit, bench.model), SCALES, ()) is None
+    data = replace(data, values=data.model(evaluate(reduced.model, effects, np.zeros(2))))
+    fit = fitted(reduced.model, effects, data, SCALES, np.zeros(2))
+    assert adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, ()) is None
 
 
 def test_poles_fit_as_closely_as_models_do_or_not_at_all():

@@ -7,24 +7,24 @@ import pytest
 
 from chladni.errors import ModelError
 from chladni.updating import diagnosis
-from chladni.updating.diagnosis import BEHIND, Trial, _finished, _tried
+from chladni.updating.diagnosis import BEHIND, HypothesisFit, _finished, _tried
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import Status
 
-NULL = SimpleNamespace(S=100.0, fit=SimpleNamespace(x=np.ones(2)))
+NULL = SimpleNamespace(neg2_log_evidence=100.0, fit=SimpleNamespace(x=np.ones(2)))
 
 
-class Search:
+class UpdatingProblem:
     """A fit from zeros stops at ``first``, one from the null's parameters at ``again``."""
 
     def __init__(self, first, again):
         self.ends, self.starts = {0.0: first, 1.0: again}, []
 
-    def trial(self, effect, start, base, steps):
+    def fitted_with(self, effect, start, base, steps):
         self.starts.append(float(base[0]))
         if self.ends[float(base[0])] is None:
             raise ModelError("an effect left negative stiffness")
-        return SimpleNamespace(S=self.ends[float(base[0])])
+        return SimpleNamespace(neg2_log_evidence=self.ends[float(base[0])])
 
 
 @pytest.mark.parametrize(
@@ -39,19 +39,21 @@ class Search:
     ],
 )
 def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
-    search = Search(first, again)
-    found = _tried(search, NULL, None, np.zeros(1), np.zeros(2))
-    assert min(t.S for t in found) == end
-    assert search.starts == starts
+    problem = UpdatingProblem(first, again)
+    found = _tried(problem, NULL, None, np.zeros(1), np.zeros(2))
+    assert min(t.neg2_log_evidence for t in found) == end
+    assert problem.starts == starts
 
 
 @pytest.mark.parametrize("status", list(Status))
 @pytest.mark.parametrize("running", [True, False])
 def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running):
     """In the running or not: a hypothesis is judged where it comes to rest."""
-    end = SimpleNamespace(S=1.0)
+    end = SimpleNamespace(neg2_log_evidence=1.0)
     monkeypatch.setattr(diagnosis, "fitted", lambda *given: end)
-    left = SimpleNamespace(S=9.0, effects=(), x=np.zeros(1), status=status, data=None)
-    search = SimpleNamespace(data=object.__new__(Responses), weighing=None)
-    got = _finished(search, Trial(None, left, None), running)
-    assert got.S == (1.0 if running or status is Status.OUT_OF_STEPS else 9.0)
+    left = SimpleNamespace(
+        neg2_log_evidence=9.0, effects=(), x=np.zeros(1), status=status, data=None
+    )
+    problem = SimpleNamespace(data=object.__new__(Responses), mass_measurement=None)
+    got = _finished(problem, HypothesisFit(None, left, None), running)
+    assert got.neg2_log_evidence == (1.0 if running or status is Status.OUT_OF_STEPS else 9.0)

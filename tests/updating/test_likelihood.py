@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.ordinary import gain, ordinary
+from chladni.effects.ordinary import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.effects.surroundings import Setup, Surroundings
@@ -16,14 +16,14 @@ from chladni.updating.reduced_model import evaluate
 
 
 @pytest.fixture(scope="module")
-def effects(bench):
+def effects(reduced):
     setup = Setup((((1, 1.0),), ((63, 1.0),)), (7,), 1.41, 200.0)
-    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup)
-    spot = bench.grids.position(26)
+    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    spot = reduced.grids.position(26)
     return [
-        ordinary(bench.groups, "E", [0]), ordinary(bench.groups, "t", [0]),
+        ordinary(reduced.groups, "E", [0]), ordinary(reduced.groups, "t", [0]),
         PointMass.near(where, spot), ExtraSupport.near(where, spot + 12),
-        gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
+        channel_gain(4, 0.5), sensor_fault("7+Z", 2, 4, 1, 0.0),
     ]  # fmt: skip
 
 
@@ -31,8 +31,8 @@ X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.15, -0.3])
 
 
 @pytest.fixture(scope="module")
-def poles(bench):
-    state = evaluate(bench.model, [ordinary(bench.groups, "E", [0])], np.array([0.004]), False)
+def poles(reduced):
+    state = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.004]), False)
     f = np.sqrt(state.lam[6:11]) / (2 * np.pi)
     every = np.ones(5, bool)
     return Poles(f, np.full(5, 1e-3), every, np.ones(5), (20.0, 1.01 * f[-1]))
@@ -55,48 +55,49 @@ def near(data, model, effects, x):
     return replace(data, values=data.model(evaluate(model, effects, 0.98 * x, False)))
 
 
-def test_slopes_of_responses(bench, responses, effects):
-    check_slopes(near(responses, bench.model, effects, X), bench.model, effects, X)
+def test_slopes_of_responses(reduced, responses, effects):
+    check_slopes(near(responses, reduced.model, effects, X), reduced.model, effects, X)
 
 
 @pytest.mark.parametrize("quantity", ["receptance", "mobility"])
-def test_slopes_of_other_quantities(bench, responses, quantity, effects):
-    data = near(replace(responses, quantity=quantity), bench.model, effects[:2], X[:2])
-    check_slopes(data, bench.model, effects[:2], X[:2])
+def test_slopes_of_other_quantities(reduced, responses, quantity, effects):
+    data = near(replace(responses, quantity=quantity), reduced.model, effects[:2], X[:2])
+    check_slopes(data, reduced.model, effects[:2], X[:2])
 
 
-def test_slopes_of_poles(bench, poles):
-    pair = [ordinary(bench.groups, q, [0]) for q in ("E", "rho")]
-    check_slopes(poles, bench.model, pair, np.array([0.002, -0.001]))
+def test_slopes_of_poles(reduced, poles):
+    pair = [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
+    check_slopes(poles, reduced.model, pair, np.array([0.002, -0.001]))
 
 
-def test_nothing_is_left_at_the_truth(bench, responses, poles):
-    stiffer = [ordinary(bench.groups, "E", [0])]
-    r, _ = responses.residual(evaluate(bench.model, stiffer, np.array([0.04])), True)
+def test_nothing_is_left_at_the_truth(reduced, responses, poles):
+    stiffer = [ordinary(reduced.groups, "E", [0])]
+    r, _ = responses.residual(evaluate(reduced.model, stiffer, np.array([0.04])), True)
     assert_allclose(r, 0, atol=1e-8)
     assert len(r) == 2 * 2 * responses.use.sum()
-    r, _ = poles.residual(evaluate(bench.model, stiffer, np.array([0.004])), True)
+    r, _ = poles.residual(evaluate(reduced.model, stiffer, np.array([0.004])), True)
     assert_allclose(r, 0, atol=1e-7)
 
 
-def test_a_gain_is_its_logarithm_on_every_line(bench, responses):
-    stiffer, level = ordinary(bench.groups, "E", [0]), gain(4, 0.5)
-    state = evaluate(bench.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
+def test_a_gain_is_its_logarithm_on_every_line(reduced, responses):
+    stiffer, level = ordinary(reduced.groups, "E", [0]), channel_gain(4, 0.5)
+    state = evaluate(reduced.model, [stiffer, level], np.array([0.04, np.log(2.0)]))
     assert_allclose(responses.deviation(state), np.log10(2.0), atol=1e-9)
 
 
-def test_a_reversed_channel_is_half_a_turn_on_that_channel(bench, responses):
+def test_a_reversed_channel_is_half_a_turn_on_that_channel(reduced, responses):
     wrong = sensor_fault("x", 2, 4, -1, 0.0)
-    state = evaluate(bench.model, [ordinary(bench.groups, "E", [0]), wrong], np.array([0.04, 0.0]))
+    stiffer = ordinary(reduced.groups, "E", [0])
+    state = evaluate(reduced.model, [stiffer, wrong], np.array([0.04, 0.0]))
     turn = np.abs(responses.deviation(state).imag) * np.log(10)
     assert_allclose(turn[:, 2], np.pi, atol=1e-8)
     assert_allclose(turn[:, [0, 1, 3]], 0, atol=1e-8)
 
 
-def test_stiffness_scales_every_frequency_by_its_root(bench, poles):
+def test_stiffness_scales_every_frequency_by_its_root(reduced, poles):
     """ln f = ln E / 2, seen through the pairing."""
-    stiffer = [ordinary(bench.groups, "E", [0])]
-    state = evaluate(bench.model, stiffer, np.array([0.004 + 0.01]))
+    stiffer = [ordinary(reduced.groups, "E", [0])]
+    state = evaluate(reduced.model, stiffer, np.array([0.004 + 0.01]))
     delta, test, model = poles.deviation(state)
     assert test.tolist() == [0, 1, 2, 3, 4]
     assert model.tolist() == [6, 7, 8, 9, 10]
@@ -106,5 +107,5 @@ def test_stiffness_scales_every_frequency_by_its_root(bench, poles):
 
 def test_noise_widens_the_spread_in_squares(responses):
     noise = np.full(responses.values.shape, 0.02)
-    wider = replace(responses, noise=noise).spread()
-    assert_allclose(wider**2, responses.spread() ** 2 + 0.02**2)
+    wider = replace(responses, noise=noise).std()
+    assert_allclose(wider**2, responses.std() ** 2 + 0.02**2)

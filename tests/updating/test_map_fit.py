@@ -8,13 +8,13 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.effect import ChannelChange, Effect, Parameter
 from chladni.errors import ModelError
-from chladni.updating.map_fit import Status, Weighing, fit
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.map_fit import MassMeasurement, Status, fit
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 
 MEAN, SD = np.array([0.5, -1.0, 0.2]), np.array([0.3, 2.0, 1.0])
 NOISE = np.array([0.1, 0.4, 0.2, 0.3, 0.1, 0.25])
-EXACT = {"gain": 1e-14, "max_steps": 60}
+EXACT = {"tol": 1e-14, "max_steps": 60}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Offsets:
 
 @pytest.fixture(scope="module")
 def model():
-    return workbench(plate(0.4, 0.3, 3, 2, 1.5e-3), 100.0).model
+    return reduced_problem(plate(0.4, 0.3, 3, 2, 1.5e-3), 100.0).model
 
 
 def linear(A, w, trials_factor=1, which=slice(None)):
@@ -77,8 +77,8 @@ def exact(A, y, sd, mean, prior):
 def test_evidence_mean_and_covariance_are_exact(model, seed, weighed):
     A, w, y = problem(seed)
     plain = model.groups.weight.sum()
-    weighing = Weighing(plain + 0.4, 0.05) if weighed else None
-    found = fit(model, [linear(A, w)], Offsets(y), weighing, np.zeros(3), **EXACT)
+    mass_measurement = MassMeasurement(plain + 0.4, 0.05) if weighed else None
+    found = fit(model, [linear(A, w)], Offsets(y), mass_measurement, np.zeros(3), **EXACT)
     rows = np.vstack([A, w]) if weighed else A
     data = np.append(y, 0.4) if weighed else y
     sd = np.append(NOISE, 0.05) if weighed else NOISE
@@ -86,7 +86,7 @@ def test_evidence_mean_and_covariance_are_exact(model, seed, weighed):
     assert found.status is Status.CONVERGED
     assert_allclose(found.x, x, atol=1e-6)
     assert_allclose(found.covariance, covariance, atol=1e-9)
-    assert_allclose(found.S, S, rtol=1e-8)
+    assert_allclose(found.neg2_log_evidence, S, rtol=1e-8)
     assert_allclose(found.misfit, (((A @ x - y) / NOISE) ** 2).sum(), rtol=1e-6)
 
 
@@ -94,8 +94,9 @@ def test_difference_of_evidence_is_the_ratio_of_marginal_likelihoods(model):
     """Models with other numbers of parameters stand on one scale."""
     A, w, y = problem(7)
     some = slice(0, 2)
-    large = fit(model, [linear(A, w)], Offsets(y), None, np.zeros(3), **EXACT).S
-    small = fit(model, [linear(A, w, which=some)], Offsets(y), None, np.zeros(2), **EXACT).S
+    large = fit(model, [linear(A, w)], Offsets(y), None, np.zeros(3), **EXACT).neg2_log_evidence
+    fewer = [linear(A, w, which=some)]
+    small = fit(model, fewer, Offsets(y), None, np.zeros(2), **EXACT).neg2_log_evidence
     expected = (
         exact(A, y, NOISE, MEAN, SD)[0] - exact(A[:, some], y, NOISE, MEAN[some], SD[some])[0]
     )
@@ -105,8 +106,8 @@ def test_difference_of_evidence_is_the_ratio_of_marginal_likelihoods(model):
 def test_places_tried_are_paid_for(model):
     A, w, y = problem(1)
     one, ten = (
-        fit(model, [linear(A, w, places)], Offsets(y), None, np.zeros(3), **EXACT).S
-        for places in (1, 10)
+        fit(model, [linear(A, w, n)], Offsets(y), None, np.zeros(3), **EXACT).neg2_log_evidence
+        for n in (1, 10)
     )
     assert_allclose(ten - one, 2 * np.log(10))
 
@@ -116,7 +117,7 @@ def test_effects_split_in_two_are_the_same_fit(model):
     first, second = linear(A, w, which=slice(0, 1)), linear(A, w, which=slice(1, 3))
     whole = fit(model, [linear(A, w)], Offsets(y), None, np.zeros(3), **EXACT)
     split = fit(model, [first, second], Offsets(y), None, np.zeros(3), **EXACT)
-    assert_allclose(split.S, whole.S, rtol=1e-8)
+    assert_allclose(split.neg2_log_evidence, whole.neg2_log_evidence, rtol=1e-8)
     assert_allclose(split.of(second), whole.x[1:], atol=1e-6)
     assert_allclose(split.sd(first), np.sqrt(whole.covariance[0, 0]))
     with pytest.raises(ModelError, match="not part of this fit"):
@@ -125,5 +126,5 @@ def test_effects_split_in_two_are_the_same_fit(model):
 
 def test_too_few_steps_are_owned_up_to(model):
     A, w, y = problem(3)
-    found = fit(model, [linear(A, w)], Offsets(y), None, np.full(3, 50.0), max_steps=1, gain=1e-14)
+    found = fit(model, [linear(A, w)], Offsets(y), None, np.full(3, 50.0), max_steps=1, tol=1e-14)
     assert found.status is Status.OUT_OF_STEPS

@@ -36,39 +36,40 @@ def test_is_the_cheapest_of_all(test, model, data):
     sd = np.array(data.draw(st.lists(st.floats(0.005, 0.5), min_size=n, max_size=n)))
     alone = np.array(data.draw(st.lists(PRICE, min_size=n, max_size=n)))
     missed = np.array(data.draw(st.lists(PRICE, min_size=m, max_size=m)))
-    at_test, at_model, lonely = paired(test, model, sd, alone, missed)
+    at_test, at_model, unpaired = paired(test, model, sd, alone, missed)
     assert np.all(np.diff(at_test) > 0)
     assert np.all(np.diff(at_model) > 0)
     got = cost(test, model, sd, alone, missed, at_test, at_model)
     best = min(cost(test, model, sd, alone, missed, *both) for both in all_pairings(n, m))
     assert_allclose(got, best, rtol=1e-9, atol=1e-9)
-    assert_allclose(lonely, np.delete(missed, at_model).sum(), atol=1e-9)
+    assert_allclose(unpaired, np.delete(missed, at_model).sum(), atol=1e-9)
 
 
 @given(frequencies(8), st.floats(0.1, 20.0))
 def test_identical_lists_pair_themselves(both, price):
     f = np.array(both)
     n = len(f)
-    at_test, at_model, lonely = paired(f, f, np.full(n, 0.01), np.full(n, price), np.full(n, price))
+    sd, prices = np.full(n, 0.01), np.full(n, price)
+    at_test, at_model, unpaired = paired(f, f, sd, prices, prices)
     assert at_test.tolist() == at_model.tolist() == list(range(n))
-    assert lonely == 0.0
+    assert unpaired == 0.0
 
 
 def test_a_spurious_pole_is_left_alone_and_shifts_nothing():
     model = np.array([10.0, 20.0, 40.0, 80.0])
     test = np.array([10.1, 20.1, 28.0, 40.1, 80.1])
-    at_test, at_model, lonely = paired(
+    at_test, at_model, unpaired = paired(
         test, model, np.full(5, 0.02), np.full(5, 20.0), np.full(4, 12.0)
     )
     assert at_test.tolist() == [0, 1, 3, 4]
     assert at_model.tolist() == [0, 1, 2, 3]
-    assert lonely == 0.0
+    assert unpaired == 0.0
 
 
 def test_nothing_pairs_where_being_alone_is_free():
     f = np.array([10.0, 20.0])
-    at_test, at_model, lonely = paired(f, 1.3 * f, np.full(2, 0.01), np.zeros(2), np.zeros(2))
-    assert len(at_test) == len(at_model) == lonely == 0
+    at_test, at_model, unpaired = paired(f, 1.3 * f, np.full(2, 0.01), np.zeros(2), np.zeros(2))
+    assert len(at_test) == len(at_model) == unpaired == 0
 
 
 @given(st.floats(1e-8, 1.0), st.floats(1e-8, 1.0))

@@ -6,29 +6,29 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.points import with_masses, with_springs
 from chladni.updating.reduced_model import evaluate, reduce
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel
 
 TOP = 120.0
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return workbench(folded_panel(h=0.06), TOP, groups=12)
+def reduced():
+    return reduced_problem(folded_panel(h=0.06), TOP, groups=12)
 
 
 def alike(got, expected):
     assert_allclose(got, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_nominal_frequencies_are_those_of_the_structure(bench):
-    lam = evaluate(bench.model, [], np.zeros(0)).lam
+def test_nominal_frequencies_are_those_of_the_structure(reduced):
+    lam = evaluate(reduced.model, [], np.zeros(0)).lam
     got = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
-    assert_allclose(got[6 : len(bench.frequency)], bench.frequency[6:], rtol=1e-7)
+    assert_allclose(got[6 : len(reduced.frequency)], reduced.frequency[6:], rtol=1e-7)
 
 
-def test_shells_are_all_there_is_where_there_is_nothing_else(bench):
-    model = bench.model
+def test_shells_are_all_there_is_where_there_is_nothing_else(reduced):
+    model = reduced.model
     total = model.linear[""].sum(axis=0) + model.cubic[""].sum(axis=0)
     assert np.abs(model.K0).max() < 1e-9 * np.abs(total).max()
     assert np.abs(model.M0).max() < 1e-9 * np.abs(model.mass.sum(axis=0)).max()
@@ -37,27 +37,27 @@ def test_shells_are_all_there_is_where_there_is_nothing_else(bench):
 
 def test_groups_and_rest_sum_to_the_structure():
     built = with_masses(folded_panel(h=0.06), (3, 9), 0.05)
-    bench = workbench(with_springs(built, (5,), np.eye(3)[2:], 2e3), TOP, groups=12)
-    model, system = bench.model, bench.structure.system
+    reduced = reduced_problem(with_springs(built, (5,), np.eye(3)[2:], 2e3), TOP, groups=12)
+    model, system = reduced.model, reduced.structure.system
     K = model.linear[""].sum(axis=0) + model.cubic[""].sum(axis=0) + model.K0
     alike(K, model.basis.T @ (system.K.real @ model.basis))
     alike(model.mass.sum(axis=0) + model.M0, model.basis.T @ (system.M @ model.basis))
     assert_allclose(model.weight0, 0.1)
 
 
-def test_basis_is_orthonormal_before_and_after_it_grows(bench):
-    rows = bench.grids.rows[[2, 11]]
-    for model in (bench.model, bench.with_attachments(rows)):
-        one = model.basis.T @ (bench.structure.system.M @ model.basis)
+def test_basis_is_orthonormal_before_and_after_it_grows(reduced):
+    rows = reduced.grids.rows[[2, 11]]
+    for model in (reduced.model, reduced.with_attachments(rows)):
+        one = model.basis.T @ (reduced.structure.system.M @ model.basis)
         assert_allclose(one, np.eye(len(one)), atol=1e-8)
 
 
 @pytest.mark.parametrize("split", [False, True])
-def test_grown_model_is_the_model_of_the_grown_basis(bench, split):
-    model = bench.model.with_components() if split else bench.model
+def test_grown_model_is_the_model_of_the_grown_basis(reduced, split):
+    model = reduced.model.with_components() if split else reduced.model
     vectors = np.random.default_rng(3).normal(size=(len(model.basis), 4))
     grown = model.extended(vectors)
-    direct = reduce(bench.groups, grown.basis)
+    direct = reduce(reduced.groups, grown.basis)
     direct = direct.with_components() if split else direct
     assert grown.basis.shape[1] == model.basis.shape[1] + 4
     assert grown.linear.keys() == direct.linear.keys()
@@ -70,12 +70,12 @@ def test_grown_model_is_the_model_of_the_grown_basis(bench, split):
     assert_allclose(grown.M0, direct.M0, atol=1e-9 * np.abs(direct.mass.sum(axis=0)).max())
 
 
-def test_vectors_it_has_already_leave_it_alone(bench):
-    assert bench.model.extended(bench.model.basis[:, 6:9] * 3.0) is bench.model
+def test_vectors_it_has_already_leave_it_alone(reduced):
+    assert reduced.model.extended(reduced.model.basis[:, 6:9] * 3.0) is reduced.model
 
 
-def test_components_sum_to_the_whole(bench):
-    split = bench.model.with_components()
+def test_components_sum_to_the_whole(reduced):
+    split = reduced.model.with_components()
     assert set(split.linear) == {"Q11", "Q22", "Q12", "Q66"}
-    alike(sum(split.linear.values()), bench.model.linear[""])
-    alike(sum(split.cubic.values()), bench.model.cubic[""])
+    alike(sum(split.linear.values()), reduced.model.linear[""])
+    alike(sum(split.cubic.values()), reduced.model.cubic[""])

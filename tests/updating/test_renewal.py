@@ -21,14 +21,14 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     """Not by name or class: the effect says so itself."""
     found = Accuracy(np.array([10.0]), np.array([0.0]), np.zeros((3, 1)))
     remade = SimpleNamespace(structure="remade")
-    monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
+    monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
     monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
-    prepared = SimpleNamespace(search=SimpleNamespace())
+    prepared = SimpleNamespace(problem=SimpleNamespace())
     begun = SimpleNamespace(effect=effect, structure="deck")
-    assert renewal.renewed(None, prepared, begun).trial.structure == structure
+    assert renewal.renewed(None, prepared, begun).hypothesis.structure == structure
 
 
-def a_trial():
+def a_hypothesis():
     fit = SimpleNamespace(effects=(), x=np.zeros(0))
     data = SimpleNamespace(over=lambda model: model)
     return SimpleNamespace(effect=Effect(), fit=fit, model="narrow", data=data)
@@ -36,16 +36,16 @@ def a_trial():
 
 @pytest.mark.parametrize(("error", "model"), [(4e-4, "narrow"), (2e-3, "wide")])
 def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
-    """0.05 % is the limit: under it the trial stays, above it a wider basis carries it."""
+    """0.05 % is the limit: under it the hypothesis stays, above it a wider basis carries it."""
     found = Accuracy(np.array([10.0]), np.array([error]), np.zeros((3, 1)))
-    monkeypatch.setattr(renewal, "_accuracy", lambda search, trial: found)
+    monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
     monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
-    fit = a_trial().fit
-    fit.data = a_trial().data
+    fit = a_hypothesis().fit
+    fit.data = a_hypothesis().data
     monkeypatch.setattr(renewal, "fitted", lambda *given: fit)
-    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
-    done = renewal.renewed(None, prepared, a_trial())
-    assert done.trial.model == model
+    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+    done = renewal.renewed(None, prepared, a_hypothesis())
+    assert done.hypothesis.model == model
     assert f"{error:.2%}" in done.note
     assert bool(done.distrust) == (model == "wide")
 
@@ -56,14 +56,14 @@ def test_is_widened_until_it_serves(monkeypatch):
     fits = []
     monkeypatch.setattr(
         renewal, "_accuracy",
-        lambda search, trial: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
+        lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
     )  # fmt: skip
     monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
-    kept = a_trial().fit
+    kept = a_hypothesis().fit
     monkeypatch.setattr(renewal, "fitted", lambda *given: fits.append(given) or kept)
-    monkeypatch.setattr(renewal, "Trial", lambda effect, fit, model: a_trial())
-    prepared = SimpleNamespace(search=SimpleNamespace(weighing=None))
-    done = renewal.renewed(None, prepared, a_trial())
+    monkeypatch.setattr(renewal, "HypothesisFit", lambda effect, fit, model: a_hypothesis())
+    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+    done = renewal.renewed(None, prepared, a_hypothesis())
     assert len(fits) == 2
     assert done.worst == 2e-4
     assert done.distrust == ()

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose
 from chladni.effects.effect import Parameter
 from chladni.effects.ordinary import ordinary
 from chladni.effects.points import AtPoints
-from chladni.updating.map_fit import Weighing
+from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.scan import baseline, direction_scores, point_scores, thickness_slopes
 
-WEIGHED = Weighing(1.45, 0.01)
+WEIGHED = MassMeasurement(1.45, 0.01)
 STRENGTHS = {"M": np.array([0.003, 0.04, 0.3]), "K": np.array([30.0, 2e3, 1e5])}
 
 
@@ -28,9 +28,9 @@ class Weight(AtPoints):
 
 
 @pytest.fixture(scope="module")
-def base(bench, responses):
-    effects = [ordinary(bench.groups, q, [0]) for q in ("E", "rho")]
-    return baseline(bench.model, effects, responses, WEIGHED, np.array([0.02, -0.03]))
+def base(reduced, responses):
+    effects = [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
+    return baseline(reduced.model, effects, responses, WEIGHED, np.array([0.02, -0.03]))
 
 
 def directly(base, model, data, places, k, matrix, strength):
@@ -43,40 +43,40 @@ def directly(base, model, data, places, k, matrix, strength):
 
 
 @pytest.mark.parametrize("matrix", ["M", "K"])
-def test_low_rank_reanalysis_is_the_evaluation(bench, responses, base, matrix):
-    places = bench.candidates.only(np.arange(0, 60, 9))
+def test_low_rank_reanalysis_is_the_evaluation(reduced, responses, base, matrix):
+    places = reduced.candidates.only(np.arange(0, 60, 9))
     strengths = STRENGTHS[matrix]
     rest = np.zeros(len(places))
-    scores = point_scores(base, bench.model, responses, places, matrix, strengths, rest)
+    scores = point_scores(base, reduced.model, responses, places, matrix, strengths, rest)
     expected = [
-        [directly(base, bench.model, responses, places, k, matrix, c) for c in strengths]
+        [directly(base, reduced.model, responses, places, k, matrix, c) for c in strengths]
         for k in range(len(places))
     ]
     assert_allclose(scores, expected, rtol=1e-6)
 
 
-def test_residual_flexibility_stands_for_the_attachment(bench, responses, base):
+def test_residual_flexibility_stands_for_the_attachment(reduced, responses, base):
     """A stiff spring is far better described with it than without."""
-    places = bench.candidates.only(np.arange(4, 60, 13))
+    places = reduced.candidates.only(np.arange(4, 60, 13))
     stiff = np.array([1e5])
-    rest = bench.flexibility(places)
+    rest = reduced.flexibility(places)
     assert np.all(rest > 0)
     with_it, without = (
-        point_scores(base, bench.model, responses, places, "K", stiff, r)[:, 0]
+        point_scores(base, reduced.model, responses, places, "K", stiff, r)[:, 0]
         for r in (rest, 0 * rest)
     )
     exact = np.array([
-        directly(base, bench.with_attachments(places.rows[[k]]), responses, places, k, "K", 1e5)
+        directly(base, reduced.with_attachments(places.rows[[k]]), responses, places, k, "K", 1e5)
         for k in range(len(places))
     ])  # fmt: skip
     assert np.all(np.abs(with_it - exact) < 0.3 * np.abs(without - exact))
     assert_allclose(with_it, exact, rtol=0.1)
 
 
-def test_a_place_already_in_the_basis_has_no_residual_flexibility(bench):
-    place = bench.candidates.only(np.array([10]))
-    grown = replace(bench, model=bench.with_attachments(place.rows))
-    assert grown.flexibility(place)[0] < 1e-6 * bench.flexibility(place)[0]
+def test_a_place_already_in_the_basis_has_no_residual_flexibility(reduced):
+    place = reduced.candidates.only(np.array([10]))
+    grown = replace(reduced, model=reduced.with_attachments(place.rows))
+    assert grown.flexibility(place)[0] < 1e-6 * reduced.flexibility(place)[0]
 
 
 def test_score_has_the_base_profiled_out(base):
@@ -90,10 +90,10 @@ def test_score_has_the_base_profiled_out(base):
     assert np.linalg.matrix_rank(C - np.eye(len(C)), tol=1e-6) == 2
 
 
-def test_slopes_of_all_groups_together_are_the_slope_of_t(bench, responses, base):
-    slopes = thickness_slopes(base, bench.model, responses)
-    whole = ordinary(bench.groups, "t", [0])
-    state = evaluate(bench.model, [*base.effects, whole], np.append(base.x, 0.0))
+def test_slopes_of_all_groups_together_are_the_slope_of_t(reduced, responses, base):
+    slopes = thickness_slopes(base, reduced.model, responses)
+    whole = ordinary(reduced.groups, "t", [0])
+    state = evaluate(reduced.model, [*base.effects, whole], np.append(base.x, 0.0))
     _, J = responses.residual(state, True)
     expected = np.append(J[:, -1], state.dweight[-1] / WEIGHED.sd)
     assert_allclose(slopes.sum(axis=1), expected, atol=1e-8 * np.abs(expected).max())

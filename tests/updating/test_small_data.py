@@ -67,8 +67,8 @@ def with_responses(folder: Path, outputs: int, modes: int) -> Path:
     (folder / "deck.bdf").write_text(plate_deck())
     built = structure(assembly(read_deck(folder / "deck.bdf"), UNITS["SI"]))
     modal = normal_modes(built.system, 30)
-    top = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
-    f = np.arange(0.5 * modal.frequency[6], 1.02 * top, 0.02)
+    f_max = 0.5 * (modal.frequency[5 + modes] + modal.frequency[6 + modes])
+    f = np.arange(0.5 * modal.frequency[6], 1.02 * f_max, 0.02)
     grids = [3, 12, 16, 22, 30][:outputs]
     a = built.rows(np.array([(g, 3) for g in grids])) @ modal.shapes
     b = built.rows(np.array([(8, 3)])) @ modal.shapes
@@ -170,12 +170,13 @@ def test_least_data(modes: int, channels: int, enough: bool) -> None:
 
 
 def test_a_name_is_withheld_with_what_it_cannot_be_told_from() -> None:
-    def trial(name: str, S: float) -> SimpleNamespace:
-        return SimpleNamespace(effect=SimpleNamespace(name=name), S=S)
+    def hypothesis(name: str, S: float) -> SimpleNamespace:
+        return SimpleNamespace(effect=SimpleNamespace(name=name), neg2_log_evidence=S)
 
-    trials = (trial("point-mass", 10.0), trial("suspension", 90.0), trial("sensor-fault", 130.0))
-    null = trial("nothing", 100.0)
-    found = Diagnosis(null, null, null, trials, "missing physics")  # type: ignore[arg-type]
+    ends = {"point-mass": 10.0, "suspension": 90.0, "sensor-fault": 130.0}
+    hypotheses = tuple(hypothesis(name, S) for name, S in ends.items())
+    null = hypothesis("nothing", 100.0)
+    found = Diagnosis(null, null, null, hypotheses, "missing physics")  # type: ignore[arg-type]
     few = SimpleNamespace(too_little="3 modes cannot bear a name")
     kept = withheld(SimpleNamespace(too_little=""), found)  # type: ignore[arg-type]
     assert kept is found

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import chladni
 from chladni.cli.app import COMMANDS, application
 from chladni.output import plain
-from chladni.planning import Wishes
+from chladni.planning import PlanSettings
 from chladni.report.result_json import to_json
 
 WORKFLOW = {  # command: the function it calls
@@ -54,7 +54,7 @@ def test_every_command_has_a_function_that_a_notebook_can_call(command):
         (
             "plan",
             "plan.json",
-            lambda case: chladni.plan(case, Wishes(sensors=8, modes=5, draws=0)),
+            lambda case: chladni.plan(case, PlanSettings(sensors=8, modes=5, draws=0)),
             ("--sensors", "8", "--modes", "5", "--drawn", "0"),
         ),
     ],

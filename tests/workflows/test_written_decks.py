@@ -52,7 +52,7 @@ def test_Q_is_that_of_the_full_matrices(case):
     """
     asked = question(case)
     prepared = prepare(asked)
-    data, state = seen(asked, prepared.score, prepared.nominal, prepared.search.setup.top)
+    data, state = seen(asked, prepared.score, prepared.nominal, prepared.problem.setup.f_max)
     system = prepared.nominal.structure.system
     made = prepared.nominal.structure
     load = asked.inputs.rows(made).T.toarray()[:, 0].astype(complex)

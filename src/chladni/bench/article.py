@@ -9,7 +9,7 @@ from ..dynamics.modes import ModalModel
 
 
 @dataclass(frozen=True)
-class Front:
+class MeasurementChain:
     """Measuring chain of an averaged FRF.
 
     ``noise``: standard deviation of each line relative to its own magnitude; ``floor``: relative
@@ -25,7 +25,7 @@ def measured(
     phi_out: np.ndarray,
     phi_in: np.ndarray,
     frequency: np.ndarray,
-    front: Front,
+    chain: MeasurementChain,
     rng: np.random.Generator,
     outputs: tuple[str, ...],
     inputs: tuple[str, ...],
@@ -39,20 +39,20 @@ def measured(
     """
     s = 2j * np.pi * frequency
     H = transfer(modal, phi_out, phi_in, s) * s[:, None, None] ** 2
-    return recorded(H, frequency, front, rng, outputs, inputs)
+    return recorded(H, frequency, chain, rng, outputs, inputs)
 
 
 def recorded(
     H: np.ndarray,
     frequency: np.ndarray,
-    front: Front,
+    chain: MeasurementChain,
     rng: np.random.Generator,
     outputs: tuple[str, ...],
     inputs: tuple[str, ...],
 ) -> FRF:
     """Accelerance H (n_f, n_out, n_in) as the front end gives it, with noise and its variance."""
     rms = np.sqrt((np.abs(H) ** 2).mean(axis=0, keepdims=True))
-    variance = (front.noise * np.abs(H)) ** 2 + (front.floor * rms) ** 2
+    variance = (chain.noise * np.abs(H)) ** 2 + (chain.floor * rms) ** 2
     e = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2)
     return FRF(
         H + np.sqrt(variance) * e, frequency, outputs, inputs, "accelerance", variance=variance

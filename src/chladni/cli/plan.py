@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..planning import Wishes
+from ..planning import PlanSettings
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
@@ -40,10 +40,10 @@ def run(
     out: Out = None,
 ) -> None:
     """Sensors by effective independence and exchange, shaker and cords, lines and duration."""
-    wishes = Wishes(
+    settings = PlanSettings(
         sensors=sensors,
         modes=modes,
-        top=top,
+        f_max=top,
         damping=damping,
         candidates=candidates,
         spacing=spacing,
@@ -59,7 +59,7 @@ def run(
         job.progress("reading the model", 0.0)
         model = load_model(source, units, command="plan")
         job.notes += model.notes
-        found = plan(model, wishes, within(job.progress, 0.1, 0.8))
+        found = plan(model, settings, within(job.progress, 0.1, 0.8))
         job.json("plan.json", to_json(found))
         job.progress("pictures", 0.8)
         job.show(plan_page(job.folder, model, found))

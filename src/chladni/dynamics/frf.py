@@ -222,9 +222,9 @@ def residual_flexibility(
     return Residual(static, slope, sigma)
 
 
-def residual_shift(modal: ModalModel, top: float) -> float:
-    """σ = -λ/100 [rad²/s²], λ the highest kept, or (2π top)² where only rigid modes are kept."""
-    return -1e-2 * (2 * np.pi * max(float(modal.frequency.max(initial=0.0)), top)) ** 2
+def residual_shift(modal: ModalModel, f_max: float) -> float:
+    """σ = -λ/100 [rad²/s²], λ the highest kept, or (2π f_max)² where only rigid modes are kept."""
+    return -1e-2 * (2 * np.pi * max(float(modal.frequency.max(initial=0.0)), f_max)) ** 2
 
 
 def unit_columns(n: int, rows: np.ndarray) -> np.ndarray:

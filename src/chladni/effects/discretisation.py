@@ -33,7 +33,7 @@ class MeshError(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class Jitter(Effect):
+class ModalDiscrepancy(Effect):
     """Every mode's stiffness may be off a little on its own."""
 
     name = "jitter"
@@ -49,8 +49,8 @@ class Jitter(Effect):
         return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam)),)
 
 
-def mesh_error(model: Modelled, top: float) -> MeshError | None:
-    """The mesh error of a structure up to 1.4 times the frequency ``top``; None if too large.
+def mesh_error(model: Modelled, f_max: float) -> MeshError | None:
+    """The mesh error of a structure up to 1.4 times the frequency ``f_max``; None if too large.
 
     With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
     ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
@@ -58,9 +58,9 @@ def mesh_error(model: Modelled, top: float) -> MeshError | None:
     built = model.structure
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
         return None
-    coarse = _flexible(model.up_to(1.4 * top), top)
-    finer = modelled(refined(built.assembly), 1.6 * top)
-    fine = _flexible(finer.modes, top)
+    coarse = _flexible(model.up_to(1.4 * f_max), f_max)
+    finer = modelled(refined(built.assembly), 1.6 * f_max)
+    fine = _flexible(finer.modes, f_max)
     rows = _rows_of(finer.structure, built)
     M_phi = built.system.M @ coarse.shapes
     overlap = M_phi.T @ (rows @ fine.shapes)
@@ -75,27 +75,29 @@ def mesh_error(model: Modelled, top: float) -> MeshError | None:
     return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
 
 
-def jitter(model: Modelled, top: float, mesh: MeshError | None, sd: float = 0.0015) -> Jitter:
-    """Independent scatter of each modal frequency up to ``top``.
+def modal_discrepancy(
+    model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.0015
+) -> ModalDiscrepancy:
+    """Independent scatter of each modal frequency up to ``f_max``.
 
     Standard deviation of ln f: ``sd``, and half of what the finer mesh changes in that mode.
     """
-    modes = _flexible(model.up_to(1.1 * top), top)
+    modes = _flexible(model.up_to(1.1 * f_max), f_max)
     lam = (2 * np.pi * modes.frequency) ** 2
     own = np.zeros(len(lam))
     if mesh is not None:
         b = mesh.rows @ modes.shapes
         own = 0.5 * np.abs((b.T * mesh.change) @ b).diagonal() / (2 * lam)
     unknown = tuple(
-        Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(spread), kind="linear", step=0.02)
-        for r, spread in enumerate(np.hypot(sd, own))
+        Parameter(f"mode {r + 1}", "-", 0.0, 2 * float(std), kind="linear", step=0.02)
+        for r, std in enumerate(np.hypot(sd, own))
     )
     rows = sp.csr_array((model.structure.system.M @ modes.shapes).T)
-    return Jitter(unknown, "every mode", rows=rows, lam=lam)
+    return ModalDiscrepancy(unknown, "every mode", rows=rows, lam=lam)
 
 
-def _flexible(modes: ModalModel, top: float) -> ModalModel:
-    keep = modes.frequency > 1e-3 * top
+def _flexible(modes: ModalModel, f_max: float) -> ModalModel:
+    keep = modes.frequency > 1e-3 * f_max
     return ModalModel(modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs)
 
 

@@ -122,7 +122,7 @@ def _scaled_material(material: Material, quantity: str, factor: float) -> Materi
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter(Effect):
+class RandomField(Effect):
     """Smooth scatter of a field within the parts, by Karhunen-Loève functions of unit prior."""
 
     name = "scatter"
@@ -138,9 +138,9 @@ class Scatter(Effect):
         return (FieldChange(self.quantity, self.functions @ x, self.functions),)
 
 
-def scatter(
+def random_field(
     groups: ShellGroups, quantity: str, sd: float, length: float = 0.3, most: int = 12
-) -> Scatter:
+) -> RandomField:
     """Gaussian scatter of standard deviation sd within each part, mean removed.
 
     Correlation exp(-d²/2ℓ²) with ℓ a share ``length`` of the part's longest side; the ``most``
@@ -159,7 +159,7 @@ def scatter(
         Parameter(f"{quantity} scatter {j + 1}", "-", 0.0, 1.0, kind="linear", step=1.5)
         for j in range(functions.shape[1])
     )
-    return Scatter(unknown, f"scatter of {quantity}", quantity=quantity, functions=functions)
+    return RandomField(unknown, f"scatter of {quantity}", quantity=quantity, functions=functions)
 
 
 def _functions(
@@ -183,7 +183,7 @@ def _functions(
 
 
 @dataclass(frozen=True, eq=False)
-class Gain(Effect):
+class ChannelGain(Effect):
     """One real factor common to all channels is unknown."""
 
     name = "gain"
@@ -197,6 +197,7 @@ class Gain(Effect):
         return ChannelChange(x[0] * one.astype(complex), one[:, None].astype(complex))
 
 
-def gain(n_outputs: int, sd: float) -> Gain:
+def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
     """The unknown gain, a factor e^x."""
-    return Gain((Parameter("gain", "-", 0.0, sd, step=1.0),), "every channel", n_outputs=n_outputs)
+    unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
+    return ChannelGain((unknown,), "every channel", n_outputs=n_outputs)

@@ -21,18 +21,18 @@ class Setup:
     sensors : of each output the (grid id, weight) it hangs on
     hangers : grid ids
     weight : mass of the structure [kg]
-    top : highest frequency of interest [Hz]
+    f_max : highest frequency of interest [Hz]
     """
 
     sensors: tuple[Share, ...]
     hangers: tuple[int, ...]
     weight: float
-    top: float
+    f_max: float
 
     @property
     def stiffness(self) -> float:
         """Spring on which a tenth of the mass swings at a third of the top frequency [N/m]."""
-        return 0.1 * self.weight * (2 * np.pi * self.top / 3) ** 2
+        return 0.1 * self.weight * (2 * np.pi * self.f_max / 3) ** 2
 
 
 @dataclass(frozen=True, eq=False)

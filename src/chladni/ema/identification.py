@@ -16,11 +16,11 @@ from .pole_selection import (
     Rule,
     Sweep,
     extended,
+    merge_duplicate_poles,
     settled,
     start,
     swept,
     uncertainty,
-    untwinned,
 )
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
@@ -36,7 +36,7 @@ class Identified:
     residues : (r, n_out, n_in)      R_r of the receptance
     lower, upper : (n_out, n_in)     L, U: modes below and above the band
     frequency_sd, damping_sd : (r,)  standard deviations [Hz], [-]
-    gain : (r,)                      rise of χ² without the pole, over what it must pay
+    relative_delta_chi2 : (r,)       rise of χ² without the pole, over what it must pay
     chi : float                      rms of the whitened residual (1: the noise is all that is left)
     outputs, inputs, quantity        as in the recording
     band : (low, high)               [Hz] that was fitted
@@ -49,7 +49,7 @@ class Identified:
     upper: np.ndarray
     frequency_sd: np.ndarray
     damping_sd: np.ndarray
-    gain: np.ndarray
+    relative_delta_chi2: np.ndarray
     chi: float
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -79,11 +79,11 @@ class Identified:
 
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes; the residual terms stay."""
-        names = ("poles", "residues", "frequency_sd", "damping_sd", "gain")
+        names = ("poles", "residues", "frequency_sd", "damping_sd", "relative_delta_chi2")
         return replace(self, **{name: getattr(self, name)[modes] for name in names})
 
 
-def spread(frf: FRF, averages: int = 1) -> np.ndarray:
+def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
     """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
 
     In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
@@ -145,22 +145,22 @@ def identify(
             f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
             f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
-    data, top = _data(frf, keep, averages)
+    data, omega_max = _data(frf, keep, averages)
     sweep = swept(data, orders, largest_damping)
     rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
     p = start(data, sweep, rule)
     fit, slope = settled(data, p, rule)
     fit, slope = extended(data, fit, slope, rule, tries)
-    fit, slope = untwinned(data, fit, slope, rule)
+    fit, slope = merge_duplicate_poles(data, fit, slope, rule)
     fit, slope = polish(data, fit.p, rule.largest, tol=0.05)
-    return _result(frf, keep, data, top, fit, slope, sweep, rule)
+    return _result(frf, keep, data, omega_max, fit, slope, sweep, rule)
 
 
 def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     """Scaled, weighted samples, and the scale of s."""
-    variance = spread(frf, averages)
+    variance = frf_variance(frf, averages)
     s = 2j * np.pi * frf.frequency[keep]
-    top = float(np.abs(s).max())
+    omega_max = float(np.abs(s).max())
     y = frf.values[keep].reshape(len(s), -1)
     v = variance[keep].reshape(len(s), -1)
     fine = np.isfinite(y) & np.isfinite(v) & (v > 0)
@@ -168,14 +168,15 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
-    return PoleData(s / top, np.where(fine, y, 0) / top**q, w * top**q, q), top
+    y = np.where(fine, y, 0)
+    return PoleData(s / omega_max, y / omega_max**q, w * omega_max**q, q), omega_max
 
 
 def _result(
     frf: FRF,
     keep: np.ndarray,
     data: PoleData,
-    top: float,
+    omega_max: float,
     fit: PoleFit,
     slope: PoleSystem,
     sweep: Sweep,
@@ -190,19 +191,19 @@ def _result(
     shape = (n_out, n_in)
     f = frf.frequency[keep]
     return Identified(
-        poles=top * fit.p[order],
-        residues=top * fit.residues[order].reshape(-1, *shape),
-        lower=top**2 * fit.x[-2].reshape(shape),
+        poles=omega_max * fit.p[order],
+        residues=omega_max * fit.residues[order].reshape(-1, *shape),
+        lower=omega_max**2 * fit.x[-2].reshape(shape),
         upper=fit.x[-1].reshape(shape),
-        frequency_sd=top * sd_f[order] / (2 * np.pi),
+        frequency_sd=omega_max * sd_f[order] / (2 * np.pi),
         damping_sd=sd_z[order],
-        gain=fit.gain[order] / rule.price,
+        relative_delta_chi2=fit.delta_chi2[order] / rule.price,
         chi=float(chi),
         outputs=frf.outputs,
         inputs=frf.inputs,
         quantity=frf.quantity,
         band=(float(f[0]), float(f[-1])),
-        diagram=replace(sweep, poles=top * sweep.poles),
+        diagram=replace(sweep, poles=omega_max * sweep.poles),
     )
 
 

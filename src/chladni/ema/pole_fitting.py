@@ -79,13 +79,13 @@ class PoleFit:
     p : (r,) complex
     x : (2 r + 2, n_c)    real coefficients of `linear`
     e : (n_f, n_c)        weighted complex residual w (y - Φ x)
-    gain : (r,)           how much χ² would rise without each pole, the other poles fixed
+    delta_chi2 : (r,)     how much χ² would rise without each pole, the other poles fixed
     """
 
     p: np.ndarray
     x: np.ndarray
     e: np.ndarray
-    gain: np.ndarray
+    delta_chi2: np.ndarray
 
     @property
     def chi2(self) -> float:
@@ -129,7 +129,7 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     v = np.concatenate([data.w / data.common[:, None]] * 2)
     t = stacked(data.common[:, None] * data.y)
     n_c, r = data.y.shape[1], len(p)
-    x, gain = np.empty((n, n_c)), np.zeros(r)
+    x, delta_chi2 = np.empty((n, n_c)), np.zeros(r)
     H, g = np.zeros((2 * r, 2 * r)), np.zeros(2 * r)
     ridge = 1e-12 * np.eye(n)
     inverse = solve_triangular(R1, np.eye(n))
@@ -139,7 +139,7 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
         factor = cho_factor(G[:n, :n] + ridge, check_finite=False)
         a = cho_solve(factor, V[:, :n].T @ u, check_finite=False)
         x[:, c] = inverse @ a
-        gain += _gains(inverse, factor, x[:, c], r)
+        delta_chi2 += _delta_chi2(inverse, factor, x[:, c], r)
         if slope:
             rest = V[:, n:].T @ (u - V[:, :n] @ a)
             S = G[n:, n:] - G[n:, :n] @ cho_solve(factor, G[:n, n:], check_finite=False)
@@ -149,7 +149,7 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
             H += np.einsum("kaln,lnb->kalb", M, T).reshape(2 * r, 2 * r)
             g += np.einsum("kma,km->ka", T, (R2.T @ rest).reshape(r, 2)).ravel()
     e = data.w * (data.y - A @ x)
-    return PoleFit(p, x, e, gain), PoleSystem(H, g) if slope else None
+    return PoleFit(p, x, e, delta_chi2), PoleSystem(H, g) if slope else None
 
 
 def _turn(ab: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def _turn(ab: np.ndarray) -> np.ndarray:
     return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], axis=1)
 
 
-def _gains(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndarray:
+def _delta_chi2(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndarray:
     """Wald's xᵀ C⁻¹ x of every residue: rise of χ² when its pole is left out (r,)."""
     root = solve_triangular(factor[0], inverse[: 2 * r].T, trans="T", check_finite=False)
     k = 2 * np.arange(r)

@@ -24,14 +24,14 @@ class Sweep:
     ----------
     order : (k,) int      number of pole pairs of the fit each pole comes from
     poles : (k,) complex  scaled as the data
-    gain : (k,)           rise of χ² without the pole
+    delta_chi2 : (k,)     rise of χ² without the pole
     chi : (n_orders,)     rms of the whitened residual, by order
     orders : (n_orders,) int
     """
 
     order: np.ndarray
     poles: np.ndarray
-    gain: np.ndarray
+    delta_chi2: np.ndarray
     chi: np.ndarray
     orders: np.ndarray
 
@@ -81,7 +81,7 @@ def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1
     f = np.abs(data.s)
     order: list[int] = []
     poles: list[complex] = []
-    gain: list[float] = []
+    delta_chi2: list[float] = []
     chi: list[float] = []
     done: list[int] = []
     best = np.inf
@@ -96,14 +96,16 @@ def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1
         parameters = fit.x.size + 2 * len(p)
         order += [n] * len(p)
         poles += list(fit.p)
-        gain += list(fit.gain)
+        delta_chi2 += list(fit.delta_chi2)
         done.append(n)
         chi.append(float(np.sqrt(fit.chi2 / max(data.samples - parameters, 1))))
         score = fit.chi2 + 2 * parameters
         if score > best and len(done) > 2 and chi[-1] < 1.2 * min(chi):
             break
         best = min(best, score)
-    return Sweep(np.array(order), np.array(poles), np.array(gain), np.array(chi), np.array(done))
+    return Sweep(
+        np.array(order), np.array(poles), np.array(delta_chi2), np.array(chi), np.array(done)
+    )
 
 
 def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
@@ -130,7 +132,7 @@ def start(data: PoleData, sweep: Sweep, rule: Rule) -> np.ndarray:
     """Poles to begin with: what pays in the richest order, and clusters the rest agree on."""
     p, richest = sweep.poles, sweep.orders.max()
     low, high = 0.9 * float(np.abs(data.s).min()), 1.1 * float(np.abs(data.s).max())
-    fits = (low < np.abs(p)) & (np.abs(p) < high) & (sweep.gain > rule.price)
+    fits = (low < np.abs(p)) & (np.abs(p) < high) & (sweep.delta_chi2 > rule.price)
     fits &= -p.real / np.abs(p) < rule.largest
     leading = [g for g in clusters(sweep, fits) if sweep.order[g[0]] == richest or len(g) > 2]
     chosen = p[[g[0] for g in leading]]
@@ -171,10 +173,10 @@ def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.nda
     no_mode = (size < low / BEYOND) | (size > BEYOND * high) | (half > 0.98 * rule.largest * size)
     inside = (low <= size) & (size <= high)
     no_mode |= inside & (uncertainty(fit.p, slope, rule.noise)[0] > half)
-    gain = np.where(no_mode, 0.0, fit.gain)
+    delta_chi2 = np.where(no_mode, 0.0, fit.delta_chi2)
     out: list[int] = []
-    for k in np.lexsort((fit.gain, gain)):
-        if gain[k] >= rule.price:
+    for k in np.lexsort((fit.delta_chi2, delta_chi2)):
+        if delta_chi2[k] >= rule.price:
             break
         if (np.abs(fit.p[out] - fit.p[k]) > 4 * np.minimum(half[out], half[k])).all():
             out.append(int(k))
@@ -230,7 +232,7 @@ def _with_pole(
     return polish(data, best.p, rule.largest, 8, rule.noise)
 
 
-def untwinned(
+def merge_duplicate_poles(
     data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule
 ) -> tuple[PoleFit, PoleSystem]:
     """Twins made one: two poles in one bandwidth with the same shape are one mode, seen twice.
@@ -260,9 +262,9 @@ def _twins(fit: PoleFit) -> list[int]:
     close = np.abs(fit.p[:, None] - fit.p) < 1.5 * np.maximum(half[:, None], half)
     power = (np.abs(R) ** 2).sum(axis=1)
     alike = np.abs(R.conj() @ R.T) ** 2 > 0.8 * power[:, None] * power
-    weaker = fit.gain[:, None] < fit.gain
+    weaker = fit.delta_chi2[:, None] < fit.delta_chi2
     pairs = (close & alike & weaker).any(axis=1)
-    return [int(k) for k in np.argsort(fit.gain) if pairs[k]]
+    return [int(k) for k in np.argsort(fit.delta_chi2) if pairs[k]]
 
 
 def _local(fit: PoleFit) -> np.ndarray:

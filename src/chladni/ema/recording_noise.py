@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..dynamics.frf import FRF
-from .identification import DERIVATIVES, Identified, spread
+from .identification import DERIVATIVES, Identified, frf_variance
 from .pole_fitting import basis, linear, residual_terms, stacked
 
 LN10 = np.log(10.0)
@@ -31,22 +31,23 @@ def equalised_noise(
     """
     low, high = identified.band
     keep = use & (frf.frequency >= low) & (frf.frequency <= high) & (frf.frequency > 0)
-    top, q = 2 * np.pi * high, DERIVATIVES[identified.quantity]
-    sigma = identified.chi * np.sqrt(spread(frf, averages)[keep] / 2)
-    w = top**q / sigma.reshape(len(sigma), -1)
-    p, R = identified.poles / top, identified.residues.reshape(len(identified.poles), -1) / top
-    line = 2j * np.pi * frf.frequency[keep] / top
+    omega_max, q = 2 * np.pi * high, DERIVATIVES[identified.quantity]
+    sigma = identified.chi * np.sqrt(frf_variance(frf, averages)[keep] / 2)
+    w = omega_max**q / sigma.reshape(len(sigma), -1)
+    p = identified.poles / omega_max
+    R = identified.residues.reshape(len(p), -1) / omega_max
+    line = 2j * np.pi * frf.frequency[keep] / omega_max
     F, second = linear(line, p, q), basis(line, p, q, 2)
     known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]
     S = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)
     H, out = np.zeros((len(s), w.shape[1]), complex), np.empty((len(s), w.shape[1]))
-    columns = _equalised_columns(s / top, p, q)
+    columns = _equalised_columns(s / omega_max, p, q)
     for c, (root, tied, _) in enumerate(known):
-        x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / top**2,
+        x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / omega_max**2,
                             identified.upper.ravel()[c : c + 1]])  # fmt: skip
         H[:, c] = columns @ x
         own = solve_triangular(root, columns.T, trans="T")
-        shared = _equalised_slopes(s / top, p, R[:, c], q).T - tied.T @ own
+        shared = _equalised_slopes(s / omega_max, p, R[:, c], q).T - tied.T @ own
         variance = (np.abs(own) ** 2).sum(axis=0)
         out[:, c] = variance + np.einsum("ks,kl,ls->s", shared.conj(), S, shared).real
     return (out / (np.abs(H) * LN10) ** 2).reshape(len(s), *identified.lower.shape)

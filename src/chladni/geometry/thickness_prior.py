@@ -94,8 +94,8 @@ def learn(assembly: Assembly, parts: tuple[str, ...] = ()) -> ThinningModel:
         left_out[name] = _rms(y[r] - guess, weight[r])
         trivial[name] = _rms(y[r], weight[r])
     every = np.concatenate(list(rows.values()))
-    spread = float(np.std(strength, ddof=1))
-    return ThinningModel(beta, spread, _rms(within, weight[every]), left_out, trivial)
+    std = float(np.std(strength, ddof=1))
+    return ThinningModel(beta, std, _rms(within, weight[every]), left_out, trivial)
 
 
 def _rms(error: np.ndarray, weight: np.ndarray) -> float:

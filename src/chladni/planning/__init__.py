@@ -67,5 +67,5 @@ from .plan_summary import summary as summary
 from .sensor_candidates import SensorCandidates as SensorCandidates
 from .sensor_candidates import find_sensor_candidates as find_sensor_candidates
 from .whole_plan import Plan as Plan
-from .whole_plan import Wishes as Wishes
+from .whole_plan import PlanSettings as PlanSettings
 from .whole_plan import plan as plan

@@ -44,17 +44,19 @@ class Ensemble:
         return self.model.basis
 
 
-def ensemble(built: Structure, top: float, spread: float, progress: Progress = silent) -> Ensemble:
+def ensemble(
+    built: Structure, f_max: float, spread: float, progress: Progress = silent
+) -> Ensemble:
     """Make a structure ready for draws of thickness.
 
     Parameters
     ----------
-    top : highest target frequency [Hz]
+    f_max : highest target frequency [Hz]
     spread : standard deviation of the logarithm of each part's thickness
     """
     progress("models with drawn thickness", 0.0)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
-    modal = normal_modes(built.system, band=REACH * top, points=where)
+    modal = normal_modes(built.system, band=REACH * f_max, points=where)
     groups = shell_groups(built, 1)
     parts = np.unique(groups.part).tolist()
     effects = tuple(ordinary(groups, "t", [p], spread) for p in parts)
@@ -62,7 +64,7 @@ def ensemble(built: Structure, top: float, spread: float, progress: Progress = s
     rng = np.random.default_rng(0)
     for k in range(FULL):
         progress(f"drawn model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
-        blocks.append(_solved(built, effects, random(rng, len(parts), spread), 1.1 * top))
+        blocks.append(_solved(built, effects, random(rng, len(parts), spread), 1.1 * f_max))
     basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
     return Ensemble(reduce(groups, basis), effects, int(rigid_modes(modal).sum()))
 
@@ -73,12 +75,12 @@ def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:
 
 
 def _solved(
-    built: Structure, effects: tuple[PartScale, ...], x: np.ndarray, top: float
+    built: Structure, effects: tuple[PartScale, ...], x: np.ndarray, f_max: float
 ) -> np.ndarray:
     """Mode shapes up to a frequency of a model drawn at x."""
     drawn = with_thickness(built, effects, x)
     where = drawn.assembly.points[drawn.assembly.rows(drawn.system.dofs[:, 0])]
-    shapes = normal_modes(drawn.system, band=top, points=where).shapes
+    shapes = normal_modes(drawn.system, band=f_max, points=where).shapes
     if len(shapes) != len(built.system.dofs):
         raise ModelError("a part's thickness changed which degrees of freedom are free")
     return shapes

@@ -196,8 +196,8 @@ def _actuator(found: Plan, i: int) -> PlannedActuator:
 def _rattle(found: Plan) -> RattleOverview:
     clearance = found.openings.clearance
     return RattleOverview(
-        force_n=found.wishes.force,
-        places_vetoed=int((found.rattle.force < found.wishes.force).sum()),
+        force_n=found.settings.force,
+        places_vetoed=int((found.rattle.force < found.settings.force).sum()),
         without_a_straight_way=int((~found.places.straight).sum()),
         open_places=len(clearance),
         least_clearance_m=float(clearance.min()) if len(clearance) else None,
@@ -213,7 +213,7 @@ def _modes(found: Plan) -> tuple[PlannedMode, ...]:
             visibility=float(found.visible[k]),
             visibility_before=float(found.visible_before[k]),
             seen_by_normals=bool(found.aimed[k]),
-            seen=bool(found.visible[k] >= found.wishes.floor),
+            seen=bool(found.visible[k] >= found.settings.floor),
             with_sensor_mass_hz=float(found.loaded[k]),
         )
         for k, f in enumerate(found.modal.frequency)
@@ -268,7 +268,7 @@ def sensors_csv(found: Plan) -> str:
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
     write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
-    rows = [(int(i), "output", found.wishes.mass) for i in found.layout]
+    rows = [(int(i), "output", found.settings.mass) for i in found.layout]
     for i, role, mass in [*rows, *((int(i), "input", 0.0) for i in found.together)]:
         at = _place(found, i)
         place = [""] * 3 if at.grid is not None else [f"{x:.7g}" for x in at.point_m]

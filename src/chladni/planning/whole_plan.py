@@ -34,14 +34,14 @@ TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting b
 
 
 @dataclass(frozen=True)
-class Wishes:
+class PlanSettings:
     """What the test is to be; lengths in metres.
 
     Attributes
     ----------
     sensors : uniaxial accelerometers at hand
-    modes : target modes; None: those below ``top``, or 24, or 4/5 of the sensors
-    top : highest frequency of interest [Hz]
+    modes : target modes; None: those below ``f_max``, or 24, or 4/5 of the sensors
+    f_max : highest frequency of interest [Hz]
     damping : expected damping ratio of every mode
     candidates : places looked at
     spacing : least distance between two sensors [m]
@@ -57,7 +57,7 @@ class Wishes:
 
     sensors: int = 30
     modes: int | None = None
-    top: float | None = None
+    f_max: float | None = None
     damping: float = 0.01
     candidates: int = 300
     spacing: float = 0.0
@@ -124,7 +124,7 @@ class Plan:
     quiet : (k,)                  their rms motion over the first modes, of the largest anywhere
     """
 
-    wishes: Wishes
+    settings: PlanSettings
     places: SensorCandidates
     modal: ModalModel
     first: int
@@ -151,7 +151,7 @@ class Plan:
 
 def plan(
     assembly: Assembly,
-    wishes: Wishes | None = None,
+    settings: PlanSettings | None = None,
     *,
     built: Structure | None = None,
     unit: str = "m",
@@ -164,31 +164,31 @@ def plan(
     built : the assembled structure, where it is at hand
     unit : "" where the deck's unit of length is not known
     """
-    wishes = wishes or Wishes()
+    settings = settings or PlanSettings()
     progress("places a sensor can sit at", 0.05)
-    places = find_sensor_candidates(assembly, wishes.candidates, unit=unit)
+    places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
     progress("modes", 0.2)
     built = built or structure(assembly)
-    modal, above, first = target_modes(built, wishes)
+    modal, above, first = target_modes(built, settings)
     mounts = mounts_at(places)
     moving = motion(built, above)
     phi = seen_at(places, mounts, moving)
     progress("sensors", 0.6)
     r, normal = len(modal), mounts.normal
     largest = np.linalg.norm(moving, axis=1).max(axis=0)
-    visible = visibility(phi[normal], largest) >= BLIND * wishes.floor
+    visible = visibility(phi[normal], largest) >= BLIND * settings.floor
     aimed, largest = visible[:r], largest[:r]
     flat = phi[normal, :r][:, aimed]
     draws = flat
-    if wishes.draws:
+    if settings.draws:
         stage = within(progress, 0.6, 0.75)
-        models = ensemble(built, float(modal.frequency[-1]), wishes.spread, stage)
+        models = ensemble(built, float(modal.frequency[-1]), settings.spread, stage)
         basis = seen_at(places, mounts, recovered(built, models.basis))[normal]
-        _, draws = drawn(models, basis, r, wishes.draws, wishes.spread, wishes.seed)
+        _, draws = drawn(models, basis, r, settings.draws, settings.spread, settings.seed)
         draws = draws[:, :, aimed]
-    ranked, log_det = _layout(draws, mounts, wishes)
+    ranked, log_det = _layout(draws, mounts, settings)
     layout, moves = with_visible_modes(
-        phi[:, :r], ranked, largest, floor=wishes.floor, rules=_near(mounts, wishes)
+        phi[:, :r], ranked, largest, floor=settings.floor, rules=_near(mounts, settings)
     )
     progress("shaker and cords", 0.8)
     f, zeta, seen = modal.frequency, modal.damping, phi[layout, :r]
@@ -197,13 +197,13 @@ def plan(
     gaps = openings(assembly, moving[:, :, :r])
     rattle = first_rattle(f, zeta, phi[normal, :r], gaps)
     ranking = ranked_actuators(
-        shaker, f[aimed], flat, margin=rattle.force / wishes.force, access=places.straight
+        shaker, f[aimed], flat, margin=rattle.force / settings.force, access=places.straight
     )
-    enough = ranking.allowed.sum() >= wishes.actuators
+    enough = ranking.allowed.sum() >= settings.actuators
     hangers, quiet = hang_points(moving[:, :, :r], places)
     three = places.moving(moving, mounts.place[layout])[..., :r]
     return Plan(
-        wishes,
+        settings,
         places,
         modal,
         first,
@@ -215,32 +215,33 @@ def plan(
         visibility(phi[ranked, :r], largest),
         visibility(seen, largest),
         log_det,
-        mode_sweep(phi[normal][:, visible], wishes.sensors, int(aimed.sum())),
+        mode_sweep(phi[normal][:, visible], settings.sensors, int(aimed.sum())),
         ranking,
         rattle,
         gaps,
-        best_actuators(shaker, wishes.actuators, ranking.allowed if enough else None),
+        best_actuators(shaker, settings.actuators, ranking.allowed if enough else None),
         (modal_rank(f, seen), 2 * r),
         gramian_quotient(observed, f),
         auto_mac(seen),
-        loaded_frequency(f, three, wishes.mass),
+        loaded_frequency(f, three, settings.mass),
         hangers,
         quiet,
     )
 
 
-def target_modes(built: Structure, wishes: Wishes) -> tuple[ModalModel, ModalModel, int]:
+def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, ModalModel, int]:
     """Target modes, these and some above, and the number of rigid modes before them."""
-    due = wishes.modes or min(24, 4 * wishes.sensors // 5)
+    due = settings.modes or min(24, 4 * settings.sensors // 5)
     n = len(built.system.dofs)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
     modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
     rigid = int(rigid_modes(modal).sum())
-    above = modal.sel(slice(rigid, None)).with_damping(wishes.damping)
-    below = np.flatnonzero(above.frequency <= (wishes.top or np.inf))
+    above = modal.sel(slice(rigid, None)).with_damping(settings.damping)
+    below = np.flatnonzero(above.frequency <= (settings.f_max or np.inf))
     if not len(below):
         raise ModelError(
-            f"no flexible mode below {wishes.top:g} Hz; the first is at {above.frequency[0]:.4g} Hz"
+            f"no flexible mode below {settings.f_max:g} Hz; the first is at "
+            f"{above.frequency[0]:.4g} Hz"
         )
     return above.sel(slice(0, min(due, len(below)))), above, rigid
 
@@ -294,31 +295,33 @@ def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
     ]
 
 
-def _near(mounts: Mount, wishes: Wishes) -> Rules:
+def _near(mounts: Mount, settings: PlanSettings) -> Rules:
     """Sensors keep their distance; one grid bears one sensor."""
-    near = too_near(mounts.points, max(wishes.spacing, 1e-9))
+    near = too_near(mounts.points, max(settings.spacing, 1e-9))
     return Rules(near=near)
 
 
-def _layout(phi: np.ndarray, mounts: Mount, wishes: Wishes) -> tuple[np.ndarray, dict[str, float]]:
+def _layout(
+    phi: np.ndarray, mounts: Mount, settings: PlanSettings
+) -> tuple[np.ndarray, dict[str, float]]:
     """The layout, ranked, and log det of the layouts of several methods."""
     c = candidates(phi)
-    rules = Rules(near=too_near(mounts.points[mounts.normal], wishes.spacing))
-    rules = rules if wishes.spacing > 0 else Rules()
-    efi = deletion(c, wishes.sensors, rules=rules).ranked
+    rules = Rules(near=too_near(mounts.points[mounts.normal], settings.spacing))
+    rules = rules if settings.spacing > 0 else Rules()
+    efi = deletion(c, settings.sensors, rules=rules).ranked
     best = kept = exchange(c, efi, rules=rules)
     layouts = {
-        "greedy": greedy(c, wishes.sensors, rules=rules),
+        "greedy": greedy(c, settings.sensors, rules=rules),
         "effective independence": efi,
         "with exchange": kept,
     }
-    if wishes.alike < 1:
+    if settings.alike < 1:
         layouts["with modes told apart"] = best = distinct(
-            c, kept, ceiling=wishes.alike, rules=rules
+            c, kept, ceiling=settings.alike, rules=rules
         )
-    if wishes.spacing == 0 and c.rows.shape[0] == 1:
-        layouts = {"pivoted QR": qr_ranking(c.rows[0])[: wishes.sensors], **layouts}
-    ranked = deletion(c, wishes.sensors, rules=_only(best, len(c))).ranked
+    if settings.spacing == 0 and c.rows.shape[0] == 1:
+        layouts = {"pivoted QR": qr_ranking(c.rows[0])[: settings.sensors], **layouts}
+    ranked = deletion(c, settings.sensors, rules=_only(best, len(c))).ranked
     return ranked, {name: value("D", c.fisher(k)) for name, k in layouts.items()}
 
 

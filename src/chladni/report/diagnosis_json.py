@@ -89,8 +89,8 @@ def _fit(a: Agreement) -> dict[str, Any]:
     return {
         **_scores(a.fitted),
         "held_out": {**_scores(a.held_out), "what": a.what},
-        "gain_over_calibration": a.gain,
-        "largest_gain": a.largest_gain,
+        "gain_over_calibration": a.two_log_bayes_factor,
+        "largest_gain": a.largest_two_log_bayes_factor,
         "threshold": a.threshold,
     }
 

@@ -79,17 +79,17 @@ def notes(found: Plan) -> list[str]:
             "others, and a sensor on a block was moved to it where that helps."
         )
     out += _rattle_notes(found)
-    if found.wishes.draws:
+    if found.settings.draws:
         out.append(
-            f"The layout serves {found.wishes.draws} models with the thickness of every part drawn "
-            f"with a standard deviation of {100 * found.wishes.spread:g} %."
+            f"The layout serves {found.settings.draws} models with the thickness of every part "
+            f"drawn with a standard deviation of {100 * found.settings.spread:g} %."
         )
     return out
 
 
 def _rattle_notes(found: Plan) -> list[str]:
     """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
-    out, force = [], found.wishes.force
+    out, force = [], found.settings.force
     if rattling := int((found.rattle.force < force).sum()):
         out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
     if blocked := int((~found.places.straight).sum()):
@@ -231,7 +231,7 @@ def _shaker(
         "Condition: greatest over least Hankel singular value, the lower the better. Least "
         "residue: driving-point residue of the mode driven worst, over the mean. Rattles from: "
         "force at resonance at which two sheets first meet. Allowed: a straight rod leads there, "
-        f"and nothing rattles at {found.wishes.force:g} N."
+        f"and nothing rattles at {found.settings.force:g} N."
     )
     columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
     words = ("rattles from", "allowed", "also a sensor")

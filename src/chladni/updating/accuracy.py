@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect
 from .reduced_model import Reduced, State, evaluate, log_fields, mass_log, slices, stiffness_log
-from .reduced_problem import Workbench
+from .reduced_problem import ReducedProblem
 
 LIMIT = 5e-4  # relative frequency error of a basis that still serves
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid
@@ -54,7 +54,7 @@ class Accuracy:
 
 
 def accuracy(
-    bench: Workbench, model: Reduced, effects: Sequence[Effect], x: np.ndarray, top: float
+    reduced: ReducedProblem, model: Reduced, effects: Sequence[Effect], x: np.ndarray, f_max: float
 ) -> Accuracy:
     """Error of the reduced model's frequencies at x.
 
@@ -62,16 +62,16 @@ def accuracy(
 
     Parameters
     ----------
-    bench : the structure and the factor of its K + σM
+    reduced : the structure and the factor of its K + σM
     model : its reduced model, over whatever basis
-    top : highest frequency of interest [Hz]
+    f_max : highest frequency of interest [Hz]
     """
     state = evaluate(model, effects, x, gradient=False)
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-    at = np.flatnonzero((f > RIGID * top) & (f <= top))
+    at = np.flatnonzero((f > RIGID * f_max) & (f <= f_max))
     q = model.basis @ state.phi[:, at]
     Kq, Mq = products(model, effects, x, q)
-    missing = np.asarray(bench.factor.solve(Kq - state.lam[at] * Mq))
+    missing = np.asarray(reduced.factor.solve(Kq - state.lam[at] * Mq))
     better = _improved(model, effects, x, state, missing)[at]
     return Accuracy(f[at], np.maximum(np.sqrt(state.lam[at] / better) - 1, 0.0), missing)
 

@@ -16,9 +16,9 @@ from scipy.signal import lfilter
 from scipy.stats import norm
 
 from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
-from .hypothesis_fit import Trial
+from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
-from .map_fit import Weighing, beside, unknowns
+from .map_fit import MassMeasurement, beside, unknowns
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300
@@ -82,7 +82,10 @@ NAMES = (
 
 
 def adequacy(
-    trial: Trial, weighing: Weighing | None, labels: tuple[str, ...], draws: int = DRAWS
+    hypothesis: HypothesisFit,
+    mass_measurement: MassMeasurement | None,
+    labels: tuple[str, ...],
+    draws: int = DRAWS,
 ) -> FitTest | None:
     """The test of one explanation; None where errors of the model have no place.
 
@@ -90,13 +93,13 @@ def adequacy(
     ----------
     labels : of the outputs, to say where
     """
-    data, fit = trial.data, trial.fit
+    data, fit = hypothesis.data, hypothesis.fit
     if isinstance(data, Poles):
         return of_poles(data)
     if not isinstance(data, Responses) or data.error is None:
         return None
     r, J = data.scaled(fit.state, True)
-    r0, J0 = beside(fit.effects, weighing, fit.x, fit.state)
+    r0, J0 = beside(fit.effects, mass_measurement, fit.x, fit.state)
     model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)

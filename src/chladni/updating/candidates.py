@@ -11,7 +11,7 @@ from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..effects.surroundings import ShellGrids, Surroundings
 from ..errors import ModelError
-from .hypothesis_fit import Search, Trial
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
 from .reduced_model import evaluate
@@ -20,10 +20,10 @@ from .scan import Baseline, baseline, direction_scores, point_scores, thickness_
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 
-def candidates(search: Search, null: Trial) -> list[Candidate]:
+def candidates(problem: UpdatingProblem, null: HypothesisFit) -> list[Candidate]:
     """The most promising of every family, scanned about the nominal and the calibrated model."""
-    context = UpdatingContext(search, null)
-    free = {e.text for e in search.base}  # what the user freed is in every fit already
+    context = UpdatingContext(problem, null)
+    free = {e.text for e in problem.base}  # what the user freed is in every fit already
     return [
         c for family in families() for c in family.proposed(context) if c.effect.text not in free
     ]
@@ -31,43 +31,48 @@ def candidates(search: Search, null: Trial) -> list[Candidate]:
 
 @dataclass(frozen=True, eq=False)
 class UpdatingContext:
-    """A search as families of effects see it (:class:`..effects.search_context.SearchContext`)."""
+    """An updating problem as families of effects see it.
 
-    search: Search
-    trial: Trial  # the best without any effect
+    See :class:`..effects.search_context.SearchContext`.
+    """
+
+    problem: UpdatingProblem
+    null_fit: HypothesisFit  # the best without any effect
 
     @property
     def where(self) -> Surroundings:
         """The structure and its test."""
-        return self.search.where
+        return self.problem.where
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Outputs of the test."""
-        return self.search.labels
+        return self.problem.labels
 
     @cached_property
     def bases(self) -> tuple[np.ndarray, ...]:
         """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
-        nominal = self.search.mean()
-        kinds = [e.kind == "ordinary" for e in self.search.base for _ in e.parameters]
-        return nominal, np.where(kinds, self.trial.fit.x, nominal)
+        nominal = self.problem.mean()
+        kinds = [e.kind == "ordinary" for e in self.problem.base for _ in e.parameters]
+        return nominal, np.where(kinds, self.null_fit.fit.x, nominal)
 
     @property
     def null(self) -> np.ndarray:
         """Base parameters of the best fit without any effect."""
-        return self.trial.fit.x
+        return self.null_fit.fit.x
 
     @cached_property
     def baselines(self) -> tuple[Baseline, ...]:
         """The base effects linearised at each of ``bases``."""
-        s = self.search
-        return tuple(baseline(s.bench.model, s.base, s.data, s.weighing, x) for x in self.bases)
+        s = self.problem
+        return tuple(
+            baseline(s.reduced.model, s.base, s.data, s.mass_measurement, x) for x in self.bases
+        )
 
     @cached_property
     def scan(self) -> "Scan | None":
         """Fast scores; None where only natural frequencies are known."""
-        data = self.search.data
+        data = self.problem.data
         return Scan(self, data) if isinstance(data, Responses) else None
 
     def scores(self, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
@@ -75,8 +80,8 @@ class UpdatingContext:
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
-        data, base = self.search.data, self.baselines[-1]
-        model = self.search.bench.model.split_for(effect, starts[0])
+        data, base = self.problem.data, self.baselines[-1]
+        model = self.problem.reduced.model.split_for(effect, starts[0])
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
         for k, start in enumerate(starts):
@@ -97,7 +102,7 @@ class UpdatingContext:
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
-        return global_starts(self.search, effect)
+        return global_starts(self.problem, effect)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,27 +115,27 @@ class Scan:
     @cached_property
     def flexibility(self) -> np.ndarray:
         """Static response of the places beyond the basis [m/N]."""
-        return self.context.search.bench.flexibility(self.context.where.places)
+        return self.context.problem.reduced.flexibility(self.context.where.places)
 
     @cached_property
     def deviation(self) -> np.ndarray:
         """log10(H_model / H_test) of the best fit without any effect, on the lines in use."""
-        return self.data.deviation(self.context.trial.fit.state)[self.data.use.any(axis=1)]
+        return self.data.deviation(self.context.null_fit.fit.state)[self.data.use.any(axis=1)]
 
     def point_scores(
         self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
-        bench = self.context.search.bench
-        rest = self.flexibility if places is None else bench.flexibility(places)
+        reduced = self.context.problem.reduced
+        rest = self.flexibility if places is None else reduced.flexibility(places)
         places = self.context.where.places if places is None else places
         base = self.context.baselines[about]
-        return point_scores(base, bench.model, self.data, places, matrix, strengths, rest)
+        return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
 
     def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
         base = self.context.baselines[about]
-        slopes = thickness_slopes(base, self.context.search.bench.model, self.data)
+        slopes = thickness_slopes(base, self.context.problem.reduced.model, self.data)
         return direction_scores(base, slopes @ change)
 
 

@@ -19,7 +19,7 @@ from ..errors import ModelError
 from .adequacy import FitTest, adequacy
 from .candidates import candidates
 from .discrepancy import MEDIAN
-from .hypothesis_fit import ROUGH, Search, Trial, fitted
+from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
 from .reduced_model import evaluate
@@ -40,7 +40,7 @@ class Diagnosis:
     ----------
     nominal, null : fits without, and with ordinary parameters free, scatter allowed in both
     plain : ordinary parameters alone, as any calibration would; what Q is compared with
-    trials : best trial of every family, best first
+    hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
@@ -48,29 +48,29 @@ class Diagnosis:
     one_of : what the data cannot tell apart, where they are too few to name anything
     """
 
-    nominal: Trial
-    null: Trial
-    plain: Trial
-    trials: tuple[Trial, ...]
+    nominal: HypothesisFit
+    null: HypothesisFit
+    plain: HypothesisFit
+    hypotheses: tuple[HypothesisFit, ...]
     verdict: str
     notes: tuple[str, ...] = ()
-    written: Trial | None = None
+    written: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
 
     @property
-    def found(self) -> Trial | None:
+    def found(self) -> HypothesisFit | None:
         """The named effect, if any."""
         named = self.verdict in ("missing physics", "measurement fault")
-        return self.trials[0] if named and self.trials else None
+        return self.hypotheses[0] if named and self.hypotheses else None
 
-    def gain(self, trial: Trial) -> float:
+    def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
-        return self.null.S - trial.S
+        return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
 
 
 def diagnose(
-    search: Search, progress: Progress = lambda text, share: None, effects: bool = True
+    problem: UpdatingProblem, progress: Progress = lambda text, share: None, effects: bool = True
 ) -> Diagnosis:
     """Name the missing physics, or say that none is missing; without ``effects``, calibrate.
 
@@ -78,32 +78,33 @@ def diagnose(
     bring starts of their own.
     """
     progress("calibration without new physics", 0.05)
-    search, null = _null(search)
-    nominal = _base_trial(search, search.nuisance, _nominal_starts(search))
+    problem, null = _null(problem)
+    nominal = _base_fit(problem, problem.nuisance, _nominal_starts(problem))
     if not effects:
-        return _calibrated(search, nominal, null)
-    plain = _plain(search, null)
+        return _calibrated(problem, nominal, null)
+    plain = _plain(problem, null)
     progress("scan of the catalogue", 0.2)
-    tried = candidates(search, null)
-    trials = []
+    tried = candidates(problem, null)
+    hypotheses = []
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.3 + 0.4 * k / len(tried))
-        trials += _tried(search, null, c.effect, c.start, c.base)
-    trials = _by_family(trials)
+        hypotheses += _tried(problem, null, c.effect, c.start, c.base)
+    hypotheses = _by_family(hypotheses)
     progress("closing in on the place", 0.7)
-    trials = _by_family([_finished(search, t, k < RUNNING) for k, t in enumerate(trials)])
-    trials = _by_family([*trials, *(t for lead in trials[:RUNNING] for t in _closer(search, lead))])
-    null = _restarted(search, null, trials)
+    hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
+    closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
+    hypotheses = _by_family([*hypotheses, *closer])
+    null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
-    called = verdict(nominal, null, trials)
-    found = Diagnosis(nominal, null, plain, tuple(trials), called)
-    return tested(found, search)
+    called = verdict(nominal, null, hypotheses)
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), called)
+    return tested(found, problem)
 
 
-def tested(diagnosis: Diagnosis, search: Search) -> Diagnosis:
+def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     """The diagnosis with its explanation held against what it predicts itself."""
     winner = diagnosis.found or diagnosis.null
-    fits = adequacy(winner, search.weighing, search.labels)
+    fits = adequacy(winner, problem.mass_measurement, problem.labels)
     if fits is None:
         return diagnosis
     name = winner.effect.name if diagnosis.found else "calibration alone"
@@ -115,18 +116,18 @@ def tested(diagnosis: Diagnosis, search: Search) -> Diagnosis:
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None)
 
 
-def _null(search: Search) -> tuple[Search, Trial]:
-    """The null, and the search with errors of the model's form as they spread from its state."""
-    model, delta = search.bench.model, MEDIAN
-    state = evaluate(model, search.base, search.mean(), False)
-    starts = _null_starts(search)
+def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
+    """The null, and the problem with errors of the model's form as they spread from its state."""
+    model, delta = problem.reduced.model, MEDIAN
+    state = evaluate(model, problem.base, problem.mean(), False)
+    starts = _null_starts(problem)
     for _ in range(2):
-        search = search.allowing_errors(state, delta)
-        null = _base_trial(search, search.base, starts)
+        problem = problem.allowing_errors(state, delta)
+        null = _base_fit(problem, problem.base, starts)
         if not isinstance(null.data, Responses) or null.data.error is None:
             break
         state, delta, starts = null.fit.state, null.data.error.delta, [null.fit.x]
-    return search, null
+    return problem, null
 
 
 def threshold() -> float:
@@ -138,135 +139,149 @@ def threshold() -> float:
     return float(2 * np.log(len(families()) / FALSE_ALARM))
 
 
-def verdict(nominal: Trial, null: Trial, trials: Sequence[Trial]) -> str:
+def verdict(
+    nominal: HypothesisFit, null: HypothesisFit, hypotheses: Sequence[HypothesisFit]
+) -> str:
     """The public verdict."""
-    best = trials[0] if trials else None
-    if best is not None and null.S - best.S > threshold():
+    best = hypotheses[0] if hypotheses else None
+    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > threshold():
         return "measurement fault" if best.effect.kind == "test" else "missing physics"
-    return "calibration only" if nominal.S - null.S > CHANGED else "nothing missing"
+    changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
+    return "calibration only" if changed else "nothing missing"
 
 
-def _calibrated(search: Search, nominal: Trial, null: Trial) -> Diagnosis:
+def _calibrated(problem: UpdatingProblem, nominal: HypothesisFit, null: HypothesisFit) -> Diagnosis:
     """The best of the usual and of random starts, and how many of them agree."""
-    tries = [_base_trial(search, search.base, [x]) for x in _random_starts(search)]
-    best = min([null, *tries], key=lambda t: t.S)
-    agree = sum(t.S < best.S + 1 for t in [null, *tries])
+    tries = [_base_fit(problem, problem.base, [x]) for x in _random_starts(problem)]
+    best = min([null, *tries], key=lambda t: t.neg2_log_evidence)
+    agree = sum(t.neg2_log_evidence < best.neg2_log_evidence + 1 for t in [null, *tries])
     note = (
         f"{agree} of {len(tries) + 1} starts, {len(tries)} of them random, ended within 1 of the "
         "best -2 ln evidence"
     )
-    plain = _plain(search, best)
-    return tested(Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,)), search)
+    plain = _plain(problem, best)
+    return tested(Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,)), problem)
 
 
-def _random_starts(search: Search, count: int = 4) -> list[np.ndarray]:
+def _random_starts(problem: UpdatingProblem, count: int = 4) -> list[np.ndarray]:
     """Ordinary parameters drawn from their prior, the rest at its mean (a fixed seed)."""
     rng = np.random.default_rng(20250102)
-    own = [e.kind == "ordinary" for e in search.base for _ in e.parameters]
-    sd = np.array([p.sd for e in search.base for p in e.parameters]) * own
-    return [search.mean() + sd * rng.normal(size=len(sd)) for _ in range(count)]
+    own = [e.kind == "ordinary" for e in problem.base for _ in e.parameters]
+    sd = np.array([p.sd for e in problem.base for p in e.parameters]) * own
+    return [problem.mean() + sd * rng.normal(size=len(sd)) for _ in range(count)]
 
 
-def _base_trial(search: Search, effects: Sequence[Effect], starts: list[np.ndarray]) -> Trial:
+def _base_fit(
+    problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
+) -> HypothesisFit:
     """Best fit of these effects alone over several starts."""
-    model = search.bench.model
-    fits = [fitted(model, effects, search.data, search.weighing, x) for x in starts]
-    return Trial(Effect(), min(fits, key=lambda f: f.S), model)
+    model = problem.reduced.model
+    fits = [fitted(model, effects, problem.data, problem.mass_measurement, x) for x in starts]
+    return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
 
 
-def _plain(search: Search, null: Trial) -> Trial:
-    """Ordinary parameters without scatter or jitter, from the same starts and from the null."""
-    kept = [e.writable for e in search.base]
-    chosen = [e for e, k in zip(search.base, kept, strict=True) if k]
+def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
+    """Ordinary parameters alone, no scatter or modal discrepancy: the same starts and the null."""
+    kept = [e.writable for e in problem.base]
+    chosen = [e for e, k in zip(problem.base, kept, strict=True) if k]
     inside = np.concatenate(
-        [np.full(len(e.parameters), k) for e, k in zip(search.base, kept, strict=True)]
+        [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
     ).astype(bool)
-    search = search.exactly()
-    return _base_trial(search, chosen, [x[inside] for x in (*_null_starts(search), null.fit.x)])
+    problem = problem.exactly()
+    return _base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
 
 
-def _nominal_starts(search: Search) -> list[np.ndarray]:
-    return [np.array([p.mean for e in search.nuisance for p in e.parameters])]
+def _nominal_starts(problem: UpdatingProblem) -> list[np.ndarray]:
+    return [np.array([p.mean for e in problem.nuisance for p in e.parameters])]
 
 
-def _null_starts(search: Search) -> list[np.ndarray]:
+def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
     """The prior mean; where modes must be paired, also softer and stiffer by up to a third."""
-    mean = search.mean()
-    if isinstance(search.data, Responses):
+    mean = problem.mean()
+    if isinstance(problem.data, Responses):
         return [mean]
-    stiff = np.array([p.name == "E" for e in search.base for p in e.parameters], dtype=float)
+    stiff = np.array([p.name == "E" for e in problem.base for p in e.parameters], dtype=float)
     return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
 
 
 def _tried(
-    search: Search, null: Trial, effect: Effect, start: np.ndarray, base: np.ndarray
-) -> list[Trial]:
+    problem: UpdatingProblem,
+    null: HypothesisFit,
+    effect: Effect,
+    start: np.ndarray,
+    base: np.ndarray,
+) -> list[HypothesisFit]:
     """Rough fits; the second begins at the null, where the first has not even come as far as that.
 
     With the effect idle a hypothesis is the null: one that stays behind it by more than its price
     has only stopped on the way. A start that is no structure at all (negative stiffness) is none.
     """
-    out: list[Trial] = []
+    out: list[HypothesisFit] = []
     for x in (base, null.fit.x):
-        if out and out[0].S < null.S + BEHIND:
+        if out and out[0].neg2_log_evidence < null.neg2_log_evidence + BEHIND:
             break
         with suppress(ModelError):
-            out.append(search.trial(effect, start, x, ROUGH))
+            out.append(problem.fitted_with(effect, start, x, ROUGH))
     return out
 
 
-def _by_family(trials: list[Trial]) -> list[Trial]:
-    """The best trial of every family, best first."""
-    best: dict[str, Trial] = {}
-    for t in trials:
-        if t.effect.name not in best or t.S < best[t.effect.name].S:
+def _by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
+    """The best hypothesis of every family, best first."""
+    best: dict[str, HypothesisFit] = {}
+    for t in hypotheses:
+        if t.effect.name not in best or t.neg2_log_evidence < best[t.effect.name].neg2_log_evidence:
             best[t.effect.name] = t
-    return sorted(best.values(), key=lambda t: t.S)
+    return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 
-def _finished(search: Search, trial: Trial, running: bool) -> Trial:
+def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool) -> HypothesisFit:
     """A hypothesis in the running, or not yet at rest, fitted to the end from where it is."""
-    at_rest = trial.fit.status is not Status.OUT_OF_STEPS
-    if not isinstance(search.data, Responses) or (at_rest and not running):
-        return trial
-    fit = fitted(trial.model, trial.fit.effects, trial.data, search.weighing, trial.fit.x)
-    return Trial(trial.effect, fit, trial.model) if fit.S < trial.S else trial
+    at_rest = hypothesis.fit.status is not Status.OUT_OF_STEPS
+    if not isinstance(problem.data, Responses) or (at_rest and not running):
+        return hypothesis
+    model, begun = hypothesis.model, hypothesis.fit
+    fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
+    if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
+        return HypothesisFit(hypothesis.effect, fit, model)
+    return hypothesis
 
 
-def _closer(search: Search, lead: Trial) -> list[Trial]:
+def _closer(problem: UpdatingProblem, lead: HypothesisFit) -> list[HypothesisFit]:
     """The leader begun anew about the place it moved to, while it moves."""
-    out: list[Trial] = []
+    out: list[HypothesisFit] = []
     for _ in range(3):
-        again = lead.effect.recentred(lead.fit.of(lead.effect), search.where)
+        again = lead.effect.recentred(lead.fit.of(lead.effect), problem.where)
         if again is None:
             break
         try:
-            trial = search.trial(*again, _taken(search, lead, ("ordinary",)))
+            hypothesis = problem.fitted_with(*again, _taken(problem, lead, ("ordinary",)))
         except ModelError:
             break
-        out.append(trial)
-        if trial.S > lead.S - 1:
+        out.append(hypothesis)
+        if hypothesis.neg2_log_evidence > lead.neg2_log_evidence - 1:
             break
-        lead = trial
+        lead = hypothesis
     return out
 
 
-def _taken(search: Search, lead: Trial, kinds: tuple[str, ...]) -> np.ndarray:
+def _taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
     """Base parameters at their prior mean, those of these kinds as the leader has them."""
-    x, at = search.mean(), 0
-    kept = search.without(lead.effect)
-    for e in search.base:
+    x, at = problem.mean(), 0
+    kept = problem.without(lead.effect)
+    for e in problem.base:
         if e in kept and e.kind in kinds:
             x[at : at + len(e.parameters)] = lead.fit.of(e)
         at += len(e.parameters)
     return x
 
 
-def _restarted(search: Search, null: Trial, trials: list[Trial]) -> Trial:
+def _restarted(
+    problem: UpdatingProblem, null: HypothesisFit, hypotheses: list[HypothesisFit]
+) -> HypothesisFit:
     """The null again, from the base parameters of the leaders: it must not lose by a bad start."""
     tries = [null]
-    for lead in trials[:2]:
+    for lead in hypotheses[:2]:
         with suppress(ModelError):
-            start = _taken(search, lead, ("ordinary", "nuisance"))
-            tries.append(_base_trial(search, search.base, [start]))
-    return min(tries, key=lambda t: t.S)
+            start = _taken(problem, lead, ("ordinary", "nuisance"))
+            tries.append(_base_fit(problem, problem.base, [start]))
+    return min(tries, key=lambda t: t.neg2_log_evidence)

@@ -54,7 +54,7 @@ class Lines(Protocol):
     def model(self, state: State) -> np.ndarray:
         """H of the model."""
 
-    def spread(self) -> np.ndarray:
+    def std(self) -> np.ndarray:
         """Standard deviation of log10 H."""
 
     def only(self, use: np.ndarray) -> Self:
@@ -98,10 +98,10 @@ class Form:
         return np.stack(np.triu_indices(len(self.lam)), axis=1)
 
 
-def form(state: State, top: float) -> Form:
+def form(state: State, f_max: float) -> Form:
     """No change yet, in the flexible modes up to ``REACH`` times the highest line [rad/s]."""
     omega = np.sqrt(np.maximum(state.lam, 0))
-    modes = np.flatnonzero((omega > RIGID * top) & (omega < REACH * top))
+    modes = np.flatnonzero((omega > RIGID * f_max) & (omega < REACH * f_max))
     k = len(modes)
     return Form(np.linalg.inv(state.phi)[modes], state.lam[modes], np.zeros((2, k, k)))
 
@@ -168,7 +168,7 @@ def curvature(data: Lines, state: State) -> np.ndarray:
     """
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
-    sd = every.spread() * np.log(10) * USUAL
+    sd = every.std() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
     return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
 
@@ -181,7 +181,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     """
     i, j = about.pairs.T
     phi_o, phi_i, d = data.modal(state)
-    H, sd = data.model(state), data.spread()
+    H, sd = data.model(state), data.std()
     T = about.rows @ state.phi
     a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
     a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)
@@ -205,11 +205,11 @@ class Learned:
 
     Attributes
     ----------
-    S : float                -2 ln evidence, δ integrated out
+    neg2_log_evidence : float  -2 ln evidence, δ integrated out
     delta : float            its most probable value
     """
 
-    S: float
+    neg2_log_evidence: float
     delta: float
 
 

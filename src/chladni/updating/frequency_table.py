@@ -52,7 +52,7 @@ def _test_modes(prepared: Prepared) -> tuple[np.ndarray, np.ndarray | None]:
     assert found is not None
     low, high = found.band
     keep = (found.frequency >= low) & (found.frequency <= high) & (found.damping < 0.05)
-    keep &= found.gain > 3.0
+    keep &= found.relative_delta_chi2 > 3.0
     if found.residues.shape[1] < 4:
         return found.frequency[keep], None
     residues = found.residues[keep, :, 0]
@@ -77,7 +77,7 @@ def _paired(
         at[pairs.test] = pairs.model
         return at, value
     only = Modelled(model.structure, modes, model.band)
-    score, state = seen(question, prepared.score, only, prepared.search.setup.top)
+    score, state = seen(question, prepared.score, only, prepared.problem.setup.f_max)
     assert isinstance(score, Poles)
     _, mode = score.forced(state, np.ones(n, bool) if real is None else real)
     return mode, value

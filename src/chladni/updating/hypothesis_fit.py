@@ -9,15 +9,15 @@ from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
 from .discrepancy import MEDIAN, learned
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
-from .map_fit import Fit, Weighing, beside, fit, unknowns
+from .map_fit import Fit, MassMeasurement, beside, fit, unknowns
 from .reduced_model import Reduced, State, evaluate
-from .reduced_problem import Workbench
+from .reduced_problem import ReducedProblem
 
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class HypothesisFit:
     """One hypothesis after its fit: the effect, the fit, the model it was fitted in."""
 
     effect: Effect
@@ -30,13 +30,13 @@ class Trial:
         return self.fit.data
 
     @property
-    def S(self) -> float:
+    def neg2_log_evidence(self) -> float:
         """-2 ln evidence."""
-        return self.fit.S
+        return self.fit.neg2_log_evidence
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class UpdatingProblem:
     """All that a diagnosis works with.
 
     Attributes
@@ -45,9 +45,9 @@ class Search:
     nuisance : the nuisances alone
     """
 
-    bench: Workbench
+    reduced: ReducedProblem
     data: Responses | Poles
-    weighing: Weighing | None
+    mass_measurement: MassMeasurement | None
     base: tuple[Effect, ...]
     nuisance: tuple[Effect, ...]
     setup: Setup
@@ -56,17 +56,17 @@ class Search:
     @property
     def where(self) -> Surroundings:
         """The structure and its test as effects may know them."""
-        bench = self.bench
-        return Surroundings(bench.groups, bench.grids, bench.candidates, self.setup)
+        reduced = self.reduced
+        return Surroundings(reduced.groups, reduced.grids, reduced.candidates, self.setup)
 
-    def allowing_errors(self, state: State, delta: float = MEDIAN) -> "Search":
+    def allowing_errors(self, state: State, delta: float = MEDIAN) -> "UpdatingProblem":
         """Responses with errors of the model's form as they spread from this state."""
         if not isinstance(self.data, Responses):
             return self
         return replace(self, data=self.data.allowing_errors(state, delta))
 
-    def exactly(self) -> "Search":
-        """The same search with a model that is taken to be right but for its parameters."""
+    def exactly(self) -> "UpdatingProblem":
+        """The same problem with a model that is taken to be right but for its parameters."""
         if not isinstance(self.data, Responses):
             return self
         return replace(self, data=self.data.exactly())
@@ -75,18 +75,17 @@ class Search:
         """Prior mean of the base parameters."""
         return np.array([p.mean for e in self.base for p in e.parameters])
 
-    def trial(
+    def fitted_with(
         self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
-    ) -> Trial:
+    ) -> HypothesisFit:
         """Fit one effect together with the base, from these starts."""
-        model = self.bench.model_for(effect, start)
+        model = self.reduced.model_for(effect, start)
         data = self.data.over(model)
         kept = self.without(effect)
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
-        return Trial(
-            effect, fitted(model, [*kept, effect], data, self.weighing, x0, max_steps), model
-        )
+        fit = fitted(model, [*kept, effect], data, self.mass_measurement, x0, max_steps)
+        return HypothesisFit(effect, fit, model)
 
     def without(self, effect: Effect) -> list[Effect]:
         """The base less what the effect makes superfluous."""
@@ -94,35 +93,36 @@ class Search:
 
 
 def fitted(
-    model: Reduced, effects: Sequence[Effect], data: Data, weighing: Weighing | None, x: np.ndarray,
-    max_steps: int = 30,
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int = 30,
 ) -> Fit:  # fmt: skip
     """A fit; for poles, the spread that no model reaches is found with it."""
     if isinstance(data, Poles):
-        return _fit_poles(model, effects, data, weighing, x)
+        return _fit_poles(model, effects, data, mass_measurement, x)
     if isinstance(data, Responses) and data.error is not None:
-        return _fit_responses(model, effects, data, weighing, x, max_steps)
-    return fit(model, effects, data, weighing, x, max_steps=max_steps)
+        return _fit_responses(model, effects, data, mass_measurement, x, max_steps)
+    return fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
 
 
 ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
 
 
 def _fit_responses(
-    model: Reduced, effects: Sequence[Effect], data: Responses, weighing: Weighing | None,
-    x: np.ndarray, max_steps: int,
+    model: Reduced, effects: Sequence[Effect], data: Responses,
+    mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int,
 ) -> Fit:  # fmt: skip
     """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
     assert data.error is not None
     constant = sum(2 * np.log(effect.trials_factor) for effect in effects)
     constant += sum(2 * np.log(p.sd) for p in unknowns(effects))
     for _ in range(ROUNDS):
-        found = fit(model, effects, data, weighing, x, max_steps=max_steps)
-        r0, J0 = beside(effects, weighing, found.x, found.state)
+        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
+        r0, J0 = beside(effects, mass_measurement, found.x, found.state)
         likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
-        found = replace(found, S=likely.S + float(constant), data=data)
+        S = likely.neg2_log_evidence + float(constant)
+        found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break
         x = found.x
@@ -133,32 +133,42 @@ SCALES = np.geomspace(0.003, 0.2, 25)
 
 
 def _fit_poles(
-    model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Poles,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
 ) -> Fit:
     """Alternate the fit with the most probable scale of what no model reaches."""
     options = []
     for road in ROADS:
         there = x
         for scale in road:
-            there = fit(model, effects, replace(data, scale=scale), weighing, there, max_steps=8).x
-        options.append(_settled(model, effects, data, weighing, there))
-    return min(options, key=lambda f: f.S)
+            given = replace(data, scale=scale)
+            there = fit(model, effects, given, mass_measurement, there, max_steps=8).x
+        options.append(_settled(model, effects, data, mass_measurement, there))
+    return min(options, key=lambda f: f.neg2_log_evidence)
 
 
 ROADS = ((0.08, 0.04, 0.02), (0.03, 0.015))  # scales on which the pairing settles
 
 
 def _settled(
-    model: Reduced, effects: Sequence[Effect], data: Poles, weighing: Weighing | None, x: np.ndarray
+    model: Reduced,
+    effects: Sequence[Effect],
+    data: Poles,
+    mass_measurement: MassMeasurement | None,
+    x: np.ndarray,
 ) -> Fit:
     """Scale and parameters in turn until the evidence stays."""
     best = None
     for _ in range(4):
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
-        now = fit(model, effects, replace(data, scale=scale), weighing, x)
+        now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
         var = data.sd[data.use] ** 2 + scale**2
-        now = replace(now, S=now.S + float(np.log(var).sum()) + _scale_prior(scale))
-        if best is not None and now.S > best.S - 0.05:
+        S = now.neg2_log_evidence + float(np.log(var).sum()) + _scale_prior(scale)
+        now = replace(now, neg2_log_evidence=S)
+        if best is not None and now.neg2_log_evidence > best.neg2_log_evidence - 0.05:
             break
         best, x = now, now.x
     return best if best is not None else now
@@ -172,7 +182,7 @@ def _likely_scale(data: Poles, state: State) -> float:
 def neg2_log_mixture(data: Poles, state: State) -> float:
     """-2 ln p(poles | modes, best assignment, scale) p(scale), up to a constant."""
     r, _ = data.residual(state, False)
-    widths = 2 * np.log(data.spread()[data.use]).sum()
+    widths = 2 * np.log(data.std()[data.use]).sum()
     return float(r @ r + widths) + _scale_prior(data.scale)
 
 
@@ -183,21 +193,25 @@ def _scale_prior(scale: float, median: float = SCALE) -> float:
 HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
 
 
-def as_written(trial: Trial, weighing: Weighing | None) -> Trial:
-    """The trial as a deck can hold it: without scatter and jitter, the effect held.
+def as_written(
+    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
+) -> HypothesisFit:
+    """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
 
     The ordinary parameters are fitted anew, for they were found beside a scatter that is not
     there any more; calibration without the effect does the same.
     """
-    x = trial.fit.of(trial.effect)
+    x = hypothesis.fit.of(hypothesis.effect)
     unknown = tuple(
-        replace(p, mean=float(v), sd=HELD) for p, v in zip(trial.effect.parameters, x, strict=True)
+        replace(p, mean=float(v), sd=HELD)
+        for p, v in zip(hypothesis.effect.parameters, x, strict=True)
     )
-    held = replace(trial.effect, parameters=unknown)
-    kept = [e for e in trial.fit.effects if e.writable]
-    start = np.concatenate([trial.fit.of(e) for e in kept])
-    effects = [held if e is trial.effect else e for e in kept]
-    data = trial.data
+    held = replace(hypothesis.effect, parameters=unknown)
+    kept = [e for e in hypothesis.fit.effects if e.writable]
+    start = np.concatenate([hypothesis.fit.of(e) for e in kept])
+    effects = [held if e is hypothesis.effect else e for e in kept]
+    data = hypothesis.data
     if isinstance(data, Responses):
         data = data.exactly()
-    return Trial(held, fit(trial.model, effects, data, weighing, start), trial.model)
+    model = hypothesis.model
+    return HypothesisFit(held, fit(model, effects, data, mass_measurement, start), model)

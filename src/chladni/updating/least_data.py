@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .diagnosis import Diagnosis
-from .hypothesis_fit import Trial
+from .hypothesis_fit import HypothesisFit
 from .question import Prepared
 
 NUMBERS = 8  # 3 + 3 + 2, see above
@@ -39,7 +39,7 @@ def withheld(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis without a name, where the data cannot bear one."""
     if not prepared.too_little:
         return diagnosis
-    one_of = tuple(t.effect.name for t in _in_question(diagnosis, diagnosis.trials))
+    one_of = tuple(t.effect.name for t in _in_question(diagnosis, diagnosis.hypotheses))
     note = (
         f"{prepared.too_little}; these explain the data and cannot be told apart by them: "
         f"{', '.join(('calibration alone', *one_of))}; more modes, or more sensors of known gain, "
@@ -51,5 +51,5 @@ def withheld(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )  # fmt: skip
 
 
-def _in_question(diagnosis: Diagnosis, trials: Sequence[Trial]) -> list[Trial]:
-    return [t for t in trials if diagnosis.gain(t) > NOT_BEHIND]
+def _in_question(diagnosis: Diagnosis, hypotheses: Sequence[HypothesisFit]) -> list[HypothesisFit]:
+    return [t for t in hypotheses if diagnosis.two_log_bayes_factor(t) > NOT_BEHIND]

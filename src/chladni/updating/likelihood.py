@@ -44,7 +44,7 @@ class Responses:
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
     use : (n_f, n_out) bool                lines and channels the fit may see
-    floor : float                          sd of log10 H that neither noise nor δ explains
+    sigma_model : float                    sd of log10 H that neither noise nor δ explains
     """
 
     values: np.ndarray
@@ -53,7 +53,7 @@ class Responses:
     inputs: object
     use: np.ndarray
     quantity: str = "accelerance"
-    floor: float = 0.003
+    sigma_model: float = 0.003
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
@@ -87,10 +87,10 @@ class Responses:
             delta = delta + state.offset[:, None]
         return wrapped(delta)
 
-    def spread(self) -> np.ndarray:
-        """Standard deviation of δ: the floor, inflated where the response itself is small."""
+    def std(self) -> np.ndarray:
+        """Standard deviation of δ: sigma_model, inflated where the response itself is small."""
         rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
-        out = self.floor**2 + (0.6 * self.floor * rms / np.abs(self.values)) ** 2
+        out = self.sigma_model**2 + (0.6 * self.sigma_model * rms / np.abs(self.values)) ** 2
         for more in (self.noise, self.bent):
             out = out + (0.0 if more is None else more**2)
         return np.sqrt(out)
@@ -114,7 +114,7 @@ class Responses:
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """Real and imaginary part of δ over its spread, on the lines and channels in use."""
-        sd = self.spread()
+        sd = self.std()
         delta = (self.deviation(state) / sd)[self.use].ravel()
         r = np.concatenate([delta.real, delta.imag])
         if not gradient:
@@ -194,32 +194,32 @@ class Poles:
             return self
         return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
 
-    def spread(self) -> np.ndarray:
+    def std(self) -> np.ndarray:
         """Standard deviation of ln f of every pole (n,)."""
         return np.sqrt(self.sd**2 + self.scale**2)
 
     def pairs(
         self, state: State, among: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Positions (test pole, model mode) that belong together, and the price of lonely modes."""
+        """Positions (test pole, model mode) of each pair, and the price of unpaired modes."""
         poles = np.flatnonzero(self.use if among is None else among)
         if not len(poles):
             return poles, poles, 0.0
         f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
-        top = self.frequency[poles[-1]]
-        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * top))
+        f_max = self.frequency[poles[-1]]
+        modes = np.flatnonzero((f > 0.02 * self.frequency[0]) & (f < 1.7 * f_max))
         missed = price_missed(self.visibility(state, modes))
-        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], top * (1 + 1e-9)))
-        test, model, lonely = paired(
-            self.frequency[poles], f[modes], self.spread()[poles], self._alone()[poles],
+        ends = (f[modes] < self.band[0]) | (f[modes] > min(self.band[1], f_max * (1 + 1e-9)))
+        test, model, unpaired = paired(
+            self.frequency[poles], f[modes], self.std()[poles], self._price_unpaired()[poles],
             np.where(ends, 0.0, missed),
         )  # fmt: skip
-        return poles[test], modes[model], lonely
+        return poles[test], modes[model], unpaired
 
-    def _alone(self) -> np.ndarray:
-        """Price of a lonely pole, on the scale on which a pair costs δ²/σ²."""
+    def _price_unpaired(self) -> np.ndarray:
+        """Price of an unpaired pole, on the scale on which a pair costs δ²/σ²."""
         price = np.where(np.isinf(self.strength), 1e4, price_spurious(self.spurious))
-        return price - 2 * np.log(self.spread())
+        return price - 2 * np.log(self.std())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
         """How strongly each mode shows, 1 = as the strongest: rms residue over likely places."""
@@ -239,12 +239,12 @@ class Poles:
         return np.log(f / self.frequency[test]), test, model
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) over its spread; lonely poles and modes at their price."""
-        test, model, lonely = self.pairs(state)
+        """ln(f_model / f_test) over its spread; unpaired poles and modes at their price."""
+        test, model, unpaired = self.pairs(state)
         lam = state.lam[model]
         delta = np.log(np.sqrt(lam) / (2 * np.pi) / self.frequency[test])
-        sd = self.spread()
-        r = np.append(np.sqrt(self._alone()), np.sqrt(lonely))
+        sd = self.std()
+        r = np.append(np.sqrt(self._price_unpaired()), np.sqrt(unpaired))
         J = np.zeros((len(r), len(state.dK)))
         r[test] = delta / sd[test]
         if gradient:

@@ -25,7 +25,7 @@ class Status(Enum):
 
 
 @dataclass(frozen=True)
-class Weighing:
+class MassMeasurement:
     """The weighed mass and its standard deviation [kg]; a datum like any other."""
 
     mass: float
@@ -42,7 +42,7 @@ class Fit:
     x : (n_p,)                     most probable parameters
     covariance : (n_p, n_p)        of x, Laplace's
     misfit : float                 |r|² of the data alone
-    S : float                      -2 ln evidence up to a constant common to all fits of the data
+    neg2_log_evidence : float      -2 ln evidence up to a constant common to all fits of the data
     state : State                  the reduced model there
     data : Data                    what was fitted
     """
@@ -51,7 +51,7 @@ class Fit:
     x: np.ndarray
     covariance: np.ndarray
     misfit: float
-    S: float
+    neg2_log_evidence: float
     state: State
     data: Data
     status: Status
@@ -80,34 +80,35 @@ def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
 
 
 def beside(
-    effects: Sequence[Effect], weighing: Weighing | None, x: np.ndarray, state: State
+    effects: Sequence[Effect], mass_measurement: MassMeasurement | None, x: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whitened residuals and slopes of what is known beside the data: priors and the scales."""
     priors = unknowns(effects)
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
     r, J = (x - mean) / sd, np.diag(1 / sd)
-    if weighing is None:
+    if mass_measurement is None:
         return r, J
-    row = state.dweight[None] / weighing.sd
-    return np.append(r, (state.weight - weighing.mass) / weighing.sd), np.concatenate([J, row])
+    row = state.dweight[None] / mass_measurement.sd
+    off = (state.weight - mass_measurement.mass) / mass_measurement.sd
+    return np.append(r, off), np.concatenate([J, row])
 
 
 def fit(
     model: Reduced,
     effects: Sequence[Effect],
     data: Data,
-    weighing: Weighing | None,
+    mass_measurement: MassMeasurement | None,
     start: np.ndarray,
     *,
     max_steps: int = 30,
-    gain: float = 0.05,
+    tol: float = 0.05,
 ) -> Fit:
     """Most probable x from one start, and the evidence there.
 
     Parameters
     ----------
     start : (n_p,)      where to begin
-    gain : float        stop when a step improves -2 ln posterior by less
+    tol : float        stop when a step improves -2 ln posterior by less
     """
     priors = unknowns(effects)
     sd = np.array([p.sd for p in priors])
@@ -116,7 +117,7 @@ def fit(
     def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
         state = evaluate(model, effects, x, gradient)
         r, J = data.residual(state, gradient)
-        r0, J0 = beside(effects, weighing, x, state)
+        r0, J0 = beside(effects, mass_measurement, x, state)
         return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
 
     x, damping = start.copy(), 1e-2
@@ -131,18 +132,18 @@ def fit(
         improved, x, damping = found
         r, J, state = objective(x, True)
         cost = float(r @ r)
-        if improved < gain:
+        if improved < tol:
             status = Status.CONVERGED
             break
     A = J.T @ J
     S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
     S += sum(2 * np.log(effect.trials_factor) for effect in effects)
-    own = r[: len(r) - len(x) - (weighing is not None)]
+    own = r[: len(r) - len(x) - (mass_measurement is not None)]
     return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
 
 
 def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]
-    """One accepted Levenberg-Marquardt step: (gain, new x, new damping), or None."""
+    """One accepted Levenberg-Marquardt step: (improvement, new x, new damping), or None."""
     A, g = J.T @ J, J.T @ r
     for _ in range(8):
         dx = -np.linalg.solve(A + damping * np.diag(np.diag(A)), g)

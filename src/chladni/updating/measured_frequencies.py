@@ -49,7 +49,7 @@ def frequencies(
     return f[keep], sd, peak / peak.max(), found, (note,)
 
 
-LEAST_GAIN = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
+LEAST_DELTA_CHI2 = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
 TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
 SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
 FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
@@ -63,9 +63,10 @@ def _peaks(found: Identified) -> np.ndarray:
 
 
 def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
-    """Poles of the band that matter: clear gain, usual damping, the strongest at its resonance."""
+    """Poles of the band that matter: a clear share of χ², usual damping, strongest of its peak."""
     f, peak = found.frequency, _peaks(found)
-    keep = (f >= band[0]) & (f <= band[1]) & (found.gain > LEAST_GAIN) & (found.damping < 0.05)
+    keep = (f >= band[0]) & (f <= band[1]) & (found.damping < 0.05)
+    keep &= found.relative_delta_chi2 > LEAST_DELTA_CHI2
     if not keep.any():
         raise FileError(
             f"no mode stands out of the recording between {band[0]:g} and {band[1]:g} Hz"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from .diagnosis import Diagnosis, tested, verdict
-from .hypothesis_fit import Search, Trial, as_written
+from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
@@ -33,10 +33,10 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     )
 
 
-def applied(assembly: Assembly, trial: Trial) -> Assembly:
-    """The assembly with the ordinary parameters and the effect of a trial in it."""
-    for effect in trial.fit.effects:
-        assembly = effect.apply(assembly, trial.fit.of(effect))
+def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
+    """The assembly with the ordinary parameters and the effect of a hypothesis in it."""
+    for effect in hypothesis.fit.effects:
+        assembly = effect.apply(assembly, hypothesis.fit.of(effect))
     return assembly
 
 
@@ -52,20 +52,20 @@ class FittedScores:
 def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScores, FittedScores]:
     """Q on the data that were fitted, and on those held out."""
     winner = diagnosis.found or diagnosis.null
-    stages = _states(prepared.search, diagnosis, winner)
+    stages = _states(prepared.problem, diagnosis, winner)
     out, real = [], real_poles(prepared, winner)
     for use in (prepared.score.use, held_out(prepared, winner)):
-        values = [prepared.score.over(trial.model).Q(state, use, real) for trial, state in stages]
+        values = [prepared.score.over(fit.model).Q(state, use, real) for fit, state in stages]
         out.append(FittedScores(*values))
     return out[0], out[1]
 
 
-def held_out(prepared: Prepared, winner: Trial) -> np.ndarray:
+def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
     """Samples the fit never saw; of a fault of one channel, that channel's alone."""
     held = prepared.held
     if not winner.effect.channels or held.ndim < 2:
         return held
-    mine = np.isin(prepared.search.labels, winner.effect.channels)
+    mine = np.isin(prepared.problem.labels, winner.effect.channels)
     own = held & mine
     return own if own.any() else held
 
@@ -82,22 +82,22 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """
     if diagnosis.found is None:
         return diagnosis
-    lead = diagnosis.trials[0]
-    diagnosis = replace(diagnosis, written=as_written(lead, prepared.search.weighing))
+    lead = diagnosis.hypotheses[0]
+    diagnosis = replace(diagnosis, written=as_written(lead, prepared.problem.mass_measurement))
     held = fitted_scores(prepared, diagnosis)[1]
     if not held.effect > (1.0 if lead.effect.kind == "test" else VETO) * held.calibrated:
         return diagnosis
     note = (
-        f"{lead.effect.name} gained {diagnosis.gain(lead):.0f} in -2 ln evidence but left the "
-        f"held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, so it is not "
-        "named"
+        f"{lead.effect.name} gained {diagnosis.two_log_bayes_factor(lead):.0f} in -2 ln evidence "
+        f"but left the held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, "
+        "so it is not named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.search)
+    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.problem)
 
 
-def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
+def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
     """Poles of the test that have a partner in the winning model; the rest are spurious."""
     if not isinstance(prepared.score, Poles):
         return None
@@ -109,10 +109,10 @@ def real_poles(prepared: Prepared, winner: Trial) -> np.ndarray | None:
     return real
 
 
-def _as_given(search: Search, null: Trial) -> np.ndarray:
+def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
     """The deck's own values, mesh error and gain as the fit found them, no scatter."""
-    x, at = search.mean(), 0
-    for e in search.base:
+    x, at = problem.mean(), 0
+    for e in problem.base:
         n = len(e.parameters)
         if e.kind == "nuisance" and e.writable:
             x[at : at + n] = null.fit.of(e)
@@ -120,16 +120,18 @@ def _as_given(search: Search, null: Trial) -> np.ndarray:
     return x
 
 
-def _states(search: Search, diagnosis: Diagnosis, winner: Trial) -> list[tuple[Trial, State]]:
+def _states(
+    problem: UpdatingProblem, diagnosis: Diagnosis, winner: HypothesisFit
+) -> list[tuple[HypothesisFit, State]]:
     """The calibrated and the updated deck, and all that the last fit had beside them."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
-        nominal = evaluate(null.model, search.base, _as_given(search, null), False)
+        nominal = evaluate(null.model, problem.base, _as_given(problem, null), False)
         return [(null, nominal), (null, nominal), (null, null.fit.state)]
     if diagnosis.found is None:
         state = plain.fit.state
         return [(plain, state), (plain, state), (null, null.fit.state)]
-    final = diagnosis.written or as_written(winner, search.weighing)
+    final = diagnosis.written or as_written(winner, problem.mass_measurement)
     return [
         (plain, plain.fit.state), (winner, final.fit.state), (winner, winner.fit.state)
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from scipy.stats import norm, qmc
 
 from ..effects.effect import Effect
 from ..errors import ModelError
-from .hypothesis_fit import SCALES, Search, neg2_log_mixture
+from .hypothesis_fit import SCALES, UpdatingProblem, neg2_log_mixture
 from .likelihood import Poles
 from .reduced_model import evaluate
 
@@ -31,19 +31,19 @@ def draws(effect: Effect, count: int) -> np.ndarray:
     return np.asarray(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))
 
 
-def global_starts(search: Search, effect: Effect, most: int = 4) -> list[np.ndarray]:
+def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> list[np.ndarray]:
     """The lowest distinct valleys of -2 ln posterior over the effect's own parameters.
 
     What the case may calibrate anyway stands at its prior mean; what the effect makes superfluous
     is left out.
     """
-    data = search.data
+    data = problem.data
     assert isinstance(data, Poles)
-    kept = search.without(effect)
+    kept = problem.without(effect)
     idle = np.array([p.mean for e in kept for p in e.parameters])
     sd = np.array([p.sd for p in effect.parameters])
     mean = np.array([p.mean for p in effect.parameters])
-    model = search.bench.model.split_for(effect, mean)
+    model = problem.reduced.model.split_for(effect, mean)
     seen = data.over(model)
 
     def cost(x: np.ndarray, scales: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""From a structure and a recording to a search: how the recording is read, and why.
+"""From a structure and a recording to an updating problem: how the recording is read, and why.
 
 With known gain and places the damping-equalised FRFs are compared; where the gain is unknown *and*
 places are uncertain, or where no FRF exists, the natural frequencies.  What is held out is chosen
@@ -12,27 +12,27 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
-from ..effects.discretisation import jitter, mesh_error
+from ..effects.discretisation import mesh_error, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
 from ..effects.model_families import model_families
-from ..effects.ordinary import defaults, gain, scatter
+from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
-from ..ema.identification import Identified, equalised, identify, spread
+from ..ema.identification import Identified, equalised, frf_variance, identify
 from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
-from .hypothesis_fit import Search
+from .hypothesis_fit import UpdatingProblem
 from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
-from .measured_frequencies import LEAST_GAIN, band_of, counted, frequencies, widened
+from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
-from .reduced_problem import Workbench, workbench
+from .reduced_problem import ReducedProblem, reduced_problem
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
@@ -43,7 +43,7 @@ FAR = 6.0  # reach of the basis for poles: material may be several times softer 
 
 
 def prepare(question: Question) -> Prepared:
-    """Identify, decide how to compare, choose what is held out, build the workbench."""
+    """Identify, decide how to compare, choose what is held out, build the reduced problem."""
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain)
@@ -61,45 +61,44 @@ def _by_responses(question: Question) -> Prepared:
     assert frf is not None
     low, high = band_of(question, frf)
     held_band = question.held_band or _upper_part(question, low, high)
-    fit_top = min(high, held_band[0]) if question.held_band is None else high
+    fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
-    top = reach[1]
-    if question.held_band is None and not _modes_seen(found, low, fit_top):
-        held_band, fit_top = (high, high), high  # all modes lie where the band was to be held out
-    seen = _modes_seen(found, low, fit_top)
+    f_max = reach[1]
+    if question.held_band is None and not _modes_seen(found, low, fit_max):
+        held_band, fit_max = (high, high), high  # all modes lie where the band was to be held out
+    seen = _modes_seen(found, low, fit_max)
     if not seen:
         raise FileError(
-            f"no mode stands out of the recording between {low:g} and {fit_top:g} Hz, so there is "
+            f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
-    nominal = modelled(question.tested(question.assembly), SOLVED * top)
+    nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    bench = workbench(nominal, top, sp.csr_array(sp.vstack([rows_o, rows_i])))
-    bench = carrying(bench, freed_by(question, bench, top))
+    reduced = reduced_problem(nominal, f_max, sp.csr_array(sp.vstack([rows_o, rows_i])))
+    reduced = carrying(reduced, freed_by(question, reduced, f_max))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     data = []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
-        use = _training(f, low, fit_top, held_sensors)
+        use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
         read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
-        data.append(read.over(bench.model))
-    nuisance = nuisances(bench, nominal, top, jittered=False)
+        data.append(read.over(reduced.model))
+    nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
     if not question.gain_known:
-        nuisance.append(gain(len(question.outputs.labels), 1.0))
-    search = searched(question, bench, data[0], nuisance, top)
-    swapped = (
-        held_sensors if isinstance(question.held_sensors, tuple) else _swapped(search, held_sensors)
-    )
+        nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
+    problem = updating_problem(question, reduced, data[0], nuisance, f_max)
+    named = isinstance(question.held_sensors, tuple)
+    swapped = held_sensors if named else _swapped(problem, held_sensors)
     if not np.array_equal(swapped, held_sensors):
         held_sensors = swapped
         data = [
-            d.only(_training(f, low, fit_top, swapped)) for d, f in zip(data, lines, strict=True)
+            d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
         ]
-        search = replace(search, data=data[0])
+        problem = replace(problem, data=data[0])
     f = lines[1]
     outside = (f >= held_band[0]) & (f <= held_band[1])
     held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
@@ -122,14 +121,14 @@ def _by_responses(question: Question) -> Prepared:
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     few = too_little(seen, int(data[0].use.any(axis=0).sum()))
     return Prepared(
-        search, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
+        problem, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
     )
 
 
 def _modes_seen(found: Identified, low: float, high: float) -> int:
     """How many poles that stand out lie between two frequencies."""
     inside = (found.frequency >= low) & (found.frequency <= high)
-    return int((inside & (found.gain > LEAST_GAIN)).sum())
+    return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
 
 
 def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
@@ -144,7 +143,7 @@ def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
 
     The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
     """
-    sd = np.sqrt(spread(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    sd = np.sqrt(frf_variance(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
     f, own = s.imag / (2 * np.pi), frf.frequency
     near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
     lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))
@@ -185,15 +184,16 @@ def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.nd
     return np.asarray(np.outer((f >= low) & (f <= high), ~held))
 
 
-def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
+def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
     """Held-out sensors, but for those whose level stands out: a fault must be fitted to be found.
 
     Only the choice of what is held out looks at them, by the median level against a model with
     ordinary parameters alone.
     """
-    data = search.data
+    data = problem.data
     assert isinstance(data, Responses)
-    rough = fit(search.bench.model, search.base, data, search.weighing, search.mean(), max_steps=8)
+    model, weighed = problem.reduced.model, problem.mass_measurement
+    rough = fit(model, problem.base, data, weighed, problem.mean(), max_steps=8)
     lines = data.use.any(axis=1)
     delta = data.deviation(rough.state)[lines].reshape(lines.sum(), len(held), -1)
     level = np.median(delta.real, axis=(0, 2))
@@ -210,12 +210,12 @@ def _swapped(search: Search, held: np.ndarray) -> np.ndarray:
 
 def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
-    top = float(frequency[-1]) * 1.15
-    highest = top if question.frf is None else max(top, band_of(question, question.frf)[1])
-    nominal = modelled(question.tested(question.assembly), max(FAR * top, SOLVED * highest))
+    f_max = float(frequency[-1]) * 1.15
+    highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
+    nominal = modelled(question.tested(question.assembly), max(FAR * f_max, SOLVED * highest))
     built = nominal.structure
-    bench = workbench(nominal, top, groups=48, reach=FAR)
-    bench = carrying(bench, freed_by(question, bench, top))
+    reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
+    reduced = carrying(reduced, freed_by(question, reduced, f_max))
     held = np.zeros(len(frequency), bool)
     if question.held_band is not None:
         held = (frequency >= question.held_band[0]) & (frequency <= question.held_band[1])
@@ -227,72 +227,76 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
-    ).over(bench.model)  # fmt: skip
-    nuisance = nuisances(bench, nominal, top)
-    search = searched(question, bench, data, nuisance, top)
+    ).over(reduced.model)  # fmt: skip
+    nuisance = nuisances(reduced, nominal, f_max)
+    problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
     few = too_little(len(frequency), 0)
-    return Prepared(search, data, held, what, notes, nominal, None, found, few, ~held)
+    return Prepared(problem, data, held, what, notes, nominal, None, found, few, ~held)
 
 
-def nuisances(bench: Workbench, model: Modelled, top: float, jittered: bool = True) -> list[Effect]:
-    """Scatter within parts, mesh error, jitter: what calibration cannot remove.
+def nuisances(
+    reduced: ReducedProblem, model: Modelled, f_max: float, with_discrepancy: bool = True
+) -> list[Effect]:
+    """Scatter within parts, mesh error, modal discrepancy: what calibration cannot remove.
 
-    Responses need no jitter: their likelihood allows any small error of modal stiffness and mass.
-    What is structured in that error stands beside it, joints and shear of the shells by families.
+    Responses need no modal discrepancy: their likelihood allows any small error of modal stiffness
+    and mass. What is structured in that error stands beside it, joints and shear of the shells by
+    families.
     """
     out: list[Effect] = [
-        scatter(bench.groups, "t", SCATTER_T), scatter(bench.groups, "E", SCATTER_E)
+        random_field(reduced.groups, "t", SCATTER_T), random_field(reduced.groups, "E", SCATTER_E)
     ]  # fmt: skip
-    if (mesh := mesh_error(model, top)) is not None:
+    if (mesh := mesh_error(model, f_max)) is not None:
         out.append(mesh)
-    if jittered:
-        return [*out, jitter(model, top, mesh)]
+    if with_discrepancy:
+        return [*out, modal_discrepancy(model, f_max, mesh)]
     return [*out, *model_families(model.structure)]
 
 
-def searched(
+def updating_problem(
     question: Question,
-    bench: Workbench,
+    reduced: ReducedProblem,
     data: Responses | Poles,
     nuisance: list[Effect],
-    top: float,
-) -> Search:
+    f_max: float,
+) -> UpdatingProblem:
     """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
-    base = [*freed_by(question, bench, top), *nuisance]
-    return Search(
-        bench, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
-        setup_of(question, top), question.outputs.labels,
+    base = [*freed_by(question, reduced, f_max), *nuisance]
+    return UpdatingProblem(
+        reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
+        setup_of(question, f_max), question.outputs.labels,
     )  # fmt: skip
 
 
-def setup_of(question: Question, top: float) -> Setup:
+def setup_of(question: Question, f_max: float) -> Setup:
     """What the effects may know of the test."""
     weight = mass_properties(question.assembly)[0]
     sensors = question.outputs.shares(question.assembly)
-    return Setup(sensors, question.hangers, weight, top)
+    return Setup(sensors, question.hangers, weight, f_max)
 
 
-def freed_by(question: Question, bench: Workbench, top: float) -> list[Effect]:
+def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
     """What the user frees, or E and rho of every material and t of every part of shells.
 
     Without shells, E and rho of every material of solids and beams.
     """
     if question.parameters:
-        return [_freed(question, bench, top, p) for p in question.parameters]
-    if len(bench.groups):
-        return list(defaults(bench.groups))
-    return [freed(bench.groups, p) for p in defaults_without_shells(question.assembly)]
+        return [_freed(question, reduced, f_max, p) for p in question.parameters]
+    if len(reduced.groups):
+        return list(defaults(reduced.groups))
+    return [freed(reduced.groups, p) for p in defaults_without_shells(question.assembly)]
 
 
-def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -> Effect:
+def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:
     """One number, or an effect whose place is known, of the parts named."""
     if p.field in UNITS:
-        return freed(bench.groups, p)
+        return freed(reduced.groups, p)
     placed = family(p.field).placed
     assert placed is not None
-    where = Surroundings(bench.groups, bench.grids, bench.candidates, setup_of(question, top))
+    setup = setup_of(question, f_max)
+    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
     names = {question.assembly.parts[k].name for k in p.positions}
     found = [e for e in placed(where) if not names or set(e.parts) <= names]
     if not found:
@@ -304,19 +308,19 @@ def _freed(question: Question, bench: Workbench, top: float, p: FreeParameter) -
     return freed_effect(found[0], p.name)
 
 
-def carrying(bench: Workbench, effects: Sequence[Effect]) -> Workbench:
-    """The workbench over a basis that carries what is free in every fit."""
+def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProblem:
+    """The reduced problem over a basis that carries what is free in every fit."""
     for effect in effects:
         x = np.array([p.mean for p in effect.parameters])
-        model = bench.model_for(effect, x)
-        bench = bench if model is bench.model else replace(bench, model=model)
-    return bench
+        model = reduced.model_for(effect, x)
+        reduced = reduced if model is reduced.model else replace(reduced, model=model)
+    return reduced
 
 
 def _mass_note(question: Question) -> list[str]:
-    if question.weighing is None:
+    if question.mass_measurement is None:
         return [
             "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"
         ]
-    w = question.weighing
+    w = question.mass_measurement
     return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]

@@ -11,9 +11,9 @@ from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
-from .hypothesis_fit import Search
+from .hypothesis_fit import UpdatingProblem
 from .likelihood import Poles, Responses
-from .map_fit import Weighing
+from .map_fit import MassMeasurement
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Question:
     frf: FRF | None = None
     frequency: np.ndarray | None = None  # poles where no FRF exists [Hz]
     frequency_sd: np.ndarray | None = None  # [Hz]
-    weighing: Weighing | None = None
+    mass_measurement: MassMeasurement | None = None
     hangers: tuple[int, ...] = ()
     band: tuple[float, float] = (0.0, np.inf)
     exclude: tuple[tuple[float, float], ...] = ()
@@ -48,20 +48,21 @@ class Question:
         return with_masses(assembly, grids, np.array(m))
 
     @property
-    def weighed_with_sensors(self) -> Weighing | None:
+    def weighed_with_sensors(self) -> MassMeasurement | None:
         """The weighing of the article and what the sensors add to it, as the model has them."""
-        if self.weighing is None:
+        if self.mass_measurement is None:
             return None
-        return replace(self.weighing, mass=self.weighing.mass + sum(m for _, m in self.carried))
+        mass = self.mass_measurement.mass + sum(m for _, m in self.carried)
+        return replace(self.mass_measurement, mass=mass)
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A search and what scores it.
+    """An updating problem and what scores it.
 
     Attributes
     ----------
-    search : what the diagnosis works with
+    problem : what the diagnosis works with
     score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
     held : samples held out, in the shape of ``score.use``
     what : the held-out data in words
@@ -70,7 +71,7 @@ class Prepared:
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
     """
 
-    search: Search
+    problem: UpdatingProblem
     score: Responses | Poles
     held: np.ndarray
     what: str

@@ -22,13 +22,13 @@ REACH = 2.5  # the basis holds modes up to this many times the highest frequency
 
 
 @dataclass(frozen=True, eq=False)
-class Workbench:
+class ReducedProblem:
     """One structure, its reduced model, and where unknown things may sit.
 
     Attributes
     ----------
     frequency : (r,) Hz      of the nominal model's modes, rigid ones included
-    top : highest frequency of interest [Hz]
+    f_max : highest frequency of interest [Hz]
     candidates : ShellGrids  a sample of all of ``grids``
     flexibility : (k,)       static response at each candidate beyond the basis [m/N]
     hertz : shift of the static responses
@@ -42,7 +42,7 @@ class Workbench:
     hertz: float
     grids: ShellGrids
     candidates: ShellGrids
-    top: float
+    f_max: float
 
     def flexibility(self, where: ShellGrids) -> np.ndarray:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
@@ -59,35 +59,35 @@ class Workbench:
 
     def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
         """The reduced model over a basis that can carry an effect near x, split as it needs."""
-        low = np.flatnonzero(self.frequency <= self.top)
+        low = np.flatnonzero(self.frequency <= self.f_max)
         rows = effect.basis_rows(x, self.model.basis[:, low])
         model = self.model if rows is None else self.with_attachments(rows)
         return model.split_for(effect, x)
 
 
-def workbench(
-    model: Modelled | Assembly, top: float, rows: sp.csr_array | None = None, *, most: int = 200,
+def reduced_problem(
+    model: Modelled | Assembly, f_max: float, rows: sp.csr_array | None = None, *, most: int = 200,
     groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
-) -> Workbench:  # fmt: skip
+) -> ReducedProblem:  # fmt: skip
     """Make a structure ready.
 
     Parameters
     ----------
-    model : its modes are solved to REACH times ``top``; an assembly is solved here
-    top : highest frequency of interest [Hz]
+    model : its modes are solved to REACH times ``f_max``; an assembly is solved here
+    f_max : highest frequency of interest [Hz]
     rows : (k, n) places whose static response the basis must hold (sensors, shakers)
     extra : (n, m) further vectors for the basis
     most : candidate places
-    reach : the basis holds modes up to this many times ``top``
+    reach : the basis holds modes up to this many times ``f_max``
     """
     if isinstance(model, Assembly):
-        model = modelled(model, reach * top)
-    built, modes = model.structure, model.up_to(reach * top)
-    flexible = modes.frequency[modes.frequency > 0.02 * top]
+        model = modelled(model, reach * f_max)
+    built, modes = model.structure, model.up_to(reach * f_max)
+    flexible = modes.frequency[modes.frequency > 0.02 * f_max]
     if not len(flexible):  # stiffer than all that was measured
         modes = normal_modes(built.system, min(FEWEST, len(built.system.dofs)))
-        flexible = modes.frequency[modes.frequency > 0.02 * top]
-    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
+        flexible = modes.frequency[modes.frequency > 0.02 * f_max]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
     factor = shifted(built.system, hertz)
     blocks = [modes.shapes]
     if rows is not None and rows.shape[0]:
@@ -98,7 +98,7 @@ def workbench(
     shells = shell_groups(built, groups)
     grids = shell_grids(shells)
     chosen = grids.only(farthest_point_sample(grids.point, most))
-    return Workbench(
+    return ReducedProblem(
         built,
         shells,
         reduce(shells, basis),
@@ -107,5 +107,5 @@ def workbench(
         hertz,
         grids,
         chosen,
-        top,
+        f_max,
     )

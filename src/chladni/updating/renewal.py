@@ -7,27 +7,27 @@ import scipy.sparse as sp
 
 from ..fem.modelled import modelled
 from .accuracy import LIMIT, Accuracy, accuracy
-from .hypothesis_fit import Search, Trial, fitted
+from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
-from .preparation import SOLVED, nuisances, searched
+from .preparation import SOLVED, nuisances, updating_problem
 from .question import Prepared, Question
-from .reduced_problem import workbench
+from .reduced_problem import reduced_problem
 
 TRIES = 3  # times the basis is widened by what it lacks
 
 
 @dataclass(frozen=True, eq=False)
 class Renewal:
-    """A trial on ground that bears it.
+    """A hypothesis on ground that bears it.
 
     Attributes
     ----------
-    trial : Trial
+    hypothesis : HypothesisFit
     note : how far the reduced model is off
     worst : largest relative frequency error that is left
     """
 
-    trial: Trial
+    hypothesis: HypothesisFit
     note: str
     worst: float
 
@@ -43,32 +43,34 @@ class Renewal:
         )
 
 
-def renewed(question: Question, prepared: Prepared, trial: Trial) -> Renewal:
-    """The trial on ground that bears it, and a sentence on how far the reduced model is off.
+def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -> Renewal:
+    """The hypothesis on ground that bears it, and a sentence on how far the reduced model is off.
 
-    Mesh error, jitter and the basis belong to the structure they were made for. Where the effect
-    makes it another one they are made anew. Elsewhere the basis is widened by what it lacks, while
-    it lacks more than ``LIMIT``. The same parameters are then fitted from where they were.
+    Mesh error, modal discrepancy and the basis belong to the structure they were made for. Where
+    the effect makes it another one they are made anew. Elsewhere the basis is widened by what it
+    lacks, while it lacks more than ``LIMIT``. The same parameters are then fitted from where they
+    were.
     """
-    search = prepared.search
-    if trial.effect.remakes_structure:
-        search, trial = _on_new_structure(question, search, trial)
-    found = _accuracy(search, trial)
+    problem = prepared.problem
+    if hypothesis.effect.remakes_structure:
+        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
+    found = _accuracy(problem, hypothesis)
     note = _said(found)
     for _ in range(TRIES):
         if found.serves():
             break
-        model = found.renewed(trial.model)
-        data = trial.data.over(model)
-        fit = fitted(model, trial.fit.effects, data, search.weighing, trial.fit.x)
-        trial = Trial(trial.effect, fit, model)
-        found = _accuracy(search, trial)
+        model, begun = found.renewed(hypothesis.model), hypothesis.fit
+        data = hypothesis.data.over(model)
+        fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+        hypothesis = HypothesisFit(hypothesis.effect, fit, model)
+        found = _accuracy(problem, hypothesis)
         note = f"{note}; with what it lacked added to its basis, {found.worst:.2%}"
-    return Renewal(trial, note, found.worst)
+    return Renewal(hypothesis, note, found.worst)
 
 
-def _accuracy(search: Search, trial: Trial) -> Accuracy:
-    return accuracy(search.bench, trial.model, trial.fit.effects, trial.fit.x, search.setup.top)
+def _accuracy(problem: UpdatingProblem, hypothesis: HypothesisFit) -> Accuracy:
+    model, fit = hypothesis.model, hypothesis.fit
+    return accuracy(problem.reduced, model, fit.effects, fit.x, problem.setup.f_max)
 
 
 def _said(found: Accuracy) -> str:
@@ -78,23 +80,25 @@ def _said(found: Accuracy) -> str:
     )
 
 
-def _on_new_structure(question: Question, old: Search, trial: Trial) -> tuple[Search, Trial]:
+def _on_new_structure(
+    question: Question, old: UpdatingProblem, hypothesis: HypothesisFit
+) -> tuple[UpdatingProblem, HypothesisFit]:
     """A strong change fitted again on a structure that has it already."""
-    effect = trial.effect
-    x = trial.fit.of(effect)
+    effect = hypothesis.effect
+    x = hypothesis.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
-    data, top = old.data, old.setup.top
-    model = modelled(changed.tested(changed.assembly), SOLVED * top)
+    data, f_max = old.data, old.setup.f_max
+    model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
-    bench = workbench(
-        model, top, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48
+    reduced = reduced_problem(
+        model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48
     )
     of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
-    fresh = searched(
+    fresh = updating_problem(
         changed,
-        bench,
-        data.over(bench.model),
-        [*nuisances(bench, model, top, not rows), *of_test],
-        top,
+        reduced,
+        data.over(reduced.model),
+        [*nuisances(reduced, model, f_max, not rows), *of_test],
+        f_max,
     )
-    return fresh, fresh.trial(effect.with_reference_state(x), x, fresh.mean())
+    return fresh, fresh.fitted_with(effect.with_reference_state(x), x, fresh.mean())

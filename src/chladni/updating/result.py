@@ -65,16 +65,16 @@ class Agreement:
     ----------
     fitted, held_out : Scores
     what : the held-out data in words
-    gain : of the named effect over calibration, in -2 ln evidence; None: none is named
-    largest_gain : of any effect that was tried
-    threshold : the gain from which an effect is named
+    two_log_bayes_factor : of the named effect over calibration; None: none is named
+    largest_two_log_bayes_factor : of any effect that was tried
+    threshold : of 2 ln Bayes factor, from which an effect is named
     """
 
     fitted: Scores = Scores()
     held_out: Scores = Scores()
     what: str = ""
-    gain: float | None = None
-    largest_gain: float | None = None
+    two_log_bayes_factor: float | None = None
+    largest_two_log_bayes_factor: float | None = None
     threshold: float | None = None
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .diagnosis import Diagnosis, threshold
-from .hypothesis_fit import Trial
+from .hypothesis_fit import HypothesisFit
 from .likelihood import LN10, Poles
 from .outcome import real_poles
 from .question import Prepared
@@ -19,15 +19,15 @@ from .result import (
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 
 
-def named_effect(trial: Trial) -> NamedEffect:
-    """The effect of a trial, where it is and how large."""
-    effect, x = trial.effect, trial.fit.of(trial.effect)
+def named_effect(hypothesis: HypothesisFit) -> NamedEffect:
+    """The effect of a hypothesis, where it is and how large."""
+    effect, x = hypothesis.effect, hypothesis.fit.of(hypothesis.effect)
     return NamedEffect(
         effect.name,
         effect.claim,
-        -trial.S / 2,
+        -hypothesis.neg2_log_evidence / 2,
         effect.location(x),
-        effect.reported(x, trial.fit.sd(effect)),
+        effect.reported(x, hypothesis.fit.sd(effect)),
     )
 
 
@@ -37,34 +37,42 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     best = found if found is not None else diagnosis.null
     out = [
         Alternative(
-            trial.effect.name,
-            -trial.S / 2,
-            why_not(trial, best, found is not None, diagnosis.gain(trial)),
-            trial.effect.location(trial.fit.of(trial.effect)),
+            hypothesis.effect.name,
+            -hypothesis.neg2_log_evidence / 2,
+            why_not(
+                hypothesis, best, found is not None, diagnosis.two_log_bayes_factor(hypothesis)
+            ),
+            hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect)),
         )
-        for trial in diagnosis.trials
-        if trial is not found
+        for hypothesis in diagnosis.hypotheses
+        if hypothesis is not found
     ]
     if found is not None:
-        gap = (diagnosis.null.S - best.S) / 2
+        gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
         reason = f"E, rho and t alone are e^{gap:.0f} times less probable"
-        out.append(Alternative("calibration only", -diagnosis.null.S / 2, reason))
+        out.append(Alternative("calibration only", -diagnosis.null.neg2_log_evidence / 2, reason))
     return tuple(sorted(out, key=lambda a: -(a.log_evidence or 0.0)))
 
 
-def why_not(trial: Trial, best: Trial, named: bool, gain: float) -> str:
+def why_not(
+    hypothesis: HypothesisFit, best: HypothesisFit, named: bool, two_log_bayes_factor: float
+) -> str:
     """Why a hypothesis was not named, with a number."""
-    if not named and gain > threshold():
-        return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
+    if not named and two_log_bayes_factor > threshold():
+        return (
+            f"gains {two_log_bayes_factor:.1f} in -2 ln evidence, but does not help on the data "
+            "held out"
+        )
     if not named:
         return (
-            f"gains {gain:.1f} in -2 ln evidence over plain calibration; "
+            f"gains {two_log_bayes_factor:.1f} in -2 ln evidence over plain calibration; "
             f"{threshold():.0f} are needed before anything is named"
         )
-    gap = (trial.S - best.S) / 2
+    gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
-        f"e^{gap:.0f} times less probable than {best.effect.name}; leaves {trial.fit.misfit:.0f} "
-        f"of weighted squares, {best.effect.name} {best.fit.misfit:.0f}"
+        f"e^{gap:.0f} times less probable than {best.effect.name}; leaves "
+        f"{hypothesis.fit.misfit:.0f} of weighted squares, {best.effect.name} "
+        f"{best.fit.misfit:.0f}"
     )
 
 
@@ -76,13 +84,13 @@ def agreement(
     last, what = found or diagnosis.null, prepared.what
     if last.effect.channels:
         what = f"channel {', '.join(last.effect.channels)} on the lines held out of {what}"
-    gains = [diagnosis.gain(trial) for trial in diagnosis.trials]
+    factors = [diagnosis.two_log_bayes_factor(hypothesis) for hypothesis in diagnosis.hypotheses]
     return Agreement(
         fitted,
         held_out,
         what,
-        None if found is None else diagnosis.gain(found),
-        max(gains, default=None),
+        None if found is None else diagnosis.two_log_bayes_factor(found),
+        max(factors, default=None),
         threshold(),
     )
 
@@ -129,6 +137,6 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
         return "that is structured, not noise"
     if not far:
         return "nothing more can be read from that"
-    if diagnosis.trials:
+    if diagnosis.hypotheses:
         return "mesh error and scatter within the parts account for it as well as any effect tried"
     return "more than noise; a diagnosis says whether physics is missing"

@@ -14,7 +14,7 @@ import numpy as np
 from ..effects.effect import Effect, FieldChange, Parameter
 from ..effects.surroundings import ShellGrids
 from .likelihood import LN10, POWER, Data, Responses
-from .map_fit import Weighing, unknowns
+from .map_fit import MassMeasurement, unknowns
 from .reduced_model import Reduced, State, evaluate
 
 
@@ -30,7 +30,7 @@ class Baseline:
     state: State
     residual: np.ndarray
     Z: np.ndarray
-    weighing: Weighing | None
+    mass_measurement: MassMeasurement | None
 
     def score(self, residuals: np.ndarray) -> np.ndarray:
         """rᵀ C⁻¹ r of every column (n, m) -> (m,)."""
@@ -38,9 +38,9 @@ class Baseline:
 
     def with_mass(self, r: np.ndarray, added: np.ndarray | float) -> np.ndarray:
         """The data's residuals (n_data, m) with the row of the scales below them."""
-        if self.weighing is None:
+        if self.mass_measurement is None:
             return r
-        row = (self.state.weight + added - self.weighing.mass) / self.weighing.sd
+        row = (self.state.weight + added - self.mass_measurement.mass) / self.mass_measurement.sd
         return np.concatenate([r, np.broadcast_to(row, (1, r.shape[1]))])
 
 
@@ -48,7 +48,7 @@ def baseline(
     model: Reduced,
     effects: Sequence[Effect],
     data: Data,
-    weighing: Weighing | None,
+    mass_measurement: MassMeasurement | None,
     x: np.ndarray,
 ) -> Baseline:
     """Linearise the base effects at x."""
@@ -57,13 +57,13 @@ def baseline(
     shapes = np.zeros((len(r), 0))
     if isinstance(data, Responses) and (error := data.error) is not None:
         shapes = error.U * (error.delta * np.sqrt(error.s))
-    if weighing is not None:
-        r = np.append(r, (state.weight - weighing.mass) / weighing.sd)
-        J = np.concatenate([J, state.dweight[None] / weighing.sd])
+    if mass_measurement is not None:
+        r = np.append(r, (state.weight - mass_measurement.mass) / mass_measurement.sd)
+        J = np.concatenate([J, state.dweight[None] / mass_measurement.sd])
         shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
     W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
     L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
-    return Baseline(tuple(effects), x, state, r, np.linalg.solve(L, W.T), weighing)
+    return Baseline(tuple(effects), x, state, r, np.linalg.solve(L, W.T), mass_measurement)
 
 
 def point_scores(
@@ -103,7 +103,7 @@ def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     delta = np.log(H * scale) / LN10
     if state.offset is not None:
         delta = delta + state.offset[:, None]
-    z = (wrapped(delta) / data.spread())[:, data.use].reshape(len(H), -1)
+    z = (wrapped(delta) / data.std())[:, data.use].reshape(len(H), -1)
     return np.concatenate([z.real, z.imag], axis=1).T
 
 
@@ -122,8 +122,8 @@ def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
     probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
     _, J = data.scaled(state, True)
-    if base.weighing is not None:
-        J = np.concatenate([J, state.dweight[None] / base.weighing.sd])
+    if base.mass_measurement is not None:
+        J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
     return J[:, -n:]
 
 

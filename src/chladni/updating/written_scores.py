@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..fem.modelled import Modelled, node_points
-from .hypothesis_fit import Trial
+from .hypothesis_fit import HypothesisFit
 from .likelihood import LN10, Poles, Responses
 from .question import Prepared, Question
 from .reduced_model import State
@@ -25,7 +25,7 @@ def written_Q(
     model: Modelled,
     sets: tuple[np.ndarray, ...],
     real: np.ndarray | None = None,
-    fault: Trial | None = None,
+    fault: HypothesisFit | None = None,
 ) -> tuple[float, ...]:
     """Q of a structure on each of these sets of samples.
 
@@ -37,7 +37,7 @@ def written_Q(
 
     Where the gain is unknown, the mean level over the fitted samples is taken out as well.
     """
-    data, state = seen(question, prepared.score, model, prepared.search.setup.top)
+    data, state = seen(question, prepared.score, model, prepared.problem.setup.f_max)
     if isinstance(data, Poles):
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
@@ -52,10 +52,10 @@ def written_Q(
 
 
 def seen(
-    question: Question, score: Responses | Poles, model: Modelled, top: float
+    question: Question, score: Responses | Poles, model: Modelled, f_max: float
 ) -> tuple[Responses | Poles, State]:
     """The data with this structure's rows in its own modes, and those modes."""
-    built, modes = model.structure, model.up_to(REACH * top)
+    built, modes = model.structure, model.up_to(REACH * f_max)
     basis = modes.shapes
     if isinstance(score, Poles):
         lam = (2 * np.pi * modes.frequency) ** 2
@@ -64,8 +64,8 @@ def seen(
             score = replace(score, a=a, b=b)
         return score, _state(lam, np.eye(len(lam)))
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    flexible = modes.frequency[modes.frequency > 0.02 * top]
-    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * top
+    flexible = modes.frequency[modes.frequency > 0.02 * f_max]
+    hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
     still = attachments(
         shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
     )

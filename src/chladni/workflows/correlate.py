@@ -67,11 +67,11 @@ def correlate(case: Case, progress: Progress = silent) -> Correlation:
 
 def _correlated(case: Case, progress: Progress) -> Correlation:
     test = case.frfs[0] if case.frfs else None
-    top = _top(case, test)
+    f_max = _f_max(case, test)
     progress("modes of the model", 0.1)
-    model = modelled(case.tested(case.assembly), REACH * top)
+    model = modelled(case.tested(case.assembly), REACH * f_max)
     f = model.modes.frequency
-    inside = ~rigid_modes(model.modes) & (f > RIGID * top) & (f <= 1.3 * top)
+    inside = ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= 1.3 * f_max)
     near = model.modes.sel(np.flatnonzero(inside))
     if test is None:
         return _by_poles(case, near)
@@ -93,7 +93,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     )  # fmt: skip
 
 
-def _top(case: Case, test: FRF | None) -> float:
+def _f_max(case: Case, test: FRF | None) -> float:
     """Highest frequency the test speaks of [Hz]."""
     if case.band is not None:
         return case.band[1]

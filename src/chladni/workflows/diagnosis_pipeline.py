@@ -39,19 +39,19 @@ from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
 
 
-def answered(case: Case, search: bool, progress: Progress) -> DiagnosisResult:
-    """Diagnose (or, without ``search``, only calibrate) a case, on one BLAS thread."""
+def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
+    """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
     with threadpool_limits(1):
         progress("identifying the recording", 0.0)
-        if search and not len(case.assembly.shells):
+        if diagnosing and not len(case.assembly.shells):
             raise FileError(
                 f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
                 "calibrate and correlate take any deck"
             )
         asked = question(case)
         prepared = prepare(asked)
-        found = compared(prepared.search, within(progress, 0.1, 0.85), search)
-        if search:
+        found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
+        if diagnosing:
             found = withheld(prepared, found)
         found, distrust = _judged(asked, prepared, found)
         if found.one_of:
@@ -60,8 +60,8 @@ def answered(case: Case, search: bool, progress: Progress) -> DiagnosisResult:
         stages, lost = _updated(case, asked, prepared, found)
         progress("scores", 0.95)
         result = _result(asked, prepared, found, stages)
-        notes = (*result.notes, *lost, *case.said("diagnose" if search else "calibrate"))
-        return replace(result, notes=notes, distrust=distrust, searched=search)
+        notes = (*result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
+        return replace(result, notes=notes, distrust=distrust, searched=diagnosing)
 
 
 def _judged(
@@ -71,13 +71,12 @@ def _judged(
     distrust: tuple[str, ...] = ()
     if found.found is not None:
         lead = renewed(asked, prepared, found.found)
-        found = replace(
-            found, trials=(lead.trial, *found.trials[1:]), notes=(*found.notes, lead.note)
-        )
+        hypotheses = (lead.hypothesis, *found.hypotheses[1:])
+        found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = judged(prepared, found), lead.distrust
     if found.found is None:
         plain = renewed(asked, prepared, found.plain)
-        found = replace(found, plain=plain.trial, notes=(*found.notes, plain.note))
+        found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
         distrust = plain.distrust
     return found, distrust
 
@@ -112,10 +111,10 @@ def _deck(
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
     """Labels of the outputs that no fit saw."""
-    data = prepared.search.data
+    data = prepared.problem.data
     if not isinstance(data, Responses):
         return ()
-    labels = prepared.search.labels
+    labels = prepared.problem.labels
     return tuple(label for k, label in enumerate(labels) if not data.use[:, k].any())
 
 
@@ -148,7 +147,7 @@ def _result(
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
     left = remainder(prepared, found)
-    weighed = None if asked.weighing is None else asked.weighing.mass
+    weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
     return DiagnosisResult(
         verdict=found.verdict,
         effects=() if found.found is None else (named_effect(found.found),),

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..case import Case
 from ..errors import FileError
-from ..updating.map_fit import Weighing
+from ..updating.map_fit import MassMeasurement
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from .unit_check import refuse_other_units
@@ -31,14 +31,14 @@ def question(case: Case) -> Question:
             f"{case.path}: diagnosis of a structure moved at its supports is not built yet; "
             "give responses to a force"
         )
-    weighing = None
+    mass_measurement = None
     if case.setup.mass is not None:
-        weighing = Weighing(case.setup.mass, case.setup.mass_sd)
+        mass_measurement = MassMeasurement(case.setup.mass, case.setup.mass_sd)
     asked = Question(
         case.assembly,
         case.outputs,
         case.inputs,
-        weighing=weighing,
+        mass_measurement=mass_measurement,
         hangers=case.setup.hangers,
         band=case.band or (0.0, np.inf),
         exclude=case.exclude,

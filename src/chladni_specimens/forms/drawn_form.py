@@ -21,7 +21,7 @@ class DrawnForm:
     ranges : {name: (low, high)}   each dimension is drawn between them [m, rad, share]
     build : (dimensions, element size) -> Assembly
     size : element size of the deck [m]
-    grain : direction a sheet may be rolled in, normal to none of the parts in ``rolled``
+    material_axis : direction a sheet may be rolled in, normal to none of the parts in ``rolled``
     rolled : names of these parts; empty where there is no sheet
     """
 
@@ -29,7 +29,7 @@ class DrawnForm:
     ranges: Mapping[str, tuple[float, float]]
     build: Callable[[Mapping[str, float], float], Assembly]
     size: float
-    grain: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    material_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
     rolled: tuple[str, ...] = ()
 
     def dimensions(self, seed: int) -> dict[str, float]:

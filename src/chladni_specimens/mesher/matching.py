@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class _Search:
-    """Alternating tree from one lonely vertex."""
+    """Alternating tree from one unmatched vertex."""
 
     root: int
     near: list[list[int]]
@@ -61,7 +61,7 @@ class _Search:
                 self.reach_even(w)
 
     def run(self, reach: int) -> int | None:
-        """The lonely vertex at the other end of an augmenting path, or None."""
+        """The unmatched vertex at the other end of an augmenting path, or None."""
         self.reach_even(self.root)
         while self.queue and len(self.parent) < reach:
             v = self.queue.popleft()
@@ -79,7 +79,7 @@ class _Search:
 
 
 def augment(root: int, near: list[list[int]], mate: dict[int, int], reach: int = 400) -> bool:
-    """Match the lonely `root` with another lonely vertex by flipping one augmenting path.
+    """Match the unmatched `root` with another unmatched vertex by flipping one augmenting path.
 
     >>> mate = {1: 2, 2: 1}
     >>> augment(0, [[1], [0, 2], [1, 3], [2]], mate), mate

@@ -1,4 +1,4 @@
-"""Triangles to quadrilaterals: best pairs first, lonely triangles joined along chains.
+"""Triangles to quadrilaterals: best pairs first, unpaired triangles joined along chains.
 
 A triangle is a quadrilateral that repeats its third node, as everywhere in this package.
 Remacle et al., Blossom-Quad, Int. J. Numer. Meth. Engng 89 (2012) 1102-1119, pair likewise.

@@ -15,7 +15,7 @@ from chladni.io.nastran import assembly, read_deck
 from chladni.model.properties import Isotropic
 from chladni.units import UNITS
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import workbench
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_evidence.concealed import Specimen, concealable, made, write
 from chladni_specimens.plates import plate
 
@@ -47,11 +47,11 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says(crack):
     """∂ln λ/∂ln f = ∫_line φ''² dx / ∫ φ''² dx, φ'' of a free beam's first mode, nu = 0."""
     n, length = 25, 0.5
     strip = plate(length, 0.06, n, 3, 1e-3, Isotropic(2.1e11, 0.0, 7850.0))
-    bench = workbench(strip, 60.0)
+    reduced = reduced_problem(strip, 60.0)
     middle = [k for k in crack.lines(strip) if abs(k.centre[0] - length / 2) < 1e-6]
     (line,) = [k for k in middle if k.shells.sum() == 3]
-    effect, x = crack.crack(bench.groups, line, 1), np.array([-8.0])
-    state = evaluate(bench.model_for(effect, x), [effect], x)
+    effect, x = crack.crack(reduced.groups, line, 1), np.array([-8.0])
+    state = evaluate(reduced.model_for(effect, x), [effect], x)
     got = state.dK[0, 6, 6] / state.lam[6] / effect.matrices(x)[0].gradient[0]
     k, s = 4.730040744862704, np.linspace(0, 1, 5001)  # cos k cosh k = 1
     r = (np.cosh(k) - np.cos(k)) / (np.sinh(k) - np.sin(k))
@@ -64,12 +64,13 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says(crack):
 def test_reduced_model_agrees_with_the_changed_structure(crack):
     """To second order of what a basis of first order lacks."""
     deck = small_plate(1)
-    bench = workbench(deck, 420.0)
-    where = Surroundings(bench.groups, bench.grids, bench.candidates, Setup((), (), 0.5, 420.0))
+    reduced = reduced_problem(deck, 420.0)
+    setup = Setup((), (), 0.5, 420.0)
+    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
     line = crack.lines(deck)[3]
     effect = crack.crack(where.groups, line, 1)
     x = np.array([0.0])  # 55 % is left
-    lam = evaluate(bench.model_for(effect, x), [effect], x, False).lam[6:14]
+    lam = evaluate(reduced.model_for(effect, x), [effect], x, False).lam[6:14]
     due = normal_modes(structure(effect.apply(deck, x)).system, 14).frequency[6:]
     nominal = normal_modes(structure(deck).system, 14).frequency[6:]
     moved = np.abs(due / nominal - 1).max()

@@ -94,9 +94,9 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     found, before = deck
     given, cards = KINDS[kind]
     at = tuple(position(before, id) for id in given.get("parts", ()))
-    cloth = shell_groups(structure(before), 4)
+    groups = shell_groups(structure(before), 4)
     what = {k: v for k, v in given.items() if k != "parts"}
-    effect = freed(cloth, FreeParameter(kind, positions=at, **what))
+    effect = freed(groups, FreeParameter(kind, positions=at, **what))
     after = effect.apply(before, np.array([0.05]))
     got, gone = rewritten(found, before, after)
     due, was, is_now = (structure(a).system for a in (after, before, got))

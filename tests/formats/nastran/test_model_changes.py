@@ -142,11 +142,11 @@ def test_grain_that_is_there_already(tmp_path):
     first, second = (effect.apply(before, np.array(x)) for x in ([0.1] * 4, [0.3, 0.1, 0, 0.4]))
     deck, before, units = opened(first, tmp_path)
     id = before.parts[0].section.membrane.id
-    grain = replace(second.parts[0].section.membrane, rho=8000.0, id=id)
-    after = before.with_parts((before.parts[0].with_section(membrane=grain, bending=grain),))
+    material = replace(second.parts[0].section.membrane, rho=8000.0, id=id)
+    after = before.with_parts((before.parts[0].with_section(membrane=material, bending=material),))
     found, _, _ = repaired(deck, before, after, units)
     same(found, after, before)
-    assert found.parts[0].section.membrane.nu12 == pytest.approx(grain.nu12, rel=1e-6)
+    assert found.parts[0].section.membrane.nu12 == pytest.approx(material.nu12, rel=1e-6)
 
 
 def test_poisson_ratio(deck):
