@@ -243,15 +243,16 @@ def test_pickles(case):
 def test_can_be_written_as_json(case):
     sd = np.full(len(case.x), 0.1)
     rows = case.effect.reported(case.x, sd)
-    json.dumps([rows, case.effect.location(case.x), case.effect.where()], allow_nan=False)
-    assert all(row["low"] <= row["value"] <= row["high"] for row in rows)
+    places = case.effect.location(case.x), case.effect.where()
+    json.dumps([vars(said) for said in (*rows, *places)], allow_nan=False)
+    assert all(row.low <= row.value <= row.high for row in rows)
 
 
 def test_reversed_channel_is_reported_with_its_sign(cases):
     fault = sensors.sensor_fault("7+Z", 1, CHANNELS, -1, 0.0)
     row = fault.reported(np.array([np.log(2.0)]), np.array([0.1]))[0]
-    assert_allclose(row["value"], -2.0)
-    assert row["low"] <= row["value"] <= row["high"]
+    assert_allclose(row.value, -2.0)
+    assert row.low <= row.value <= row.high
     assert_allclose(fault.outputs(np.zeros(1)).value[1], 1j * np.pi / np.log(10))
 
 

@@ -227,7 +227,7 @@ def test_is_concealed_in_the_article_or_its_recording(family, article, proposed)
     assert one.deck is article.deck
     assert one.truth == two.truth
     c = proposed[0]
-    reported = {row["name"] for row in c.effect.reported(c.start, np.zeros(len(c.start)))}
+    reported = {row.name for row in c.effect.reported(c.start, np.zeros(len(c.start)))}
     assert one.truth["parameters"]
     assert set(one.truth["parameters"]) <= reported
     before, after = (normal_modes(structure(a.assembly).system, 12).frequency[6:]

@@ -108,11 +108,11 @@ def test_bounds_are_never_passed_and_do_not_bend_the_deck(reduced):
     E = STEEL.E
     for x, bound in ((9.0, 1.1), (-9.0, 0.8)):
         row = effect.reported(np.array([x]), np.array([0.1]))[0]
-        assert_allclose(row["value"], bound * E, rtol=1e-6)
-        assert row["on_bound"]
+        assert_allclose(row.value, bound * E, rtol=1e-6)
+        assert effect.on_bound(np.array([x]))
     here = effect.reported(np.array([0.01]), np.array([0.001]))[0]
-    assert "on_bound" not in here
-    assert_allclose(here["value"], E * np.exp(0.01), rtol=1e-3)
+    assert not effect.on_bound(np.array([0.01]))
+    assert_allclose(here.value, E * np.exp(0.01), rtol=1e-3)
 
 
 def test_one_value_is_given_as_it_is_and_several_as_a_factor(reduced):

@@ -25,5 +25,5 @@ def test_the_reported_factor_explains_the_recording(factor: float) -> None:
     off = Responses(wrong, s, rows, rows[[0]], use).over(reduced.model)
     x = np.array([np.log(abs(factor))])
     fault = sensor_fault("30:+Z", 1, 2, int(np.sign(factor)), 0.0)
-    assert fault.reported(x, np.array([0.1]))[0]["value"] == pytest.approx(factor)
+    assert fault.reported(x, np.array([0.1]))[0].value == pytest.approx(factor)
     assert off.deviation(evaluate(reduced.model, [fault], x, False)) == pytest.approx(0, abs=1e-9)

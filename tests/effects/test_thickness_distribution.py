@@ -85,8 +85,8 @@ def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     effect = thickness_distribution(panel, group, 1)
     away = (np.array([-0.1, 0.15, 0.0]) - effect.surface.origin) @ effect.surface.axes.T
     x = np.array([0.0, np.log(0.1 / effect.size), *(away / effect.size)])
-    place = np.array(effect.location(x)["point_m"])
-    depth = effect.reported(x, np.zeros(4))[0]["value"]
+    place = np.array(effect.location(x).point_m)
+    depth = effect.reported(x, np.zeros(4))[0].value
     assembly = panel.structure.assembly
     thinnest = (effect.apply(assembly, x).shells.thickness / assembly.shells.thickness).min()
     assert abs(place[0]) < 1e-9

@@ -1,5 +1,7 @@
 """What every environment owes its users, checked on every registered one."""
 
+import inspect
+import re
 from itertools import pairwise
 
 import gymnasium as gym
@@ -34,6 +36,13 @@ def rollout(env, seed, steps=300, act=legal):
         if terminated or truncated:
             break
     return story
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_docstring_is_the_specification(id):
+    text = inspect.getdoc(type(gym.make(id).unwrapped))
+    for word in ("Observation", "Action", "Reward", "End", "Parameters"):
+        assert re.search(rf"^{word}$", text, re.MULTILINE), f"{id}: says nothing under {word}"
 
 
 @pytest.mark.parametrize(("id", "options"), VARIANTS)

@@ -233,6 +233,70 @@ def test_records_that_do_not_fit_together(tmp_path: Path, second: dict, said: st
         read_uff(foreign(tmp_path / "a.uff", record(), second))
 
 
+@pytest.mark.parametrize(
+    ("unit", "kind", "hertz"),
+    [
+        ("Hz", 18, 1.0),
+        ("NONE", 18, 1.0),
+        ("Hertz", 0, 1.0),
+        ("kHz", 1, 1e3),
+        ("rad/s", 18, 1 / (2 * np.pi)),
+        ("rad/sec", 18, 1 / (2 * np.pi)),
+        ("RPM", 18, 1 / 60),
+        ("1/min", 0, 1 / 60),
+    ],
+)
+def test_frequencies_become_hertz(tmp_path: Path, unit: str, kind: int, hertz: float) -> None:
+    axis = dict(abscissa_axis_units_lab=unit, abscissa_spec_data_type=kind)
+    frf = read_uff(foreign(tmp_path / "a.uff", record(**axis))).frf
+    assert frf is not None
+    np.testing.assert_allclose(frf.frequency, hertz * record()["x"], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "offender"),
+    [
+        ("rpm", 19, r"data type 19 \(rpm\), is in 'rpm'"),  # a speed: the order is not said
+        ("Hz", 19, r"data type 19 \(rpm\), is in 'Hz'"),
+        ("rpm", 0, "data type 0, is in 'rpm'"),
+        ("-", 20, r"data type 20 \(order\)"),
+        ("s", 17, r"data type 17 \(time\), is in 's'"),
+        ("furlong", 18, "data type 18, is in 'furlong'"),
+    ],
+)
+def test_an_abscissa_that_is_no_frequency(
+    tmp_path: Path, unit: str, kind: int, offender: str
+) -> None:
+    """An FRF is refused with the alternatives; a spectrum beside one is left out with a note."""
+    axis = dict(abscissa_axis_units_lab=unit, abscissa_spec_data_type=kind)
+    sentence = rf"a\.uff, dataset 2 \(type 58\): its abscissa, {offender}.*Hz, kHz, rad/s or rpm"
+    with pytest.raises(FileError, match=sentence):
+        read_uff(foreign(tmp_path / "a.uff", record(), record(rsp_node=5, **axis)))
+    beside = foreign(tmp_path / "b.uff", record(), record(func_type=9, **axis))
+    recording = read_uff(beside)
+    assert recording.functions == ()
+    assert "left out: b.uff, dataset 2" in recording.notes[0]
+
+
+@pytest.mark.parametrize("quantity", [None, "accelerance"])
+@pytest.mark.parametrize(
+    ("above", "below"),
+    [("V", "NONE"), ("mV", "N"), ("mV/N", "NONE"), ("(V)/(V)", "NONE"), ("m/s^2", "V"),
+     ("counts", "NONE")],
+)  # fmt: skip
+def test_values_nobody_calibrated(
+    tmp_path: Path, above: str, below: str, quantity: str | None
+) -> None:
+    """Volts are no motion, whatever data type or case say of them."""
+    second = record(rsp_node=5, ordinate_axis_units_lab=above, orddenom_axis_units_lab=below)
+    offender = below if above == "m/s^2" else above
+    path = foreign(tmp_path / "a.uff", record(), second)
+    with pytest.raises(FileError, match=r"a\.uff, dataset 2 .*over N or lbf.*\.npz") as said:
+        read_uff(path, quantity)
+    assert f"in {offender!r} and" in str(said.value)
+    assert "\n" not in str(said.value)
+
+
 def test_zeros_and_missing_files(tmp_path: Path) -> None:
     zeros = record(data=np.zeros(10, complex))
     with pytest.raises(FileError, match="empty"):

@@ -154,9 +154,9 @@ def test_modes_are_told_apart(panel, built):
 
 def test_shakers_are_vetoed_by_rattle_and_access(found):
     result = summary(found)
-    for a in result["actuators"]:
-        low = a["rattles_from_n"] is not None and a["rattles_from_n"] < found.settings.force
-        assert a["vetoed"] == (low or not a["straight_way_to_it"])
+    for a in result.actuators:
+        low = a.rattles_from_n is not None and a.rattles_from_n < found.settings.force
+        assert a.vetoed == (low or not a.straight_way_to_it)
     assert found.actuators.allowed[found.together].all()
 
 
@@ -205,8 +205,8 @@ def test_sensors_load_the_structure(found):
 
 def test_every_mode_is_seen_or_said_not_to_be(found):
     result = summary(found)
-    for k, mode in enumerate(result["modes"]):
-        assert mode["seen"] == (found.visible[k] >= 0.2)
+    for k, mode in enumerate(result.modes):
+        assert mode.seen == (found.visible[k] >= 0.2)
     assert np.all(found.visible[found.visible_before >= 0.2] >= 0.2)
 
 
@@ -231,14 +231,14 @@ def test_an_in_plane_mode_is_seen_with_a_block():
     assert planned.modal.frequency[0] == pytest.approx(due, rel=1e-3)
     np.testing.assert_array_equal(planned.aimed, 2 * [False] + 5 * [True])  # shift, turn in plane
     result = summary(planned)
-    assert {m["mode"] for m in result["moves"]} <= {planned.first + 1, planned.first + 2}
-    for move in result["moves"]:
-        assert move["taken"].endswith((":+X", ":+Y"))
-        assert move["before"] < 1e-6
+    assert {m.mode for m in result.moves} <= {planned.first + 1, planned.first + 2}
+    for move in result.moves:
+        assert move.taken.endswith((":+X", ":+Y"))
+        assert move.before < 1e-6
     assert np.all(planned.visible[:2] > 0.5)
-    assert all(m["seen"] for m in result["modes"])
-    assert np.isfinite(result["actuators"][0]["condition"])
-    assert result["sensors"][-1]["mounted"] == "on a block"
+    assert all(m.seen for m in result.modes)
+    assert np.isfinite(result.actuators[0].condition)
+    assert result.sensors[-1].at.mounted == "on a block"
 
 
 def test_hang_points_are_quiet_and_apart(found):

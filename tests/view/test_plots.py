@@ -1,10 +1,12 @@
 """Plots: written, of the right kind, without global state."""
 
+import inspect
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
@@ -15,31 +17,69 @@ H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))
 CURVES = {"test": (F, H), "before": (F, 1.1 * H), "after": (F, H), "another": (F, 2 * H)}
 R = np.array([30.0, 80.0, 150.0])
 
-PLOTS = {
-    "frf": lambda p: plots.frf(p, CURVES, "1:+Z", "m/N", [(20, 100)], [(40, 45)]),
-    "grid": lambda p: plots.frf_grid(p, {f"{k}:+Z": CURVES for k in range(3)}),
-    "nyquist": lambda p: plots.nyquist(p, CURVES),
-    "ladder": lambda p: plots.frequency_ladder(p, R, 0.9 * R, R * [1, np.nan, 1.01]),
-    "mac": lambda p: plots.mac_matrix(p, np.eye(3), "abc", "def"),
-    "stabilisation": lambda p: plots.stabilisation(
-        p, [(n, R, np.array([True, False, True])) for n in (4, 6)], R, (F, np.abs(H))
+PLOTS = {  # name: the drawing, and words that must stand on it
+    "frf": (
+        lambda p: plots.frf(p, CURVES, "1:+Z", "m/N", [(20, 100)], [(40, 45)]),
+        ("1:+Z", "|H| [m/N]", "frequency [Hz]", "phase [deg]", *CURVES),
     ),
-    "evidence": lambda p: plots.evidence_bars(p, {"a": -3.0, "b": -300.0}),
-    "waterfall": lambda p: plots.waterfall(p, {"nominal": 0.2, "with": 0.01}, 0.005),
-    "deviation": lambda p: plots.deviation_map(p, np.eye(2), ["1:+Z", "2:+Z"], ["0-50", "50-100"]),
-}
+    "frf_grid": (
+        lambda p: plots.frf_grid(p, {f"{k}:+Z": CURVES for k in range(3)}),
+        ("0:+Z", "2:+Z", "frequency [Hz]", *CURVES),
+    ),
+    "nyquist": (lambda p: plots.nyquist(p, CURVES, unit="[m/N]"), ("Re H [m/N]", "Im H [m/N]")),
+    "frequency_ladder": (
+        lambda p: plots.frequency_ladder(p, R, 0.9 * R, R * [1, np.nan, 1.01]), ("30", "%"),
+    ),
+    "mac_matrix": (lambda p: plots.mac_matrix(p, np.eye(3), "abc", "def"), ("a", "f", "MAC")),
+    "stabilisation": (
+        lambda p: plots.stabilisation(
+            p, [(n, R, np.array([True, False, True])) for n in (4, 6)], R, (F, np.abs(H))
+        ),
+        ("frequency [Hz]", "order"),
+    ),
+    "evidence_bars": (
+        lambda p: plots.evidence_bars(p, {"a": -3.0, "b": -300.0}), ("a", "b", "evidence"),
+    ),
+    "waterfall": (
+        lambda p: plots.waterfall(p, {"nominal": 0.2, "with": 0.01}, 0.005), ("nominal", "Q"),
+    ),
+    "deviation_map": (
+        lambda p: plots.deviation_map(p, np.eye(2), ["1:+Z", "2:+Z"], ["0-50", "50-100"]),
+        ("1:+Z", "50-100", "Q"),
+    ),
+}  # fmt: skip
+
+
+def test_every_plot_is_drawn_here():
+    own = {name for name, f in vars(plots).items()
+           if inspect.isfunction(f) and f.__module__ == plots.__name__}  # fmt: skip
+    assert {name for name in own if not name.startswith("_")} == PLOTS.keys()
 
 
 @pytest.mark.parametrize("name", PLOTS)
 def test_every_plot_is_written(tmp_path, name):
-    path = PLOTS[name](tmp_path / "plot.png")
+    path = PLOTS[name][0](tmp_path / "plot.png")
     with Image.open(path) as image:
         assert min(image.size) > 250
         assert np.asarray(image.convert("L")).std() > 5
 
 
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_plot_says_what_it_shows(tmp_path, name, monkeypatch):
+    """Labels with units, names of curves and of rows."""
+    saved = []
+    save = plots.save
+    monkeypatch.setattr(
+        plots, "save", lambda figure, path: saved.append(figure) or save(figure, path)
+    )
+    draw, words = PLOTS[name]
+    draw(tmp_path / "plot.png")
+    said = [text.get_text() for text in saved[0].findobj(Text) if text.get_visible()]
+    assert not [word for word in words if not any(word in text for text in said)], said
+
+
 def test_vector_graphics_by_suffix(tmp_path):
-    assert "<svg" in PLOTS["frf"](tmp_path / "plot.svg").read_text()
+    assert "<svg" in PLOTS["frf"][0](tmp_path / "plot.svg").read_text()
 
 
 def test_labels_must_fit_the_matrix(tmp_path):

@@ -11,6 +11,7 @@ import chladni
 from chladni.cli.app import application
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.report.diagnosis_json import read_diagnosis
+from chladni.report.verdict import PLACES
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +32,13 @@ def test_the_page_is_written_again_from_its_folder(run_folder, tmp_path):
     for section in ("Scores", "What was calibrated", "Frequencies", "Why not something else"):
         a, b = (t[t.index(f"<h2>{section}</h2>") :] for t in (first, second))
         assert a[: a.index("<figure")] == b[: b.index("<figure")] if "<figure" in a else True
+
+
+def test_every_picture_of_a_run_stands_on_its_page(run_folder):
+    """A picture without a row in PLACES is drawn for nobody; where the effect is has its own."""
+    drawn = {p.stem for p in run_folder.glob("*.png")}
+    assert {name for name in drawn if not name.startswith("where")} <= set(PLACES)
+    assert (run_folder / "report.html").read_text().count("data:image/png") == len(drawn)
 
 
 def test_the_result_is_read_back(run_folder, diagnosed):

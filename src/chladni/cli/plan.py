@@ -60,7 +60,6 @@ def run(
         model = load_model(source, units, command="plan")
         job.notes += model.notes
         found = plan(model, settings, within(job.progress, 0.1, 0.8))
-        result = to_json(found)
-        job.json("plan.json", result)
+        job.json("plan.json", to_json(found))
         job.progress("pictures", 0.8)
-        job.show(plan_page(job.folder, model, found, result))
+        job.show(plan_page(job.folder, model, found))

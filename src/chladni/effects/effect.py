@@ -15,12 +15,13 @@ physical one.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..model.assembly import Assembly
+from .estimate import Estimate, Location
 
 if TYPE_CHECKING:
     from .surroundings import Surroundings
@@ -179,19 +180,17 @@ class Effect:
         """The structure with the effect written into it."""
         return assembly
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """Parameters as diagnosis.json has them: name, value, unit, 95 % interval.
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Physical values of the parameters with their 95 % intervals.
 
         Laplace's intervals are widened by WIDER: model error makes them too narrow.
         """
-        out = []
-        for k, p in enumerate(self.parameters):
-            low, high = p.interval(x[k], WIDER * sd[k])
-            row = {"name": p.name, "value": p.value(x[k]), "unit": p.unit, "low": low, "high": high}
-            out.append(row)
-        return out
+        return tuple(
+            Estimate(p.name, p.value(x[k]), p.unit, *p.interval(x[k], WIDER * sd[k]))
+            for k, p in enumerate(self.parameters)
+        )
 
-    def location(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> Location:
         """Where it is once it has been fitted."""
         return self.where()
 
@@ -201,17 +200,16 @@ class Effect:
         grid = np.meshgrid(*options, indexing="ij") if options else []
         return [np.array(x) for x in zip(*(g.ravel() for g in grid), strict=True)]
 
-    def where(self) -> dict[str, Any]:
-        """The place as diagnosis.json has it."""
-        return {
-            "text": self.text,
-            "parts": list(self.parts),
-            "grids": [int(g) for g in self.grids],
-            "point_m": None if self.point is None else [float(v) for v in self.point],
-            "radius_m": self.radius,
-            "band_hz": None,
-            "channels": list(self.channels),
-        }
+    def where(self) -> Location:
+        """The place it was made for."""
+        return Location(
+            self.text,
+            tuple(self.parts),
+            tuple(int(g) for g in self.grids),
+            None if self.point is None else tuple(float(v) for v in self.point),
+            self.radius,
+            channels=tuple(self.channels),
+        )
 
 
 def count(effects: Sequence[Effect]) -> int:

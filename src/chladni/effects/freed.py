@@ -19,6 +19,7 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.properties import Isotropic, Part, ShellSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
+from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
 from .ordinary import SPREAD, ordinary, scaled, value
 from .shell_groups import ShellGroups
@@ -97,21 +98,20 @@ class Freed(Effect):
             assembly = member.apply(assembly, y)
         return assembly
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
-        """Value and interval within the bounds, and whether the value leans on one."""
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Value and interval within the bounds; :meth:`on_bound` says whether it leans on one."""
         if len(x) > 1 or not len(self.parameters):
             return self.members[0].reported(x, sd)
         p, reach = self.parameters[0], 1.96 * WIDER * sd
         low, here, high = (p.value(float(self.y(x + s * reach)[0][0])) for s in (-1, 0, 1))
-        row = {"name": p.name, "value": here, "unit": p.unit, "low": low, "high": high}
-        return [{**row, "on_bound": True}] if self.on_bound(x) else [row]
+        return (Estimate(p.name, here, p.unit, low, high),)
 
     def on_bound(self, x: np.ndarray) -> bool:
         """True where the value is all but at a bound, so that it may stand for something else."""
         y = float(self.y(x)[0][0])
         return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
 
-    def location(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> Location:
         """Where it is."""
         return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
 

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from ..geometry.facets import tangents
 from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, Parameter, PointTerm
+from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .surroundings import ShellGrids, Surroundings
 
@@ -108,17 +109,17 @@ class MovableAttachment(Effect):
         assert self.patch is not None
         return np.asarray(self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane)
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The strength; the place stands in ``location``."""
         return super().reported(x, sd)[:1]
 
-    def location(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> Location:
         """The place a fit moved it to."""
         assert self.patch is not None
-        point, grid = [float(v) for v in self.at(x)], self.nearest(x)
+        point, grid = tuple(float(v) for v in self.at(x)), self.nearest(x)
         text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
-        own = {"text": text, "grids": [grid], "point_m": point, "radius_m": self.patch.size}
-        return {**self.where(), **own}
+        size = self.patch.size
+        return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=size)
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""

@@ -1,13 +1,14 @@
 """A sheet stiffer along one axis than across it: rolling, fibres, growth rings."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
+from .estimate import Estimate
 from .family import Article, Family
 from .material_class import orthotropy
 from .shell_groups import ShellGroups
@@ -42,12 +43,11 @@ class OrthotropicMaterial(Effect):
         G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E1, E2, G12 and nu12."""
-        rows = super().reported(x, sd)
+        moduli = super().reported(x, sd)[:3]
         nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * WIDER * sd[3]))[3] for s in (-1, 0, 1)]
-        last = {"name": "nu12", "value": nu[1], "unit": "-", "low": nu[0], "high": nu[2]}
-        return [*rows[:3], last]
+        return *moduli, Estimate("nu12", nu[1], "-", nu[0], nu[2])
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
         """ln of Q11, Q22, Q12, Q66 over the isotropic ones (4,)."""

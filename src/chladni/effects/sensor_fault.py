@@ -1,11 +1,11 @@
 """What the test itself does to a channel."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
-from .effect import ChannelChange, Effect, Parameter
+from .effect import WIDER, ChannelChange, Effect, Parameter
+from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 
@@ -23,11 +23,11 @@ class SensorFault(Effect):
     sign: int = 1
     mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The factor on the channel, negative where its sign is wrong too."""
-        row = super().reported(x, sd)[0]
-        low, high = sorted(self.sign * row[k] for k in ("low", "high"))
-        return [{**row, "value": self.sign * row["value"], "low": low, "high": high}]
+        (gain,) = self.parameters
+        low, high = sorted(self.sign * v for v in gain.interval(x[0], WIDER * sd[0]))
+        return (Estimate(gain.name, self.sign * gain.value(x[0]), gain.unit, low, high),)
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
         """x / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""

@@ -1,13 +1,13 @@
 """Thickness that is not what the deck says, here and there."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, FieldChange, Parameter
+from .estimate import Estimate, Location
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .shell_groups import ShellGroups
@@ -60,21 +60,20 @@ class ThicknessDistribution(Effect):
         factor = np.where(self.shells[:, None], 1 - thinning(x[0]) * q, 1.0)
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The deepest thinning on the sheet and the radius R; the place stands in ``location``."""
         rows = super().reported(x, sd)
         there = float(self._bump(x, self._deepest(x)[1][None])[0])
         value, low, high = (there * thinning(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
-        return [{**rows[0], "value": value, "low": low, "high": high}, rows[1]]
+        return replace(rows[0], value=value, low=low, high=high), rows[1]
 
-    def location(self, x: np.ndarray) -> dict[str, Any]:
+    def location(self, x: np.ndarray) -> Location:
         """The place a fit moved it to: where the sheet is thinnest."""
         grid, deepest = self._deepest(x)
-        point = [float(v) for v in deepest]
+        point = tuple(float(v) for v in deepest)
         text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
         radius = float(self.size * np.exp(x[1]))
-        own = {"text": text, "point_m": point, "radius_m": radius, "grids": [grid]}
-        return {**self.where(), **own}
+        return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
     def _deepest(self, x: np.ndarray) -> tuple[int, np.ndarray]:
         """Grid and point where the sheet is thinnest: c, or the grid next to it if c is outside."""

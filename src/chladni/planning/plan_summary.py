@@ -1,8 +1,10 @@
-"""A plan as plain data: ``plan.json`` (DESIGN §7), the table of sensors, lines and duration."""
+"""A plan row by row: sensors, shakers, modes, lines and duration; the table of sensors."""
 
 import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
 from io import StringIO
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
@@ -24,127 +26,238 @@ AVERAGES = 20
 SHOWN = 20  # actuators listed
 
 
-def summary(found: Plan) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class PlannedPlace:
+    """A place and a direction; ``side`` of the surface normal is +1 or -1."""
+
+    label: str
+    grid: int | None  # None: the centre of a shell
+    direction: np.ndarray
+    point_m: np.ndarray
+    mounted: Literal["flat", "on a block"]
+    side: int
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSensor:
+    """A sensor; ``for_mode`` is the mode it was moved for."""
+
+    rank: int
+    at: PlannedPlace
+    for_mode: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedActuator:
+    """A shaker place, what speaks for it and what against it."""
+
+    at: PlannedPlace
+    condition: float
+    least_over_mean_residue: float
+    straight_way_to_it: bool
+    rattles_from_n: float | None
+    rattles_between: tuple[str, str] | None
+    rattles_in_mode: int | None
+    vetoed: bool
+    is_sensor: bool
+
+
+@dataclass(frozen=True)
+class PlannedMode:
+    """How well the sensors see a mode; ``mode`` counts in the deck, from 1."""
+
+    mode: int
+    frequency_hz: float
+    visibility: float
+    visibility_before: float
+    seen_by_normals: bool
+    seen: bool
+    with_sensor_mass_hz: float
+
+
+@dataclass(frozen=True)
+class MovedSensor:
+    """A sensor given up at one label and taken at another, so that a mode is seen."""
+
+    mode: int
+    given_up: str
+    taken: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class RattleOverview:
+    """What the mesh says of clearances, whichever place is shaken."""
+
+    force_n: float
+    places_vetoed: int
+    without_a_straight_way: int
+    open_places: int
+    least_clearance_m: float | None
+    touching_pairs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class PlanScores:
+    """Numbers by which one layout is held against another."""
+
+    log_det: float
+    log_det_by_method: Mapping[str, float]
+    auto_mac_highest: float
+    observability_rank: int
+    states: int
+    gramian_quotient: float
+
+
+@dataclass(frozen=True, eq=False)
+class Durations:
+    """Lines and time of a stepped-sine sweep and of burst random."""
+
+    band_hz: tuple[float, float]
+    lines: int
+    lines_hz: np.ndarray
+    lines_per_octave: float
+    lines_per_half_bandwidth: np.ndarray
+    stepped_sine_s: float
+    longest_wait_cycles: float
+    burst_random_s: float
+    burst_random_resolution_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class PlanSummary:
     """Ordered sensors, ranked actuators, modes, scores."""
-    return {
-        "sensors": _sensors(found),
-        "actuators": [_actuator(found, int(i)) for i in found.actuators.order[:SHOWN]],
-        "actuators_together": [_mount(found, int(i)) for i in found.together],
-        "hangers": found.hangers,
-        "rattle": _rattle(found),
-        "modes": _modes(found),
-        "moves": [
-            {
-                "mode": found.first + 1 + m.mode,
-                "given_up": found.mounts.labels[m.out],
-                "taken": found.mounts.labels[m.into],
-                "before": m.before,
-                "after": m.after,
-            }
-            for m in found.moves
-        ],
-        "mode_sweep": [{"modes": n, "overlap": share} for n, share in found.sweep],
-        "candidates": {"count": len(found.places), "refused": dict(found.places.refused)},
-        "scores": _scores(found),
-        "test": durations(found),
-    }
+
+    sensors: tuple[PlannedSensor, ...]
+    actuators: tuple[PlannedActuator, ...]
+    actuators_together: tuple[PlannedPlace, ...]
+    hangers: np.ndarray
+    rattle: RattleOverview
+    modes: tuple[PlannedMode, ...]
+    moves: tuple[MovedSensor, ...]
+    mode_sweep: tuple[tuple[int, float], ...]
+    candidates: int
+    refused: Mapping[str, int]
+    scores: PlanScores
+    test: Durations
 
 
-def _mount(found: Plan, i: int) -> dict[str, Any]:
+def summary(found: Plan) -> PlanSummary:
+    """The plan row by row."""
+    return PlanSummary(
+        sensors=_sensors(found),
+        actuators=tuple(_actuator(found, int(i)) for i in found.actuators.order[:SHOWN]),
+        actuators_together=tuple(_place(found, int(i)) for i in found.together),
+        hangers=found.hangers,
+        rattle=_rattle(found),
+        modes=_modes(found),
+        moves=_moves(found),
+        mode_sweep=found.sweep,
+        candidates=len(found.places),
+        refused=dict(found.places.refused),
+        scores=_scores(found),
+        test=durations(found),
+    )
+
+
+def _place(found: Plan, i: int) -> PlannedPlace:
     """What is known of one place and direction."""
     m = found.mounts
-    return {
-        "label": m.labels[i],
-        "grid": int(m.ids[i]) if found.places.is_grid[m.place[i]] else None,
-        "direction": m.directions[i],
-        "point_m": m.points[i],
-        "mounted": "flat" if m.normal[i] else "on a block",
-        "side": int(m.side[i]),
-    }
+    grid = int(m.ids[i]) if found.places.is_grid[m.place[i]] else None
+    mounted: Literal["flat", "on a block"] = "flat" if m.normal[i] else "on a block"
+    return PlannedPlace(m.labels[i], grid, m.directions[i], m.points[i], mounted, int(m.side[i]))
 
 
-def _sensors(found: Plan) -> list[dict[str, Any]]:
+def _sensors(found: Plan) -> tuple[PlannedSensor, ...]:
     moved = {m.into: found.first + 1 + m.mode for m in found.moves}
-    return [
-        {"rank": k + 1, **_mount(found, i), "for_mode": moved.get(i)}
+    return tuple(
+        PlannedSensor(k + 1, _place(found, i), moved.get(i))
         for k, i in enumerate(found.layout.tolist())
-    ]
+    )
 
 
-def _actuator(found: Plan, i: int) -> dict[str, Any]:
+def _actuator(found: Plan, i: int) -> PlannedActuator:
     place = int(found.rattle.place[i])
-    return {
-        **_mount(found, i),
-        "condition": found.actuators.condition[i],
-        "least_over_mean_residue": found.actuators.residue[i],
-        "straight_way_to_it": bool(found.places.straight[found.mounts.place[i]]),
-        "rattles_from_n": None if place < 0 else found.rattle.force[i],
-        "rattles_between": None if place < 0 else found.openings.pairs[found.openings.pair[place]],
-        "rattles_in_mode": None if place < 0 else found.first + 1 + int(found.rattle.mode[i]),
-        "vetoed": not bool(found.actuators.allowed[i]),
-        "is_sensor": bool(i in found.layout),
-    }
+    quiet = place < 0
+    return PlannedActuator(
+        at=_place(found, i),
+        condition=float(found.actuators.condition[i]),
+        least_over_mean_residue=float(found.actuators.residue[i]),
+        straight_way_to_it=bool(found.places.straight[found.mounts.place[i]]),
+        rattles_from_n=None if quiet else float(found.rattle.force[i]),
+        rattles_between=None if quiet else found.openings.pairs[found.openings.pair[place]],
+        rattles_in_mode=None if quiet else found.first + 1 + int(found.rattle.mode[i]),
+        vetoed=not bool(found.actuators.allowed[i]),
+        is_sensor=bool(i in found.layout),
+    )
 
 
-def _rattle(found: Plan) -> dict[str, Any]:
-    """What the mesh says of clearances, whichever place is shaken."""
-    return {
-        "force_n": found.settings.force,
-        "places_vetoed": int((found.rattle.force < found.settings.force).sum()),
-        "without_a_straight_way": int((~found.places.straight).sum()),
-        "open_places": len(found.openings.clearance),
-        "least_clearance_m": float(found.openings.clearance.min(initial=np.inf))
-        if len(found.openings.clearance)
-        else None,
-        "touching_pairs": [list(pair) for pair in found.openings.touching],
-    }
+def _rattle(found: Plan) -> RattleOverview:
+    clearance = found.openings.clearance
+    return RattleOverview(
+        force_n=found.settings.force,
+        places_vetoed=int((found.rattle.force < found.settings.force).sum()),
+        without_a_straight_way=int((~found.places.straight).sum()),
+        open_places=len(clearance),
+        least_clearance_m=float(clearance.min()) if len(clearance) else None,
+        touching_pairs=found.openings.touching,
+    )
 
 
-def _modes(found: Plan) -> list[dict[str, Any]]:
-    return [
-        {
-            "mode": found.first + 1 + k,
-            "frequency_hz": f,
-            "visibility": found.visible[k],
-            "visibility_before": found.visible_before[k],
-            "seen_by_normals": bool(found.aimed[k]),
-            "seen": bool(found.visible[k] >= found.settings.floor),
-            "with_sensor_mass_hz": found.loaded[k],
-        }
+def _modes(found: Plan) -> tuple[PlannedMode, ...]:
+    return tuple(
+        PlannedMode(
+            mode=found.first + 1 + k,
+            frequency_hz=float(f),
+            visibility=float(found.visible[k]),
+            visibility_before=float(found.visible_before[k]),
+            seen_by_normals=bool(found.aimed[k]),
+            seen=bool(found.visible[k] >= found.settings.floor),
+            with_sensor_mass_hz=float(found.loaded[k]),
+        )
         for k, f in enumerate(found.modal.frequency)
-    ]
+    )
 
 
-def _scores(found: Plan) -> dict[str, Any]:
+def _moves(found: Plan) -> tuple[MovedSensor, ...]:
+    names = found.mounts.labels
+    return tuple(
+        MovedSensor(found.first + 1 + m.mode, names[m.out], names[m.into], m.before, m.after)
+        for m in found.moves
+    )
+
+
+def _scores(found: Plan) -> PlanScores:
     kept = candidates(found.phi).fisher(found.layout)
-    return {
-        "log_det": value("D", kept),
-        "log_det_by_method": found.log_det,
-        "auto_mac_highest": float((found.auto_mac - np.eye(len(found.modal))).max(initial=0.0)),
-        "observability_rank": found.observable[0],
-        "states": found.observable[1],
-        "gramian_quotient": found.quotient,
-    }
+    return PlanScores(
+        log_det=value("D", kept),
+        log_det_by_method=found.log_det,
+        auto_mac_highest=float((found.auto_mac - np.eye(len(found.modal))).max(initial=0.0)),
+        observability_rank=found.observable[0],
+        states=found.observable[1],
+        gramian_quotient=found.quotient,
+    )
 
 
-def durations(found: Plan) -> dict[str, Any]:
+def durations(found: Plan) -> Durations:
     """Lines and time of a stepped-sine sweep and of burst random."""
     f, zeta = found.modal.frequency, found.modal.damping
-    low, high = 0.7 * f[0], 1.05 * f[-1]
+    low, high = float(0.7 * f[0]), float(1.05 * f[-1])
     lines = even_lines(low, high, float(zeta.min()), PER_BANDWIDTH)
     wait = delay_at(lines, f, zeta)
     resolution = float(half_bandwidth(f[0], zeta[0]) / PER_BANDWIDTH)
-    return {
-        "band_hz": [low, high],
-        "lines": len(lines),
-        "lines_hz": lines,
-        "lines_per_octave": float(np.log(2) / np.log(lines[1] / lines[0])),
-        "lines_per_half_bandwidth": lines_per_bandwidth(lines, f, zeta),
-        "stepped_sine_s": lines_time(lines, wait),
-        "longest_wait_cycles": float(wait.max()),
-        "burst_random_s": burst_random_time(resolution, AVERAGES),
-        "burst_random_resolution_hz": resolution,
-    }
+    return Durations(
+        band_hz=(low, high),
+        lines=len(lines),
+        lines_hz=lines,
+        lines_per_octave=float(np.log(2) / np.log(lines[1] / lines[0])),
+        lines_per_half_bandwidth=lines_per_bandwidth(lines, f, zeta),
+        stepped_sine_s=lines_time(lines, wait),
+        longest_wait_cycles=float(wait.max()),
+        burst_random_s=burst_random_time(resolution, AVERAGES),
+        burst_random_resolution_hz=resolution,
+    )
 
 
 def sensors_csv(found: Plan) -> str:
@@ -157,8 +270,8 @@ def sensors_csv(found: Plan) -> str:
     write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
     rows = [(int(i), "output", found.settings.mass) for i in found.layout]
     for i, role, mass in [*rows, *((int(i), "input", 0.0) for i in found.together)]:
-        m = _mount(found, i)
-        place = [""] * 3 if m["grid"] is not None else [f"{x:.7g}" for x in m["point_m"]]
-        direction = [f"{x:.9g}" for x in m["direction"]]
-        write([m["label"], m["grid"], *place, *direction, role, f"{mass:g}"])
+        at = _place(found, i)
+        place = [""] * 3 if at.grid is not None else [f"{x:.7g}" for x in at.point_m]
+        direction = [f"{x:.9g}" for x in at.direction]
+        write([at.label, at.grid, *place, *direction, role, f"{mass:g}"])
     return text.getvalue()

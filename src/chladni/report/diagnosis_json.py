@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from ..effects.estimate import Estimate, Location
 from ..errors import FileError
 from ..updating.result import (
     Adequacy,
     Agreement,
     Alternative,
     CalibratedParameter,
-    Estimate,
     FrequencyError,
     FrequencyRow,
-    Location,
     MassComparison,
     NamedEffect,
     Remainder,

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
+from ..effects.estimate import Location
 from ..ema.correlation import deviation
-from ..updating.result import Alternative, Location, NamedEffect, Scores
+from ..updating.result import Alternative, NamedEffect, Scores
 from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult

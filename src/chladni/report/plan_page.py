@@ -1,13 +1,21 @@
 """A plan as a page: pictures of the layout and of what it sees, tables, sentences."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ..fem.assemble import Structure
 from ..output import write_text
-from ..planning.plan_summary import AVERAGES, PER_BANDWIDTH, sensors_csv
+from ..planning.plan_summary import (
+    AVERAGES,
+    PER_BANDWIDTH,
+    Durations,
+    PlannedActuator,
+    PlannedPlace,
+    PlanSummary,
+    sensors_csv,
+    summary,
+)
 from ..planning.whole_plan import Plan, motion
 from ..view import plots, scene
 from ..view.surface import Surface
@@ -23,21 +31,22 @@ PICTURES = {
 }
 
 
-def plan_page(folder: Path, model: Model, found: Plan, result: dict[str, Any]) -> PageParts:
+def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     """Sections of the page; its pictures and the table of sensors are written into the folder."""
     write_text(folder / "sensors.csv", sensors_csv(found))
+    result = summary(found)
     body = sections(found, result, model.seen, model.structure, folder)
     files = [("sensors.csv", "sensors and shakers, for case.toml"), *PICTURES.items()]
     return PageParts(lead(result), body, notes(found), files)
 
 
-def lead(result: dict[str, Any]) -> str:
+def lead(result: PlanSummary) -> str:
     """The plan in two sentences."""
-    f = [m["frequency_hz"] for m in result["modes"]]
-    shake = ", ".join(a["label"] for a in result["actuators_together"])
-    unseen = [str(m["mode"]) for m in result["modes"] if not m["seen"]]
+    f = [m.frequency_hz for m in result.modes]
+    shake = ", ".join(at.label for at in result.actuators_together)
+    unseen = [str(m.mode) for m in result.modes if not m.seen]
     text = (
-        f"{len(result['sensors'])} sensors tell {len(f)} modes from {number(f[0])} to "
+        f"{len(result.sensors)} sensors tell {len(f)} modes from {number(f[0])} to "
         f"{number(f[-1])} Hz apart; shake at {shake}."
     )
     return text + (f" Hardly seen: mode {', '.join(unseen)}." if unseen else "")
@@ -99,26 +108,26 @@ def _rattle_notes(found: Plan) -> list[str]:
 
 
 def sections(
-    found: Plan, result: dict[str, Any], seen: Surface, built: Structure, folder: Path
+    found: Plan, result: PlanSummary, seen: Surface, built: Structure, folder: Path
 ) -> list[Section]:
     """The page; its pictures (:data:`PICTURES`) are written into the folder."""
     return [
         Section("Sensors", _sensors(found, result, seen, folder / "sensors.png")),
         Section("Modes", _modes(found, result, seen, built, folder)),
         Section("Shaker and cords", _shaker(found, result, seen, folder / "shaker.png")),
-        Section("Lines and duration", [Text([_test(result["test"])])]),
+        Section("Lines and duration", [Text([_test(result.test)])]),
     ]
 
 
 def _sensors(
-    found: Plan, result: dict[str, Any], seen: Surface, path: Path
+    found: Plan, result: PlanSummary, seen: Surface, path: Path
 ) -> list[Picture | Table | Facts | Items]:
-    outputs = [_marker(s, str(s["rank"])) for s in result["sensors"]]
-    shakers = [_marker(a, "shaker") for a in result["actuators_together"]]
+    outputs = [_marker(s.at, str(s.rank)) for s in result.sensors]
+    shakers = [_marker(at, "shaker") for at in result.actuators_together]
     picture = scene.sensors(path, seen, outputs, shakers)
     rows = [
-        (str(s["rank"]), s["label"], *_where(s), _vector(s["direction"]), s["mounted"])
-        for s in result["sensors"]
+        (str(s.rank), s.at.label, *_where(s.at), _vector(s.at.direction), s.at.mounted)
+        for s in result.sensors
     ]
     table = Table(
         ("rank", "label", "grid", "place [m]", "direction", "mounted"),
@@ -128,9 +137,9 @@ def _sensors(
         "A place without a grid is the centre of a shell.",
     )
     moves = [
-        f"Mode {m['mode']} was hardly seen ({number(m['before'], 2)} of its largest motion): the "
-        f"sensor at {m['given_up']} moves to {m['taken']} ({number(m['after'], 2)})."
-        for m in result["moves"]
+        f"Mode {m.mode} was hardly seen ({number(m.before, 2)} of its largest motion): the "
+        f"sensor at {m.given_up} moves to {m.taken} ({number(m.after, 2)})."
+        for m in result.moves
     ]
     return [
         Picture(picture, "Sensors by rank (blue), shaker (red)."),
@@ -140,31 +149,34 @@ def _sensors(
     ]
 
 
-def _where(mount: dict[str, Any]) -> tuple[str, str]:
-    grid = "" if mount["grid"] is None else str(mount["grid"])
-    return grid, _vector(mount["point_m"])
+def _where(at: PlannedPlace) -> tuple[str, str]:
+    return "" if at.grid is None else str(at.grid), _vector(at.point_m)
 
 
-def _marker(mount: dict[str, Any], text: str) -> scene.Marker:
-    x, y, z = (float(v) for v in mount["point_m"])
-    a, b, c = (float(v) for v in mount["direction"])
+def _marker(at: PlannedPlace, text: str) -> scene.Marker:
+    return _arrow(at.point_m, at.direction, text)
+
+
+def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> scene.Marker:
+    x, y, z = (float(v) for v in point)
+    a, b, c = (float(v) for v in direction)
     return scene.Marker((x, y, z), (a, b, c), text)
 
 
 def _modes(
-    found: Plan, result: dict[str, Any], seen: Surface, built: Structure, folder: Path
+    found: Plan, result: PlanSummary, seen: Surface, built: Structure, folder: Path
 ) -> list[Table | Picture]:
     shift = found.loaded / found.modal.frequency - 1
     rows = [
         (
-            str(m["mode"]),
-            number(m["frequency_hz"], 5),
-            number(m["visibility"], 2),
-            "yes" if m["seen"] else "hardly",
-            "yes" if m["seen_by_normals"] else "no, moves along the sheets",
+            str(m.mode),
+            number(m.frequency_hz, 5),
+            number(m.visibility, 2),
+            "yes" if m.seen else "hardly",
+            "yes" if m.seen_by_normals else "no, moves along the sheets",
             f"{100 * shift[k]:.2f} %",
         )
-        for k, m in enumerate(result["modes"])
+        for k, m in enumerate(result.modes)
     ]
     table = Table(
         ("mode", "Hz", "visibility", "seen", "seen by normals", "shift by sensors"),
@@ -179,7 +191,7 @@ def _modes(
         caption="Share of the sensors that stays when so many modes are targeted instead of those "
         "in the row above.",
     )
-    names = [str(m["mode"]) for m in result["modes"]]
+    names = [str(m.mode) for m in result.modes]
     mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
     least = _least_seen(found, seen, built, folder / "modes.png")
     return [table, Picture(least, "Those the sensors see least."), Picture(mac), steps]
@@ -193,27 +205,27 @@ def _least_seen(found: Plan, seen: Surface, built: Structure, path: Path) -> Pat
 
 
 def _shaker(
-    found: Plan, result: dict[str, Any], seen: Surface, path: Path
+    found: Plan, result: PlanSummary, seen: Surface, path: Path
 ) -> list[Facts | Table | Picture]:
-    best = [_marker(a, str(k + 1)) for k, a in enumerate(result["actuators"][:10])]
+    best = [_marker(a.at, str(k + 1)) for k, a in enumerate(result.actuators[:10])]
     rows = [
         (
             str(k + 1),
-            a["label"],
-            *_where(a),
-            number(a["condition"]),
-            number(a["least_over_mean_residue"], 2),
+            a.at.label,
+            *_where(a.at),
+            number(a.condition),
+            number(a.least_over_mean_residue, 2),
             _rattling(a),
-            "no" if a["vetoed"] else "yes",
-            "yes" if a["is_sensor"] else "",
+            "no" if a.vetoed else "yes",
+            "yes" if a.is_sensor else "",
         )
-        for k, a in enumerate(result["actuators"][:10])
+        for k, a in enumerate(result.actuators[:10])
     ]
-    s = result["scores"]
+    s = result.scores
     facts = [
-        ("Observability", f"rank {s['observability_rank']} of {s['states']}"),
-        ("Quotient of the observability gramian", number(s["gramian_quotient"])),
-        ("Cords at grids", ", ".join(str(g) for g in result["hangers"])),
+        ("Observability", f"rank {s.observability_rank} of {s.states}"),
+        ("Quotient of the observability gramian", number(s.gramian_quotient)),
+        ("Cords at grids", ", ".join(str(g) for g in result.hangers)),
     ]
     caption = (
         "Condition: greatest over least Hankel singular value, the lower the better. Least "
@@ -224,32 +236,32 @@ def _shaker(
     columns = ("rank", "label", "grid", "place [m]", "condition", "least residue")
     words = ("rattles from", "allowed", "also a sensor")
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
-    cords = [_hanger(found, int(g)) for g in result["hangers"]]
+    cords = [_hanger(found, int(g)) for g in result.hangers]
     picture = scene.sensors(path, seen, cords, best, ("cord", "shaker, by rank"))
     return [Facts(facts), Picture(picture, "Ten best shaker places (red), cords (blue)."), table]
 
 
-def _rattling(actuator: dict[str, Any]) -> str:
-    if actuator["rattles_between"] is None:
+def _rattling(actuator: PlannedActuator) -> str:
+    if actuator.rattles_between is None or actuator.rattles_from_n is None:
         return "none foretold"
-    a, b = actuator["rattles_between"]
-    return f"{number(actuator['rattles_from_n'], 2)} N: {a} / {b}"
+    a, b = actuator.rattles_between
+    return f"{number(actuator.rattles_from_n, 2)} N: {a} / {b}"
 
 
 def _hanger(found: Plan, grid: int) -> scene.Marker:
     k = int(np.flatnonzero(found.places.ids == grid)[0])
-    return _marker({"point_m": found.places.points[k], "direction": found.places.normals[k]}, "")
+    return _arrow(found.places.points[k], found.places.normals[k], "")
 
 
-def _test(t: dict[str, Any]) -> str:
-    low, high = t["band_hz"]
+def _test(t: Durations) -> str:
+    low, high = t.band_hz
     return (
-        f"Stepped sine from {number(low)} to {number(high)} Hz needs {t['lines']} lines "
-        f"({number(t['lines_per_octave'], 3)} per octave, {PER_BANDWIDTH} in every half-bandwidth) "
-        f"and {number(t['stepped_sine_s'] / 60, 3)} minutes a sweep, waiting up to "
-        f"{t['longest_wait_cycles']:.0f} cycles until 1 % of a transient is left. Burst random "
-        f"with {AVERAGES} averages of {number(t['burst_random_resolution_hz'], 3)} Hz needs "
-        f"{number(t['burst_random_s'] / 60, 3)} minutes."
+        f"Stepped sine from {number(low)} to {number(high)} Hz needs {t.lines} lines "
+        f"({number(t.lines_per_octave, 3)} per octave, {PER_BANDWIDTH} in every half-bandwidth) "
+        f"and {number(t.stepped_sine_s / 60, 3)} minutes a sweep, waiting up to "
+        f"{t.longest_wait_cycles:.0f} cycles until 1 % of a transient is left. Burst random "
+        f"with {AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
+        f"{number(t.burst_random_s / 60, 3)} minutes."
     )
 
 

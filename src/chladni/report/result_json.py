@@ -9,6 +9,7 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
 from .diagnosis_json import diagnosis_json
+from .plan_json import plan_json
 
 
 @singledispatch
@@ -24,7 +25,7 @@ def _(result: DiagnosisResult) -> dict[str, Any]:
 
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
-    return summary(result)
+    return plan_json(summary(result))
 
 
 @to_json.register

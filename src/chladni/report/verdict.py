@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..updating.result import Agreement, Estimate, Location, NamedEffect, Scores
+from ..effects.estimate import Estimate, Location
+from ..updating.result import Agreement, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
 from .words import interval, number, percent, quantity

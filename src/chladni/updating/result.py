@@ -1,32 +1,8 @@
 """The parts of a diagnosis as types: one a key of ``diagnosis.json`` (SI)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-import numpy as np
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A physical value with its 95 % interval."""
-
-    name: str
-    value: float
-    unit: str = ""
-    low: float | None = None
-    high: float | None = None
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where an effect acts: in words, and as far as it is known in numbers."""
-
-    text: str = ""
-    parts: tuple[str, ...] = ()
-    grids: tuple[int, ...] = ()
-    point_m: tuple[float, ...] | None = None
-    radius_m: float | None = None
-    band_hz: tuple[float, float] | None = None
-    channels: tuple[str, ...] = ()
+from ..effects.estimate import Estimate, Location
 
 
 @dataclass(frozen=True)
@@ -36,7 +12,7 @@ class NamedEffect:
     name: str
     claim: str = ""
     log_evidence: float | None = None
-    where: Location = Location()
+    where: Location = field(default_factory=Location)
     parameters: tuple[Estimate, ...] = ()
 
 
@@ -159,18 +135,3 @@ class Adequacy:
     p: float
     what: str
     where: tuple[dict[str, object], ...] = ()
-
-
-def estimate(row: dict[str, object]) -> Estimate:
-    """An effect's reported parameter as a type."""
-    name, value, unit, low, high = (row[k] for k in ("name", "value", "unit", "low", "high"))
-    return Estimate(str(name), _float(value), str(unit), _float(low), _float(high))
-
-
-def location(where: dict[str, object]) -> Location:
-    """An effect's place as a type."""
-    return Location(**{k: tuple(v) if isinstance(v, list) else v for k, v in where.items()})  # type: ignore[arg-type]
-
-
-def _float(value: object) -> float:
-    return float(np.asarray(value, float))

@@ -14,8 +14,6 @@ from .result import (
     NamedEffect,
     Remainder,
     Scores,
-    estimate,
-    location,
 )
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
@@ -24,13 +22,12 @@ STRUCTURED = 5.0  # times the spread of the recording: more than that is not noi
 def named_effect(hypothesis: HypothesisFit) -> NamedEffect:
     """The effect of a hypothesis, where it is and how large."""
     effect, x = hypothesis.effect, hypothesis.fit.of(hypothesis.effect)
-    rows = effect.reported(x, hypothesis.fit.sd(effect))
     return NamedEffect(
         effect.name,
         effect.claim,
         -hypothesis.neg2_log_evidence / 2,
-        location(effect.location(x)),
-        tuple(estimate(row) for row in rows),
+        effect.location(x),
+        effect.reported(x, hypothesis.fit.sd(effect)),
     )
 
 
@@ -45,7 +42,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             why_not(
                 hypothesis, best, found is not None, diagnosis.two_log_bayes_factor(hypothesis)
             ),
-            location(hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect))),
+            hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect)),
         )
         for hypothesis in diagnosis.hypotheses
         if hypothesis is not found
@@ -107,8 +104,8 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         for parameter, row in zip(effect.parameters, rows, strict=True):
             given = parameter.value(parameter.mean)
             called = getattr(effect, "called", "")  # by the user
-            where = f"{called}: {effect.text}" if called not in ("", row["name"]) else effect.text
-            out.append(CalibratedParameter(where, estimate(row), given))
+            where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
+            out.append(CalibratedParameter(where, row, given))
     return tuple(out)
 
 

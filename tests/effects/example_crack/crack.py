@@ -6,13 +6,13 @@ package tells chladni by one entry point, ``crack = "crack:FAMILY"`` in the grou
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from chladni.effects.effect import WIDER, Effect, MatrixTerm, Parameter
+from chladni.effects.estimate import Estimate
 from chladni.effects.family import Article, Family
 from chladni.effects.search_context import Candidate, SearchContext, best_places
 from chladni.effects.shell_groups import ShellGroups
@@ -80,10 +80,10 @@ class Crack(Effect):
         """The shells of the line with a property of their own, 12I/t³ times f."""
         return cracked(assembly, self.shells, left(x[0]))
 
-    def reported(self, x: np.ndarray, sd: np.ndarray) -> list[dict[str, Any]]:
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of 12I/t³."""
         value, high, low = (left(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
-        return [{"name": "12I/T3", "value": value, "unit": "-", "low": low, "high": high}]
+        return (Estimate("12I/T3", value, "-", low, high),)
 
 
 def left(x: float) -> float:

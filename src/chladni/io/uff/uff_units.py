@@ -3,7 +3,10 @@
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...errors import FileError
+from .uff_sets import FunctionSet, UnitsSet
 
 # code of dataset 164: (metre per file length, newton per file force)
 _POUND, _KILOGRAM_FORCE = 4.4482216152605, 9.80665
@@ -21,6 +24,16 @@ _LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.02
 _FORCE = {"n": 1.0, "mn": 1e-3, "kn": 1e3, "lbf": _POUND, "lb": _POUND, "kgf": _KILOGRAM_FORCE}
 _RESPONSE = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _GRAVITY = 9.80665
+_HERTZ = {
+    **dict.fromkeys(("", "hz", "hertz", "1/s", "cps"), 1.0),
+    "khz": 1e3,
+    **dict.fromkeys(("rad/s", "radians/s"), 1 / (2 * np.pi)),
+    **dict.fromkeys(("1/min", "cpm", "rpm", "r/min", "rev/min", "u/min"), 1 / 60),
+}
+_SPEED = ("rpm", "r/min", "rev/min", "u/min")  # a frequency only where the data type says so
+_FREQUENCY = 18  # specific data type; 0 and 1 leave it open
+_ABSCISSA = {17: "time", 19: "rpm", 20: "order"}
+_ELECTRICAL = re.compile(r"[kmunµ]?v|k?volts?|millivolts?|counts?|lsb|p?coulomb|pc")
 
 
 @dataclass(frozen=True)
@@ -39,12 +52,12 @@ class Meaning:
     factor: float
 
 
-def file_units(header: dict) -> FileUnits:
+def file_units(header: UnitsSet) -> FileUnits:
     """Dataset 164: the named system, or for a user's own (code 9) the factors written there."""
-    known = _SYSTEMS.get(int(header["units_code"]))
+    known = _SYSTEMS.get(header.system)
     if known:
         return FileUnits(*known)
-    return FileUnits(1 / (header["length"] or 1.0), 1 / (header["force"] or 1.0))
+    return FileUnits(1 / (header.length or 1.0), 1 / (header.force or 1.0))
 
 
 def _bare(label: str) -> str:
@@ -93,7 +106,7 @@ def ratio(label: str) -> tuple[str | None, float | None, float | None]:
     return None, None, None
 
 
-def meaning(record: dict, units: FileUnits, where: str) -> Meaning:
+def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
     """Quantity and SI factor of an FRF record: unit labels first, then data types and dataset 164.
 
     Raises
@@ -101,18 +114,56 @@ def meaning(record: dict, units: FileUnits, where: str) -> Meaning:
     FileError
         If the label and the data type contradict each other.
     """
-    typed = _RESPONSE.get(record["ordinate_spec_data_type"])
-    motion_below = record["orddenom_spec_data_type"] in _RESPONSE
-    if record["func_type"] == 5 or (typed and motion_below):
+    typed = _RESPONSE.get(record.ordinate.kind)
+    motion_below = record.denominator.kind in _RESPONSE
+    if record.function == 5 or (typed and motion_below):
         return Meaning("transmissibility", 1.0)
-    said, length, force = ratio(record["ordinate_axis_units_lab"])
+    said, length, force = ratio(record.ordinate.unit)
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
             f"{where}: the data type says {typed}, the unit label "
-            f"{record['ordinate_axis_units_lab']!r} says {said}; state the quantity in the case"
+            f"{record.ordinate.unit!r} says {said}; state the quantity in the case"
         )
-    below = _FORCE.get(_bare(record["orddenom_axis_units_lab"]))
+    below = _FORCE.get(_bare(record.denominator.unit))
     if said == "transmissibility":
         return Meaning(said, length / force if length and force else 1.0)
     force = force or below or units.force
     return Meaning(said or typed, (length or units.length) / force)
+
+
+def hertz(record: FunctionSet, where: str) -> np.ndarray:
+    """The abscissa as frequencies [Hz]; of revolutions only where they are said to be a frequency.
+
+    Raises
+    ------
+    FileError
+        If it is something else (a speed, an order, a time), or in a unit that is not known.
+    """
+    kind, unit = record.abscissa.kind, _bare(record.abscissa.unit)
+    needed = f"a function of frequency has data type {_FREQUENCY} and is in Hz, kHz, rad/s or rpm"
+    is_frequency = kind == _FREQUENCY or (kind in (0, 1) and unit not in _SPEED)
+    if unit not in _HERTZ or not is_frequency:
+        named = _ABSCISSA.get(kind)
+        typed = f"data type {kind}" + (f" ({named})" if named else "")
+        raise FileError(f"{where}: its abscissa, {typed}, is in {record.abscissa.unit!r}; {needed}")
+    f = np.asarray(record.x, float) * _HERTZ[unit]
+    if np.any(f < 0):
+        raise FileError(f"{where}: a frequency of {f.min():g} Hz is negative")
+    return f
+
+
+def check_calibrated(record: FunctionSet, where: str) -> None:
+    """Refuse what a front end measured but nobody calibrated.
+
+    Raises
+    ------
+    FileError
+        If the ordinate or its denominator is in volts, counts or a charge.
+    """
+    for axis in (record.ordinate, record.denominator):
+        if any(_ELECTRICAL.fullmatch(part) for part in _bare(axis.unit).split("/")):
+            raise FileError(
+                f"{where}: its values are in {axis.unit!r} and the file holds no calibration; "
+                "export them in units of motion and force (m, mm/s, m/s^2 or g over N or lbf), or "
+                'give them as .npz with their quantity and state gain = "unknown" in the case'
+            )

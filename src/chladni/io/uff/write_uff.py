@@ -8,6 +8,7 @@ and readers by blanks both find the numbers.
 
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from ...dofs import parse
 from ...dynamics.frf import FRF
 from ...errors import FileError, LabelError
+from .uff_sets import Axis, FunctionSet, HeaderSet, NodeSet, UnitsSet, for_pyuff
 
 _RESPONSE = {"receptance": 8, "mobility": 11, "accelerance": 12, "transmissibility": 12}
 _UNIT = {
@@ -59,26 +61,38 @@ def _write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None
     """Header, units and nodes, in pyuff's hand."""
     import pyuff
 
-    head = dict(type=151, model_name=title, description="NONE", db_app="chladni", program="chladni")
-    units = dict(type=164, units_code=1, units_description="SI", temp_mode=1, length=1.0, force=1.0)
-    sets = [head, units | dict(temp=1.0, temp_offset=273.15)]
+    sets: list[HeaderSet | UnitsSet | NodeSet]
+    sets = [HeaderSet(model=title, program="chladni"), UnitsSet()]
     if nodes:
-        xyz = np.array([nodes[n] for n in nodes], float)
-        zero = np.zeros(len(xyz), int)
-        frame = dict(def_cs=zero, disp_cs=zero, color=zero + 1)
-        x, y, z = xyz.T
-        sets.append(dict(type=2411, node_nums=np.array(list(nodes)), x=x, y=y, z=z, **frame))
-    pyuff.UFF(str(path)).write_sets(sets, mode="add")
+        ids, places = np.array(list(nodes)), np.array(list(nodes.values()), float)
+        sets.append(NodeSet(nodes=ids, places=places, systems=np.zeros(len(ids), int)))
+    pyuff.UFF(str(path)).write_sets([for_pyuff(one) for one in sets], mode="add")
 
 
 def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
     """One dataset 58 a channel, then its coherence."""
+    above, below = _UNIT[frf.quantity]
+    ordinate = Axis(_RESPONSE[frf.quantity], above)
+    denominator = Axis(13 if below == "N" else 12, below)
     for j, input in enumerate(frf.inputs):
         for i, output in enumerate(frf.outputs):
-            dofs = (_code(output), _code(input))
-            yield _dataset(frf, dofs, frf.values[:, i, j], 4, title, binary)
+            H = FunctionSet(
+                function=4,
+                response=_code(output),
+                reference=_code(input),
+                due=len(frf.frequency),
+                x=frf.frequency,
+                y=frf.values[:, i, j],
+                abscissa=Axis(18, "Hz"),
+                ordinate=ordinate,
+                denominator=denominator,
+            )
+            yield _encoded(H, title, binary)
             if frf.coherence is not None:
-                yield _dataset(frf, dofs, frf.coherence[:, i, j], 6, title, binary)
+                gamma = replace(
+                    H, function=6, y=frf.coherence[:, i, j], ordinate=Axis(), denominator=Axis()
+                )
+                yield _encoded(gamma, title, binary)
 
 
 def _code(dof: str) -> tuple[int, int]:
@@ -95,48 +109,34 @@ def _code(dof: str) -> tuple[int, int]:
     return point, component * sign
 
 
-def _dataset(
-    frf: FRF,
-    dofs: tuple[tuple[int, int], tuple[int, int]],
-    y: np.ndarray,
-    function: int,
-    title: str,
-    binary: bool,
-) -> bytes:
+def _encoded(record: FunctionSet, title: str, binary: bool) -> bytes:
     """One record: head, numbers, end mark."""
-    even = _even(frf.frequency) and not binary
-    head = _head(frf, dofs, y, function, title, even)
+    x, y = record.x, record.y
+    even = _even(x) and not binary
+    head = _head(record, title, even)
     if not binary:
-        return (f"    -1\n    58{'':74}\n" + head + _text(frf.frequency, y, even)).encode()
-    bits = _columns(frf.frequency, y).astype("<f8").tobytes()  # 1: little-endian, 2: IEEE
+        return (f"    -1\n    58{'':74}\n" + head + _text(x, y, even)).encode()
+    bits = _columns(x, y).astype("<f8").tobytes()  # 1: little-endian, 2: IEEE
     mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
     return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"
 
 
-def _head(
-    frf: FRF,
-    dofs: tuple[tuple[int, int], tuple[int, int]],
-    y: np.ndarray,
-    function: int,
-    title: str,
-    even: bool,
-) -> str:
+def _head(record: FunctionSet, title: str, even: bool) -> str:
     """Records 1 to 11."""
-    (out, out_way), (ref, ref_way) = dofs
-    f = frf.frequency
+    (out, out_way), (ref, ref_way) = record.response, record.reference
+    f = record.x
     start, step = (f[0], (f[-1] - f[0]) / (len(f) - 1)) if even else (0.0, 0.0)
-    above, below = _UNIT[frf.quantity] if function == 4 else ("NONE", "NONE")
-    kinds = (_RESPONSE[frf.quantity], 13 if below == "N" else 12) if function == 4 else (0, 0)
     lines = [f"{title[:80]:80}"] + [f"{'NONE':80}"] * 4
     lines += [
-        f"{function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}{ref:10d}"
-        f"{ref_way:4d}",
-        f"{6 if np.iscomplexobj(y) else 4:10d}{len(y):10d}{int(even):10d}{start:13.5e}{step:13.5e}"
-        f"{0:13.5e}",
+        f"{record.function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}"
+        f"{ref:10d}{ref_way:4d}",
+        f"{6 if np.iscomplexobj(record.y) else 4:10d}{len(f):10d}{int(even):10d}{start:13.5e}"
+        f"{step:13.5e}{0:13.5e}",
     ]
-    axes = ((18, "Frequency", "Hz"), (kinds[0], "NONE", above), (kinds[1], "NONE", below))
-    for kind, name, unit in (*axes, (0, "NONE", "NONE")):
-        lines.append(f"{kind:10d}{0:5d}{0:5d}{0:5d} {name:20} {unit:20}")
+    names = ("Frequency", "NONE", "NONE", "NONE")
+    axes = (record.abscissa, record.ordinate, record.denominator, Axis())
+    for name, axis in zip(names, axes, strict=True):
+        lines.append(f"{axis.kind:10d}{0:5d}{0:5d}{0:5d} {name:20} {axis.unit:20}")
     return "\n".join(lines) + "\n"
 
 
