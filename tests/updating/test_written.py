@@ -10,7 +10,8 @@ from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.thickness_distribution import thickness_distribution
 from chladni.updating import outcome
-from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.diagnosis import Diagnosis, threshold
+from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.hypothesis_fit import HypothesisFit, as_written
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
@@ -43,15 +44,39 @@ def test_is_the_best_without_scatter(hypothesis):
     assert deck.fit.misfit <= r @ r + 1e-6
 
 
-def test_what_the_held_out_data_refuse_is_not_written(monkeypatch, hypothesis):
-    """No name, and nothing of it in the deck that is reported."""
-    refused = FittedScores(1.0, 2.0, 1.0)
-    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, diagnosis: (refused, refused))
-    far = replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + 1e6)
-    null = HypothesisFit(Effect(), far, hypothesis.model)
+NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
+
+
+@pytest.mark.parametrize(
+    ("ahead", "heard", "harm", "called"),
+    [
+        (1000.0, HeldOutEvidence(0.0, 0.0, 0.0), 1.0, NAMED),  # no vote of what cannot feel it
+        (1000.0, HeldOutEvidence(), 1.0, NAMED),  # nor has what was not held out
+        (1000.0, HeldOutEvidence(-threshold() - 1, 500.0, 500.0), 1.0, REST),
+        (1000.0, HeldOutEvidence(500.0, -threshold() - 1, 500.0), 1.0, REST),
+        (1000.0, HeldOutEvidence(500.0, 500.0, -threshold() - 1), 1.0, REST),
+        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), 2.0, REST),
+        (threshold() + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
+        (threshold() + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
+    ],
+)
+def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, harm, called):
+    """No name then, and nothing of it in the deck that is reported.
+
+    Where all data together still refute calibration alone, something is missing all the same.
+    """
+    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
+    scores = FittedScores(1.0, harm, 1.0)
+    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: (scores, scores))
+    null = HypothesisFit(
+        Effect(),
+        replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead),
+        hypothesis.model,
+    )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
-    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None, labels=()))
-    judged = outcome.judged(prepared, found)
-    assert judged.found is None
-    assert judged.written is None
-    assert "so it is not named" in judged.notes[-1]
+    problem = SimpleNamespace(mass_measurement=None, labels=())
+    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
+    assert judged.verdict == called
+    assert (judged.written is not None) == (called == NAMED)
+    assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
+    assert called != REST or not judged.adequacy.passes

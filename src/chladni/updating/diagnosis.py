@@ -19,6 +19,7 @@ from ..errors import ModelError
 from .adequacy import FitTest, adequacy
 from .candidates import candidates
 from .discrepancy import MEDIAN
+from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status

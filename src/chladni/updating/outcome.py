@@ -6,7 +6,9 @@ import numpy as np
 
 from ..effects.registry import families
 from ..model.assembly import Assembly
-from .diagnosis import Diagnosis, tested, verdict
+from .adequacy import FitTest
+from .diagnosis import Diagnosis, tested, threshold, verdict
+from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
 from .likelihood import Poles
 from .question import Prepared, Question
@@ -85,8 +87,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """
     if diagnosis.found is None:
         return diagnosis
-    lead = diagnosis.hypotheses[0]
-    diagnosis = replace(diagnosis, written=as_written(lead, prepared.problem.mass_measurement))
+    lead, problem = diagnosis.hypotheses[0], prepared.problem
+    heard = held_out_evidence(problem, prepared.unseen, diagnosis.null, lead)
+    gain = diagnosis.two_log_bayes_factor(lead)
+    diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
     held = fitted_scores(prepared, diagnosis)[1]
     together = gain + (heard.held_out or 0.0)
     against = any(g < -threshold() for g in heard.votes.values())
@@ -94,13 +98,33 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         notes = (*diagnosis.notes, f"asked of {lead.effect.name}: {_said(heard)}")
         return replace(diagnosis, notes=notes)
     note = (
-        f"{lead.effect.name} gained {diagnosis.two_log_bayes_factor(lead):.0f} in -2 ln evidence "
-        f"but left the held-out Q at {held.effect / held.calibrated:.2f} of plain calibration's, "
-        "so it is not named"
+        f"{lead.effect.name} gained {gain:.0f} in -2 ln evidence but left the data no fit saw "
+        f"worse explained ({_said(heard)}; held-out Q {held.calibrated:.3g} calibrated, "
+        f"{held.effect:.3g} with it), so it is not named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    return tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), prepared.problem)
+    refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), problem)
+    return refused if together <= threshold() else _unexplained(refused, lead, together)
+
+
+def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> Diagnosis:
+    """Calibration alone is refuted by all data together, and what refuted it is refused."""
+    p = float(min(1.0, len(families()) * np.exp(-together / 2)))
+    what = (
+        f"{lead.effect.name} explains all data e^{together / 2:.0f} times better than calibration "
+        "alone, yet not those that no fit saw"
+    )
+    fits = FitTest(False, p, what, lead.effect.text)
+    note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
+
+
+def _said(heard: HeldOutEvidence) -> str:
+    """The gains of data that were not fitted, in words."""
+    words = [f"{what} {gain:+.0f}" for what, gain in heard.votes.items()]
+    return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"
 
 
 def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:

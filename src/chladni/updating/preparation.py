@@ -99,9 +99,7 @@ def _by_responses(question: Question) -> Prepared:
             d.only(_training(f, low, fit_max, swapped)) for d, f in zip(data, lines, strict=True)
         ]
         problem = replace(problem, data=data[0])
-    f = lines[1]
-    outside = (f >= held_band[0]) & (f <= held_band[1])
-    held = outside[:, None] | (held_sensors[None, :] & ((f >= low) & (f <= reach[1]))[:, None])
+    unseen, held = (_left_out(d, held_band, reach, held_sensors) for d in (data[0], data[1]))
     names = [n for n, h in zip(question.outputs.labels, held_sensors, strict=True) if h]
     what = _held_in_words(names, held_band)
     notes = [
@@ -121,7 +119,7 @@ def _by_responses(question: Question) -> Prepared:
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     few = too_little(seen, int(data[0].use.any(axis=0).sum()))
     return Prepared(
-        problem, data[1], held & ~data[1].use, what, tuple(notes), nominal, noise, found, few
+        problem, data[1], held, what, tuple(notes), nominal, noise, found, few, unseen=unseen
     )
 
 
@@ -184,6 +182,16 @@ def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.nd
     return np.asarray(np.outer((f >= low) & (f <= high), ~held))
 
 
+def _left_out(
+    data: Responses, band: tuple[float, float], reach: tuple[float, float], sensors: np.ndarray
+) -> np.ndarray:
+    """Lines of the held-out band, and the held-out sensors on every line (n_f, n_out)."""
+    f = data.s.imag / (2 * np.pi)
+    outside = (f >= band[0]) & (f <= band[1])
+    held = outside[:, None] | (sensors[None, :] & ((f >= reach[0]) & (f <= reach[1]))[:, None])
+    return np.asarray(held & ~data.use)
+
+
 def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
     """Held-out sensors, but for those whose level stands out: a fault must be fitted to be found.
 
@@ -233,7 +241,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_mass_note(question))
     few = too_little(len(frequency), 0)
-    return Prepared(problem, data, held, what, notes, nominal, None, found, few, ~held)
+    return Prepared(problem, data, held, what, notes, nominal, None, found, few, ~held, held)
 
 
 def nuisances(

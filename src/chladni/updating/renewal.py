@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ..fem.modelled import modelled
 from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
-from .likelihood import Responses
+from .likelihood import Poles, Responses
 from .preparation import SOLVED, nuisances, updating_problem
 from .question import Prepared, Question
 from .reduced_problem import reduced_problem
@@ -87,7 +87,8 @@ def _on_new_structure(
     effect = hypothesis.effect
     x = hypothesis.fit.of(effect)
     changed = replace(question, assembly=effect.apply(question.assembly, x))
-    data, f_max = old.data, old.setup.f_max
+    data, f_max = hypothesis.data, old.setup.f_max
+    assert isinstance(data, (Responses, Poles))
     model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     reduced = reduced_problem(

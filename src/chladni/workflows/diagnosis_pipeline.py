@@ -74,7 +74,7 @@ def _judged(
         lead = renewed(asked, prepared, found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
-        found, distrust = judged(prepared, found), lead.distrust
+        found, distrust = with_confusers(judged(prepared, found)), lead.distrust
     if found.found is None:
         plain = renewed(asked, prepared, found.plain)
         found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
