@@ -61,7 +61,7 @@ high = 1.1
 """
 
 _TAIL = """\
-Without any `[[parameter]]`, E and rho of every material and t of every part of shells are free; in
+Without any `[[parameter]]`, E and t of every part of shells and rho of every material are free; in
 a deck without shells E and rho of every material of solids and beams.
 
 What can be freed, and of what: E, rho, nu and t of isotropic shells; E, rho, t, E1, E2, G12 and

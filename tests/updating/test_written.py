@@ -13,6 +13,7 @@ from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.hypothesis_fit import HypothesisFit, as_written
+from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
@@ -44,6 +45,7 @@ def test_is_the_best_without_scatter(hypothesis):
     assert deck.fit.misfit <= r @ r + 1e-6
 
 
+DUE = threshold(object.__new__(Responses))
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 
@@ -52,12 +54,12 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
     [
         (1000.0, HeldOutEvidence(0.0, 0.0, 0.0), 1.0, NAMED),  # no vote of what cannot feel it
         (1000.0, HeldOutEvidence(), 1.0, NAMED),  # nor has what was not held out
-        (1000.0, HeldOutEvidence(-threshold() - 1, 500.0, 500.0), 1.0, REST),
-        (1000.0, HeldOutEvidence(500.0, -threshold() - 1, 500.0), 1.0, REST),
-        (1000.0, HeldOutEvidence(500.0, 500.0, -threshold() - 1), 1.0, REST),
+        (1000.0, HeldOutEvidence(-DUE - 1, 500.0, 500.0), 1.0, REST),
+        (1000.0, HeldOutEvidence(500.0, -DUE - 1, 500.0), 1.0, REST),
+        (1000.0, HeldOutEvidence(500.0, 500.0, -DUE - 1), 1.0, REST),
         (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), 2.0, REST),
-        (threshold() + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
-        (threshold() + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
+        (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
+        (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
     ],
 )
 def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, harm, called):

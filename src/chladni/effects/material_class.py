@@ -16,10 +16,14 @@ from ..model.properties import Isotropic
 
 @dataclass(frozen=True)
 class Orthotropy:
-    """Medians [Pa] of E1, E2, G12 and the standard deviations of their logarithms."""
+    """Medians [Pa] of E1, E2, G12 and the standard deviations of their logarithms.
+
+    ``nu_sd`` is that of the logit of sqrt(nu12 nu21) / 0.6: 0.25 is 0.04 about 0.3.
+    """
 
     median: tuple[float, float, float]
     sd: tuple[float, float, float]
+    nu_sd: float = 1.0
 
     @property
     def directed(self) -> bool:
@@ -48,4 +52,6 @@ def orthotropy(material: Isotropic) -> Orthotropy:
         along = 27e6 * material.rho
         return Orthotropy((along, 0.08 * along, 0.08 * along), (0.25, 0.45, 0.35))
     E, G = material.E, material.shear_modulus
-    return Orthotropy((E, E, G), (0.12, 0.12, 0.12) if is_metal(material) else (1.0, 1.0, 0.7))
+    if is_metal(material):
+        return Orthotropy((E, E, G), (0.12, 0.12, 0.12), 0.25)
+    return Orthotropy((E, E, G), (1.0, 1.0, 0.7))

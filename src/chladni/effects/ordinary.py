@@ -64,7 +64,11 @@ def ordinary(
 
 
 def defaults(groups: ShellGroups) -> list[PartScale]:
-    """E and rho of every material and t of every shell part: what a user may calibrate anyway."""
+    """E and t of every shell part, rho of every material: what a user may calibrate anyway.
+
+    A part may have been given the wrong sheet, so that E is each part's own; weighing tells one
+    density at most.
+    """
     parts = groups.structure.assembly.parts
     used = sorted(set(groups.part.tolist()))
     by_material: dict[int, list[int]] = {}
@@ -73,7 +77,8 @@ def defaults(groups: ShellGroups) -> list[PartScale]:
         if isinstance(section, ShellSection):
             material = section.membrane or section.bending
             by_material.setdefault(id(material) if material is None else material.id, []).append(k)
-    out = [ordinary(groups, q, ks) for ks in by_material.values() for q in ("E", "rho")]
+    out = [ordinary(groups, "E", [k]) for k in used]
+    out += [ordinary(groups, "rho", ks) for ks in by_material.values()]
     return out + [ordinary(groups, "t", [k]) for k in used]
 
 

@@ -10,7 +10,7 @@ from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .material_class import orthotropy
+from .material_class import is_metal, orthotropy
 from .shell_groups import ShellGroups
 from .surroundings import Surroundings
 
@@ -109,7 +109,10 @@ def _about(mean: float, sd: float) -> tuple[float, ...]:
 def orthotropic(
     groups: ShellGroups, positions: tuple[int, ...], axis: np.ndarray
 ) -> OrthotropicMaterial:
-    """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame."""
+    """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame.
+
+    It takes the place of E; and of t where the moduli are so little known that t says nothing more.
+    """
     parts = groups.structure.assembly.parts
     section = parts[positions[0]].section
     material = section.membrane or section.bending if isinstance(section, ShellSection) else None
@@ -125,7 +128,7 @@ def orthotropic(
                 ("E1", "E2", "G12"), prior.shift(E, G), prior.sd, (E, E, G), strict=True
             )
         ),
-        Parameter("nu mean", "-", nu_mean, 1.0, kind="linear", step=0.5, nominal=nu_mean),
+        Parameter("nu mean", "-", nu_mean, prior.nu_sd, kind="linear", step=0.5, nominal=nu_mean),
     )
     names = tuple(parts[k].name for k in positions)
     direction = "xyz"[int(np.argmax(np.abs(axis)))]
@@ -133,7 +136,7 @@ def orthotropic(
         unknown,
         f"all of {', '.join(names)}, axis 1 along {direction}",
         names,
-        replaces=("E of " + ", ".join(names),),
+        replaces=tuple(f"{q} of {n}" for q in ("E" if is_metal(material) else "Et") for n in names),
         E=material.E,
         nu=material.nu,
         positions=positions,

@@ -25,7 +25,8 @@ from .likelihood import Responses
 from .map_fit import Status
 from .reduced_model import evaluate
 
-FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing
+FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
+FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
@@ -133,13 +134,14 @@ def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
     return problem, null
 
 
-def threshold() -> float:
-    """The gain in -2 ln evidence that is needed to name anything.
+def threshold(data: object) -> float:
+    """The gain in -2 ln evidence that is needed to name anything from responses or from poles.
 
     Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
     (Markov); the families share the chance of a false alarm.
     """
-    return float(2 * np.log(len(families()) / FALSE_ALARM))
+    chance = FALSE_ALARM_FRF if isinstance(data, Responses) else FALSE_ALARM
+    return float(2 * np.log(len(families()) / chance))
 
 
 def verdict(
@@ -147,7 +149,7 @@ def verdict(
 ) -> str:
     """The public verdict."""
     best = hypotheses[0] if hypotheses else None
-    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > threshold():
+    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > threshold(null.data):
         return "measurement fault" if best.effect.kind == "test" else "missing physics"
     changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
     return "calibration only" if changed else "nothing missing"
@@ -190,7 +192,6 @@ def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
     ).astype(bool)
-    problem = problem.exactly()
     return _base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
 
 

@@ -79,11 +79,11 @@ HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibrat
 def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """The verdict once data that no fit saw have been heard, and the named effect as written.
 
-    They refuse a name as surely as the fitted data must carry it: where they speak against it by
-    the gain that would be needed to name it, where less than that is left of all data together, or
-    where the deck with the effect does harm.  Data that cannot feel the effect are predicted alike
-    without it and have no vote.  Where all data together still want more than calibration, what is
-    missing is not in the catalogue.
+    The fitted data must carry a name after the fit was renewed.  The others refuse it as surely:
+    where they speak against it by the gain that would be needed to name it, where less than that is
+    left of all data together, or where the deck with the effect does harm.  Data that cannot feel
+    the effect are predicted alike without it and have no vote.  Where all data together still want
+    more than calibration, what is missing is not in the catalogue.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -93,8 +93,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
     held = fitted_scores(prepared, diagnosis)[1]
     together = gain + (heard.held_out or 0.0)
-    against = any(g < -threshold() for g in heard.votes.values())
-    if not against and together > threshold() and not held.effect > HARM * held.calibrated:
+    due = threshold(diagnosis.null.data)
+    against = any(g < -due for g in heard.votes.values())
+    enough = min(gain, together) > due
+    if enough and not against and not held.effect > HARM * held.calibrated:
         notes = (*diagnosis.notes, f"asked of {lead.effect.name}: {_said(heard)}")
         return replace(diagnosis, notes=notes)
     note = (
@@ -105,7 +107,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
     refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), problem)
-    return refused if together <= threshold() else _unexplained(refused, lead, together)
+    return refused if together <= due else _unexplained(refused, lead, together)
 
 
 def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> Diagnosis:

@@ -286,7 +286,7 @@ def setup_of(question: Question, f_max: float) -> Setup:
 
 
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
-    """What the user frees, or E and rho of every material and t of every part of shells.
+    """What the user frees, or E and t of every part of shells and rho of every material.
 
     Without shells, E and rho of every material of solids and beams.
     """

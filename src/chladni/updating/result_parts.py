@@ -39,9 +39,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
         Alternative(
             hypothesis.effect.name,
             -hypothesis.neg2_log_evidence / 2,
-            why_not(
-                hypothesis, best, found is not None, diagnosis.two_log_bayes_factor(hypothesis)
-            ),
+            why_not(diagnosis, hypothesis, best),
             hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect)),
         )
         for hypothesis in diagnosis.hypotheses
@@ -54,19 +52,15 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     return tuple(sorted(out, key=lambda a: -(a.log_evidence or 0.0)))
 
 
-def why_not(
-    hypothesis: HypothesisFit, best: HypothesisFit, named: bool, two_log_bayes_factor: float
-) -> str:
+def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
     """Why a hypothesis was not named, with a number."""
-    if not named and two_log_bayes_factor > threshold():
+    gain, due = diagnosis.two_log_bayes_factor(hypothesis), threshold(diagnosis.null.data)
+    if diagnosis.found is None and gain > due:
+        return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
+    if diagnosis.found is None:
         return (
-            f"gains {two_log_bayes_factor:.1f} in -2 ln evidence, but does not help on the data "
-            "held out"
-        )
-    if not named:
-        return (
-            f"gains {two_log_bayes_factor:.1f} in -2 ln evidence over plain calibration; "
-            f"{threshold():.0f} are needed before anything is named"
+            f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
+            "before anything is named"
         )
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
@@ -91,16 +85,21 @@ def agreement(
         what,
         None if found is None else diagnosis.two_log_bayes_factor(found),
         max(factors, default=None),
-        threshold(),
+        threshold(diagnosis.null.data),
     )
 
 
 def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
-    """Ordinary parameters of the deck that is written, beside the values of the deck given."""
+    """Ordinary parameters of the deck that is written, beside the values of the deck given.
+
+    Their intervals are of the fit that had scatter and joints beside them.
+    """
     deck = diagnosis.written or diagnosis.found or diagnosis.plain
+    whole = (diagnosis.found or diagnosis.null).fit
     out = []
     for effect in (e for e in deck.fit.effects if e.kind == "ordinary"):
-        rows = effect.reported(deck.fit.of(effect), deck.fit.sd(effect))
+        fit = whole if effect in whole.effects else deck.fit
+        rows = effect.reported(deck.fit.of(effect), fit.sd(effect))
         for parameter, row in zip(effect.parameters, rows, strict=True):
             given = parameter.value(parameter.mean)
             called = getattr(effect, "called", "")  # by the user

@@ -96,7 +96,7 @@ def test_concealed_in_a_plate_it_is_named_and_written(crack, tmp_path):
     (left,) = d["effects"][0]["parameters"]
     assert left["low"] < case.truth["value"] < left["high"]
     held = d["fit"]["held_out"]
-    assert held["Q_with_effect"] < held["Q_calibrated"] / 2
+    assert held["Q_with_mesh_error"] < held["Q_calibrated_with_mesh_error"] / 2
 
     updated = assembly(read_deck(out / "updated.bdf"), UNITS["mm-t-s"])
     ratio = {p.name: p.section.bending_ratio for p in updated.parts}
