@@ -82,3 +82,34 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
     assert called != REST or not judged.adequacy.passes
+
+
+def test_calibration_alone_is_written_without_scatter(reduced, responses):
+    """What the null has beside E stays out of the deck, and E is fitted anew."""
+    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)]
+    start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
+    fitted = fit(reduced.model, effects, responses.over(reduced.model), None, start)
+    deck = as_written(HypothesisFit(Effect(), fitted, reduced.model), None)
+    assert [e.name for e in deck.fit.effects] == ["part-scale"]
+    assert deck.fit.x[0] == pytest.approx(0.04, abs=2e-3)
+
+
+@pytest.mark.parametrize(("E", "kept"), [(0.03, True), (0.2, False)])
+def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
+    monkeypatch, reduced, responses, E, kept
+):
+    data = responses.over(reduced.model)
+    base = (ordinary(reduced.groups, "E", [0]),)
+
+    def at(x):
+        found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
+        return HypothesisFit(Effect(), found, reduced.model)
+
+    monkeypatch.setattr(outcome, "as_written", lambda null, mass: at(E))
+    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
+    prepared = SimpleNamespace(problem=problem, score=data)
+    plain = at(0.04)
+    found = outcome.prudently_calibrated(
+        prepared, Diagnosis(plain, plain, plain, (), "calibration only")
+    )
+    assert (found.plain is not plain) == kept

@@ -41,7 +41,8 @@ class Diagnosis:
     Attributes
     ----------
     nominal, null : fits without, and with ordinary parameters free, scatter allowed in both
-    plain : ordinary parameters alone, as any calibration would; what Q is compared with
+    plain : ordinary parameters alone, as any calibration would: what a named effect is compared
+        with; where nothing is named, beside the learned error of the model instead
     hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
@@ -192,6 +193,7 @@ def _plain(problem: UpdatingProblem, null: HypothesisFit) -> HypothesisFit:
     inside = np.concatenate(
         [np.full(len(e.parameters), k) for e, k in zip(problem.base, kept, strict=True)]
     ).astype(bool)
+    problem = problem.exactly()
     return _base_fit(problem, chosen, [x[inside] for x in (*_null_starts(problem), null.fit.x)])
 
 

@@ -65,6 +65,12 @@ class UpdatingProblem:
             return self
         return replace(self, data=self.data.allowing_errors(state, delta))
 
+    def exactly(self) -> "UpdatingProblem":
+        """The same problem with a model that is taken to be right but for its parameters."""
+        if not isinstance(self.data, Responses):
+            return self
+        return replace(self, data=self.data.exactly())
+
     def mean(self) -> np.ndarray:
         """Prior mean of the base parameters."""
         return np.array([p.mean for e in self.base for p in e.parameters])
@@ -193,16 +199,17 @@ def as_written(
     """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
 
     The ordinary parameters are fitted anew, for they were found beside a scatter that is not there
-    any more; calibration without the effect does the same.  The learned error of the model stays in
+    any more.  The learned error of the model stays in
     the likelihood, else they would bend to make up for mesh and joints: on a coarse plate with a
     concealed crack E went to 264 GPa for 210 without it, and to 212 with it.
     """
-    x = hypothesis.fit.of(hypothesis.effect)
-    unknown = tuple(
-        replace(p, mean=float(v), sd=HELD)
-        for p, v in zip(hypothesis.effect.parameters, x, strict=True)
-    )
-    held = replace(hypothesis.effect, parameters=unknown)
+    held = hypothesis.effect
+    if held.parameters:
+        x = hypothesis.fit.of(held)
+        unknown = tuple(
+            replace(p, mean=float(v), sd=HELD) for p, v in zip(held.parameters, x, strict=True)
+        )
+        held = replace(held, parameters=unknown)
     kept = [e for e in hypothesis.fit.effects if e.writable]
     start = np.concatenate([hypothesis.fit.of(e) for e in kept])
     effects = [held if e is hypothesis.effect else e for e in kept]

@@ -123,6 +123,22 @@ def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> 
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
 
 
+def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """Calibration as it is answered with where nothing is named: the null as a deck can hold it.
+
+    Plain calibration would bend E, rho and t to make up for mesh and joints. Where errors of the
+    model are so large that the prudent values fit worse than the deck as it was given, it stays.
+    """
+    null = diagnosis.null
+    prudent = as_written(null, prepared.problem.mass_measurement)
+    if diagnosis.verdict == "nothing missing":
+        return replace(diagnosis, plain=prudent)
+    given = evaluate(null.model, prepared.problem.base, prepared.problem.mean(), False)
+    data = prepared.score.over(null.model)
+    before, after = (data.Q(state, data.use) for state in (given, prudent.fit.state))
+    return replace(diagnosis, plain=prudent) if after <= before else diagnosis
+
+
 def _said(heard: HeldOutEvidence) -> str:
     """The gains of data that were not fitted, in words."""
     words = [f"{what} {gain:+.0f}" for what, gain in heard.votes.items()]

@@ -28,7 +28,14 @@ from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.leaning import leaning
 from ..updating.least_data import withheld
 from ..updating.likelihood import Poles, Responses
-from ..updating.outcome import fitted_scores, held_out, judged, models, real_poles
+from ..updating.outcome import (
+    fitted_scores,
+    held_out,
+    judged,
+    models,
+    prudently_calibrated,
+    real_poles,
+)
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
@@ -76,6 +83,7 @@ def _judged(
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = with_confusers(judged(prepared, found)), lead.distrust
     if found.found is None:
+        found = prudently_calibrated(prepared, found)
         plain = renewed(asked, prepared, found.plain)
         found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
         distrust = plain.distrust
