@@ -13,7 +13,7 @@ from chladni.updating.adequacy import _drawn, _Linear, adequacy, of_poles, ranke
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.likelihood import Poles
 from chladni.updating.map_fit import MassMeasurement, beside
-from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_model import State, evaluate
 
 SCALES = MassMeasurement(1.413, 1.4e-3)
 
@@ -68,10 +68,34 @@ def test_without_errors_of_form_there_is_nothing_to_test(reduced, seen):
     assert adequacy(HypothesisFit(Effect(), fit, reduced.model), SCALES, ()) is None
 
 
+def modes(*hertz):
+    lam = (2 * np.pi * np.array(hertz)) ** 2
+    n, none = len(lam), np.zeros(0)
+    return State(lam, np.eye(n), none, none, 0.0, none, None, None)
+
+
+def listed(**changed):
+    f = np.array([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])
+    poles = Poles(f, np.full(6, 1e-4), np.ones(6, bool), np.ones(6), (5.0, 70.0), spurious=0.05)
+    return replace(poles, **changed)
+
+
 def test_poles_fit_as_closely_as_models_do_or_not_at_all():
     """The median spread is met by half of all models; six times that by hardly one."""
-    f = np.array([10.0, 20.0, 30.0])
-    poles = Poles(f, np.full(3, 1e-4), np.ones(3, bool), np.ones(3), (5.0, 40.0))
-    assert_allclose(of_poles(poles).p, 0.5)
-    assert of_poles(poles).passes
-    assert not of_poles(replace(poles, scale=6 * poles.scale)).passes
+    every = modes(10, 20, 30, 40, 50, 60)
+    assert_allclose(of_poles(listed(), every).p, 0.5)
+    assert of_poles(listed(), every).passes
+    assert not of_poles(listed(scale=6 * listed().scale), every).passes
+
+
+def test_poles_without_partner_are_counted_and_said():
+    """Of six listed modes one may be spurious by chance, three are not."""
+    assert of_poles(listed(), modes(10, 20, 30, 40, 50, 75)).passes
+    found = of_poles(listed(), modes(10, 25, 35, 45, 60))
+    assert not found.passes
+    assert "have no partner" in found.what
+    assert "20" in found.where
+
+
+def test_of_a_raw_recording_more_poles_may_be_the_rigs():
+    assert of_poles(listed(spurious=0.4), modes(10, 25, 40, 60)).passes

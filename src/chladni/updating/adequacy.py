@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
+from .reduced_model import State
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300
@@ -95,7 +96,7 @@ def adequacy(
     """
     data, fit = hypothesis.data, hypothesis.fit
     if isinstance(data, Poles):
-        return of_poles(data)
+        return of_poles(data, fit.state)
     if not isinstance(data, Responses) or data.error is None:
         return None
     r, J = data.scaled(fit.state, True)
@@ -110,17 +111,26 @@ def adequacy(
     return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where)
 
 
-def of_poles(data: Poles) -> FitTest:
-    """Whether natural frequencies are met as closely as models of this kind meet them.
+def of_poles(data: Poles, state: State) -> FitTest:
+    """Whether natural frequencies are met, as closely and as often as models of this kind do.
 
-    p is the prior chance of a spread of ln f at least as large as the one that was learned.
+    p is the smaller of two chances: of a spread of ln f at least as large as the one that was
+    learned, and of at least as many poles without a partner among the modes of ``state``, each
+    being spurious with the share that such a list has.
     """
-    p = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
+    poles = np.flatnonzero(data.use)
+    alone = np.setdiff1d(poles, data.pairs(state)[0])
+    often = float(binom.sf(len(alone) - 1, len(poles), data.spurious))
+    if often < closely:
+        what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
+        where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
+        return FitTest(often >= LEAST, often, what, where)
     what = (
         f"natural frequencies are met to {data.scale:.1%}; models of one structure differ by about "
         f"{SCALE:.1%}"
     )
-    return FitTest(p >= LEAST, p, what, "over all modes")
+    return FitTest(closely >= LEAST, closely, what, "over all modes")
 
 
 def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:
