@@ -40,6 +40,10 @@ PLOTS = {  # name: the drawing, and words that must stand on it
     "evidence_bars": (
         lambda p: plots.evidence_bars(p, {"a": -3.0, "b": -300.0}), ("a", "b", "evidence"),
     ),
+    "fit_test": (
+        lambda p: plots.fit_test(p, {"misfit": (0.5, 1.0, 0.4, 2.5), "worst line": (9, 2, 1, 4)}),
+        ("misfit", "worst line", "median"),
+    ),
     "waterfall": (
         lambda p: plots.waterfall(p, {"nominal": 0.2, "with": 0.01}, 0.005), ("nominal", "Q"),
     ),

@@ -12,6 +12,7 @@ from ..updating.result import (
     Agreement,
     Alternative,
     CalibratedParameter,
+    FitStatistic,
     FrequencyError,
     FrequencyRow,
     MassComparison,
@@ -46,7 +47,7 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
             {"where": c.where, **_estimate(c.estimate), "deck_value": c.deck_value}
             for c in r.calibrated
         ],
-        "adequate": None if r.adequate is None else vars(r.adequate),
+        "adequate": None if r.adequate is None else _adequate(r.adequate),
         "one_of": [list(names) for names in r.one_of],
         "mass": None if m is None else vars(m),
         "frequencies": [dict(vars(row)) for row in r.frequencies],
@@ -99,6 +100,15 @@ def _scores(scores: Scores) -> dict[str, float | None]:
     return {key: getattr(scores, name) for key, name in _Q.items()}
 
 
+def _adequate(found: Adequacy) -> dict[str, Any]:
+    return {**vars(found), "statistics": [dict(vars(row)) for row in found.statistics]}
+
+
+def _read_adequate(d: Mapping[str, Any]) -> Adequacy:
+    rows = tuple(_known(FitStatistic, row) for row in d.get("statistics") or ())
+    return Adequacy(d["passes"], d["p"], d["what"], tuple(d.get("where") or ()), rows)
+
+
 def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
     """A result from its JSON; what is missing there is empty here."""
     mass, error, left, good = (
@@ -120,9 +130,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         structured=Remainder(left["is"], left["left"], left["known"], left["sentence"])
         if left
         else None,
-        adequate=Adequacy(good["passes"], good["p"], good["what"], tuple(good.get("where") or ()))
-        if good
-        else None,
+        adequate=_read_adequate(good) if good else None,
         one_of=tuple(tuple(names) for names in d.get("one_of") or ()),
         notes=tuple(str(n) for n in d.get("notes") or ()),
         distrust=tuple(str(n) for n in d.get("distrust") or ()),

@@ -104,6 +104,9 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
     evidence = {h.name: h.log_evidence for h in tried if h.log_evidence is not None}
     if len(evidence) > 1:
         made["evidence"] = plots.evidence_bars(folder / "evidence.png", evidence)
+    if result.adequate is not None and result.adequate.statistics:
+        rows = {s.name: (s.value, s.median, s.low, s.high) for s in result.adequate.statistics}
+        made["fit_test"] = plots.fit_test(folder / "fit_test.png", rows)
     return made
 
 

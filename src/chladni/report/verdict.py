@@ -36,6 +36,11 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "nyquist": ("frf", "Nyquist."),
     "waterfall": ("scores", "Deviation Q on fitted data, step by step."),
     "held_out": ("scores", "Deviation Q on held-out data."),
+    "fit_test": (
+        "scores",
+        "What the explanation leaves (dot), beside what draws of the model itself leave (bar: 99 % "
+        "of them); a dot beyond its bar is not explained.",
+    ),
     "deviation": ("scores", "Where the deviation is left: channel by band."),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
     "mac": ("modes", "Modal assurance criterion, test against model."),

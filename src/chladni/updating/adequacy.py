@@ -20,6 +20,7 @@ from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
 from .reduced_model import State
+from .result import FitStatistic
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300
@@ -36,6 +37,7 @@ class FitTest:
     p: float
     what: str
     where: str
+    statistics: tuple[FitStatistic, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,7 @@ class _Linear:
         return np.array(values), square
 
 
+STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
 NAMES = (
     "an error of the model's form of {0:.1%} is needed; formulations of one structure differ by "
     "0.3 to 4 %",
@@ -108,7 +111,12 @@ def adequacy(
     own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
     p, least = ranked(seen, np.array(own))
     where = _where(data, square, labels)
-    return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where)
+    ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
+    rows = tuple(
+        FitStatistic(name, float(value), *map(float, row))
+        for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
+    )
+    return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where, rows)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

@@ -127,6 +127,20 @@ class Remainder:
     sentence: str
 
 
+@dataclass(frozen=True)
+class FitStatistic:
+    """A statistic of what an explanation leaves, and its range over draws of the model itself.
+
+    ``low`` to ``high`` holds 99 % of the draws.
+    """
+
+    name: str
+    value: float
+    median: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, eq=False)
 class Adequacy:
     """The absolute test of the best explanation."""
@@ -135,3 +149,4 @@ class Adequacy:
     p: float
     what: str
     where: tuple[dict[str, object], ...] = ()
+    statistics: tuple[FitStatistic, ...] = ()

@@ -199,6 +199,21 @@ def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | N
     return save(figure, path)
 
 
+def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, float]]) -> Path:
+    """Statistics of what is left, (value, median, low, high) each, as multiples of their median."""
+    figure = Figure(figsize=(7.6, 0.42 * len(rows) + 1.1), layout="constrained")
+    ax = figure.subplots()
+    for k, (value, median, low, high) in enumerate(rows.values()):
+        ax.barh(k, (high - low) / median, left=low / median, color="#aab4bf", height=0.5)
+        ax.plot(1.0, k, "|", color="#555555", ms=12)
+        ax.plot(value / median, k, "o", color=AFTER if value <= high else BEFORE, ms=7)
+    ax.set(xscale="log", xlabel="over the median of draws of the model itself [-]")
+    ax.set_yticks(range(len(rows)), list(rows))
+    ax.invert_yaxis()
+    ax.spines[["top", "right"]].set_visible(False)
+    return save(figure, path)
+
+
 def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None = None) -> Path:
     """Deviation Q from the nominal model down, step by step, with what repeats alone would give."""
     figure = Figure(figsize=(max(4.6, 1.5 * len(steps)), 3.2), layout="constrained")

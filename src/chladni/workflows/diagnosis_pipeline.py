@@ -176,12 +176,13 @@ def _result(
 
 
 def _adequate(found: Diagnosis) -> Adequacy | None:
-    """The absolute test as the page has it; None where natural frequencies were compared."""
+    """The absolute test as the page has it."""
     test = found.adequacy
     if test is None:
         return None
     place: dict[str, object] = {"text": test.where, "parts": [], "modes_hz": []}
-    return Adequacy(test.passes, test.p, test.what, () if test.passes else (place,))
+    where = () if test.passes else (place,)
+    return Adequacy(test.passes, test.p, test.what, where, test.statistics)
 
 
 def _article_mass(asked: Question, stages: UpdatedModels) -> float:

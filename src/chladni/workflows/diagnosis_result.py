@@ -67,8 +67,7 @@ class DiagnosisResult:
     calibrated : E, rho, t, ... that were fitted
     frequencies : test and decks side by side
     structured : whether calibration alone leaves more than noise
-    adequate, one_of : the absolute test, and explanations that the data cannot separate; not
-        made yet
+    adequate, one_of : the absolute test, and explanations that the data cannot separate
     notes : how the recording was read, what was done and why
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
