@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from ..errors import ShapeError
 from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
@@ -209,6 +210,9 @@ def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, flo
         ax.plot(value / median, k, "o", color=AFTER if value <= high else BEFORE, ms=7)
     ax.set(xscale="log", xlabel="over the median of draws of the model itself [-]")
     ax.set_yticks(range(len(rows)), list(rows))
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)
     return save(figure, path)
