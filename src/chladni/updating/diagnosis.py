@@ -90,11 +90,11 @@ def diagnose(
     plain = _plain(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = candidates(problem, null)
-    hypotheses = []
+    hypotheses: list[HypothesisFit] = []
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.3 + 0.4 * k / len(tried))
-        hypotheses += _tried(problem, null, c.effect, c.start, c.base)
-    hypotheses = _by_family(hypotheses)
+        fits = _tried(problem, null, c.effect, c.start, c.base)
+        hypotheses = _by_family([*hypotheses, *fits])  # each holds a reduced model of its own
     progress("closing in on the place", 0.7)
     hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
     closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
