@@ -109,6 +109,8 @@ def diagnose(
 def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     """The diagnosis with its explanation held against what it predicts itself."""
     winner = diagnosis.found or diagnosis.null
+    if diagnosis.found:
+        winner = _about_itself(problem, winner)
     fits = adequacy(winner, problem.mass_measurement, problem.labels)
     if fits is None:
         return diagnosis
@@ -119,6 +121,21 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     note = f"{note}, {fits.where}; nothing in the catalogue explains the recording"
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None)
+
+
+def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> HypothesisFit:
+    """The winner with errors of the model's form as they spread from its own state.
+
+    While hypotheses are compared they spread from the null's; a strong effect makes it another
+    structure (a support turns rigid modes into flexible ones, which err as those do).
+    """
+    data = winner.data
+    if not isinstance(data, Responses) or data.error is None:
+        return winner
+    data = data.allowing_errors(winner.fit.state, data.error.delta)
+    mass = problem.mass_measurement
+    fit = fitted(winner.model, winner.fit.effects, data, mass, winner.fit.x, ROUGH)
+    return HypothesisFit(winner.effect, fit, winner.model)
 
 
 def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
