@@ -7,14 +7,14 @@ from pathlib import Path
 from chladni.errors import ChladniError, LabelError
 
 from .evidence_run import run
-from .evidence_sets import SETS, orders, purpose
+from .evidence_sets import SETS, orders, purpose, seed_range
 
 
 def main(words: list[str] | None = None) -> int:
     """Entry point; 0 (done) or 2 (the input is at fault: one sentence)."""
     asked = _parser().parse_args(words)
     try:
-        seeds = _seeds(asked.seeds)
+        seeds = seed_range(asked.seeds)
         _say(purpose(seeds))
         chosen = orders(asked.set, seeds)
         for key in ("kinds", "structures"):
@@ -40,18 +40,6 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--limit", type=float, default=3600.0, help="seconds a diagnosis may take")
     command.add_argument("--out", type=Path, required=True)
     return top
-
-
-def _seeds(text: str) -> list[int]:
-    """Seeds of '600-604' or '600'.
-
-    >>> _seeds("600-602")
-    [600, 601, 602]
-    """
-    first, _, last = text.partition("-")
-    if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
-        raise LabelError(f"seeds {text!r} are no range; write 600-604")
-    return list(range(int(first), int(last or first) + 1))
 
 
 def _say(text: str) -> None:

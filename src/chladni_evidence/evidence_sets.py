@@ -90,6 +90,24 @@ def _outside(seed: int) -> Iterator[Order]:
         yield Order(home, kind, seed, "fine" if kind in OURS else MESHES[(seed + k) % 2])
 
 
+def seed_range(text: str) -> range:
+    """Seeds of a text as '600-604' or '600', both ends included.
+
+    Raises
+    ------
+    LabelError
+        If it is no range, or one that ends before it begins.
+
+    >>> list(seed_range("600-602"))
+    [600, 601, 602]
+    """
+    first, _, last = text.partition("-")
+    last = last or first
+    if not (first.isdecimal() and last.isdecimal() and int(first) <= int(last)):
+        raise LabelError(f"seeds {text!r} are no range; write 600-604")
+    return range(int(first), int(last) + 1)
+
+
 def purpose(seeds: Sequence[int]) -> str:
     """What these seeds are for, in a sentence.
 

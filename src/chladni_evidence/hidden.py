@@ -30,7 +30,7 @@ class Site:
     mass : float           [kg]
     first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
     sheets : tuple of str  parts an effect may sit on
-    material_axis, rolled :direction of rolling, and the parts that may be orthotropic
+    material_axis, rolled : direction of rolling, and the parts that may be orthotropic
     """
 
     article: Assembly

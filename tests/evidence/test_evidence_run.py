@@ -10,7 +10,7 @@ from chladni_evidence import evidence_run
 from chladni_evidence.__main__ import main
 from chladni_evidence.blind_diagnosis import Answer, diagnosed
 from chladni_evidence.evidence_run import RunFolders, run
-from chladni_evidence.evidence_sets import SETS, Order, orders, purpose
+from chladni_evidence.evidence_sets import SETS, Order, orders, purpose, seed_range
 from chladni_evidence.hidden_kinds import CATALOGUED
 from chladni_evidence.made_case import KINDS
 from chladni_evidence.outside_kinds import OUTSIDE
@@ -117,6 +117,13 @@ def test_command_line_refuses_in_a_sentence(tmp_path, capsys):
     assert main(["run", "--set", "forms", "--seeds", "599-600", *out]) == 2
     assert main(["run", "--set", "forms", "--seeds", "some", *out]) == 2
     assert "write 600-604" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["109-100", "some", "-3", ""])
+def test_seeds_that_are_no_range_are_refused(text):
+    with pytest.raises(LabelError, match="are no range"):
+        seed_range(text)
+    assert seed_range("7") == range(7, 8)
 
 
 @pytest.mark.slow

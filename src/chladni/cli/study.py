@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from ..errors import LabelError
 from ..output import write_json, write_text
 from .run import Out
 
@@ -18,11 +17,12 @@ def run(
     out: Out = None,
 ) -> None:
     """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
+    from chladni_evidence.evidence_sets import seed_range
     from chladni_evidence.score import Row, confusion, summary
     from chladni_evidence.study import blinds, line, study
 
     place, rows = out or Path("runs") / "study", []
-    cases = blinds(place, _range(seeds), _names(effects), _names(structures))
+    cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:
         rows.append(row)
@@ -37,11 +37,3 @@ def run(
 
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _range(text: str) -> range:
-    """Seeds of a text as 100-109, both ends included."""
-    first, _, last = text.partition("-")
-    if not (first.isdecimal() and (last or first).isdecimal()):
-        raise LabelError(f"seeds {text!r} are no range; write 100-109")
-    return range(int(first), int(last or first) + 1)

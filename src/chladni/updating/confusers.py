@@ -24,7 +24,9 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     odds = ", ".join(f"e^{behind[name]:.0f} times {name}" for name in names[1:])
     note = (
         f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
-        f"probable as {odds}); what would settle it: {check}"
+        f"probable as {odds})"
     )
-    one_of = (*names, check) if check else names
-    return replace(diagnosis, one_of=one_of, notes=(*diagnosis.notes, note))
+    if not check:
+        return replace(diagnosis, one_of=names, notes=(*diagnosis.notes, note))
+    note = f"{note}; what would settle it: {check}"
+    return replace(diagnosis, one_of=(*names, check), notes=(*diagnosis.notes, note))

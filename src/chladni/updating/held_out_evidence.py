@@ -22,6 +22,7 @@ from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import beside, unknowns
 from .reduced_model import evaluate
+from .scan import baseline
 
 BLOCKS = 8  # of neighbouring lines
 
@@ -129,23 +130,12 @@ def _of_samples(data: Responses, fold: np.ndarray) -> np.ndarray:
 
 def predictive(problem: UpdatingProblem, hypothesis: HypothesisFit, folds: np.ndarray) -> float:
     """2 ln predictive density of every fold given all others, summed, up to a constant."""
-    data, fit = hypothesis.data, hypothesis.fit
-    assert isinstance(data, Responses)
-    assert data.error is not None
-    r, J = data.scaled(fit.state, True)
-    known = unknowns(fit.effects)
-    mean, sd = np.array([p.mean for p in known]), np.array([p.sd for p in known])
-    error = data.error
-    shapes = error.U * (error.delta * np.sqrt(error.s))
-    mass_measurement = problem.mass_measurement
-    if mass_measurement is not None:
-        r = np.append(r, (fit.state.weight - mass_measurement.mass) / mass_measurement.sd)
-        J = np.concatenate([J, fit.state.dweight[None] / mass_measurement.sd])
-        shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
-    r = r - J @ (fit.x - mean)
-    W = np.concatenate([J * sd, shapes], axis=1)
-    L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
-    B = np.linalg.solve(L, W.T).T  # C⁻¹ = I - B Bᵀ
+    fit = hypothesis.fit
+    about = baseline(
+        hypothesis.model, fit.effects, hypothesis.data, problem.mass_measurement, fit.x
+    )
+    mean = np.array([p.mean for p in unknowns(fit.effects)])
+    r, B = about.residual - about.slopes @ (fit.x - mean), about.Z.T  # C⁻¹ = I - B Bᵀ
     z = r - B @ (B.T @ r)
     total = 0.0
     for k in np.unique(folds):

@@ -106,8 +106,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    refused = tested(replace(diagnosis, verdict=plainly, notes=notes, written=None), problem)
-    return refused if together <= due else _unexplained(refused, lead, together)
+    refused = replace(diagnosis, verdict=plainly, notes=notes, written=None)
+    return tested(refused, problem) if together <= due else _unexplained(refused, lead, together)
 
 
 def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> Diagnosis:
@@ -133,7 +133,7 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     prudent = as_written(null, prepared.problem.mass_measurement)
     if diagnosis.verdict == "nothing missing":
         return replace(diagnosis, plain=prudent)
-    given = evaluate(null.model, prepared.problem.base, prepared.problem.mean(), False)
+    given = _as_given(prepared.problem, null)
     data = prepared.score.over(null.model)
     before, after = (data.Q(state, data.use) for state in (given, prudent.fit.state))
     return replace(diagnosis, plain=prudent) if after <= before else diagnosis
@@ -157,7 +157,7 @@ def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
     return real
 
 
-def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
+def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> State:
     """The deck's own values, mesh error and gain as the fit found them, no scatter."""
     x, at = problem.mean(), 0
     for e in problem.base:
@@ -165,7 +165,7 @@ def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
         if e.kind == "nuisance" and e.writable:
             x[at : at + n] = null.fit.of(e)
         at += n
-    return x
+    return evaluate(null.model, problem.base, x, False)
 
 
 def _states(
@@ -174,7 +174,7 @@ def _states(
     """The calibrated and the updated deck, and all that the last fit had beside them."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
-        nominal = evaluate(null.model, problem.base, _as_given(problem, null), False)
+        nominal = _as_given(problem, null)
         return [(null, nominal), (null, nominal), (null, null.fit.state)]
     if diagnosis.found is None:
         state = plain.fit.state

@@ -22,13 +22,15 @@ from .reduced_model import Reduced, State, evaluate
 class Baseline:
     """A state of the base effects and what is needed to score small changes of it.
 
-    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|²; ``slopes`` (n, n_p) are those of the
+    residual, the row of the scales included in both.
     """
 
     effects: tuple[Effect, ...]
     x: np.ndarray
     state: State
     residual: np.ndarray
+    slopes: np.ndarray
     Z: np.ndarray
     mass_measurement: MassMeasurement | None
 
@@ -63,7 +65,8 @@ def baseline(
         shapes = np.concatenate([shapes, np.zeros((1, shapes.shape[1]))])
     W = np.concatenate([J * np.array([p.sd for p in unknowns(effects)]), shapes], axis=1)
     L = np.linalg.cholesky(np.eye(W.shape[1]) + W.T @ W)
-    return Baseline(tuple(effects), x, state, r, np.linalg.solve(L, W.T), mass_measurement)
+    Z = np.linalg.solve(L, W.T)
+    return Baseline(tuple(effects), x, state, r, J, Z, mass_measurement)
 
 
 def point_scores(
