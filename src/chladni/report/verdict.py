@@ -39,7 +39,8 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "fit_test": (
         "scores",
         "What the explanation leaves (dot), beside what draws of the model itself leave (bar: 99 % "
-        "of them); a dot beyond its bar is not explained.",
+        "of them). A dot to the right of its bar is not explained; one to the left says that noise "
+        "is believed larger than it is.",
     ),
     "deviation": ("scores", "Where the deviation is left: channel by band."),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
