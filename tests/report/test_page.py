@@ -181,3 +181,12 @@ def test_values_that_the_deck_keeps_are_not_called_calibrated(tmp_path):
 def test_reasons_not_to_trust_stand_first(tmp_path):
     text, _ = read(write_page(tmp_path, replace(RESULT, distrust=("the basis is too small",))))
     assert text.index("the basis is too small") < text.index("At a glance")
+
+
+@pytest.mark.parametrize("verdict", ["missing physics", "measurement fault"])
+def test_what_cannot_be_told_apart_is_the_headline(verdict):
+    tied = replace(RESULT, verdict=verdict, one_of=(("hem-contact", "weigh the structure"),))
+    said = sentence(tied)
+    assert "hem-contact" in said
+    assert "weigh the structure" in said
+    assert sentence(replace(tied, one_of=())) != said

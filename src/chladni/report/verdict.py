@@ -71,6 +71,8 @@ def sentence(result: DiagnosisResult) -> str:
         return f"The model lacks one of these, which the data cannot tell apart: {_tied(result)}."
     if verdict == "missing physics":
         return f"The model lacks {what}{gain}."
+    if verdict == "measurement fault" and result.one_of:
+        return f"Recording or model is at fault; the data cannot tell which: {_tied(result)}."
     if verdict == "measurement fault":
         return f"The recording is at fault, not the model: {what}{gain}."
     if verdict == "nonlinear":
