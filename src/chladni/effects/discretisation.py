@@ -12,7 +12,7 @@ from ..fem.modelled import Modelled, modelled
 from ..geometry.refine import refined
 from .effect import Effect, Parameter, PointTerm
 
-MOST = 40_000  # dofs of a structure that is still refined
+MOST = 60_000  # dofs of a structure that is still refined: four times as many take half a minute
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 
 

@@ -7,15 +7,17 @@ and Stern 1996, Statistica Sinica 6, 733-807, with the prior in place of the pos
 uniform where the model is true).
 
 A model that fits only with an error of form far beyond what formulations differ by does not fit.
+Nor does one whose modes would have to be damped more unevenly than those of one structure are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import binom, norm
 
-from .discrepancy import LOG_SD, MEDIAN, Discrepancy, learned
+from .damping_scatter import FEWEST, ModalDamping
+from .discrepancy import LOG_SD, MEDIAN, RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
@@ -24,6 +26,7 @@ from .result import FitStatistic
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300
+BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspension
 ALIKE = (
     0.88  # correlation of noise on neighbouring lines, which the same modes were identified from
 )
@@ -90,12 +93,14 @@ def adequacy(
     mass_measurement: MassMeasurement | None,
     labels: tuple[str, ...],
     draws: int = DRAWS,
+    damping: ModalDamping | None = None,
 ) -> FitTest | None:
     """The test of one explanation; None where errors of the model have no place.
 
     Parameters
     ----------
     labels : of the outputs, to say where
+    damping : of the modes, which is tested beside the fit where it is given
     """
     data, fit = hypothesis.data, hypothesis.fit
     if isinstance(data, Poles):
@@ -116,7 +121,26 @@ def adequacy(
         FitStatistic(name, float(value), *map(float, row))
         for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
     )
-    return FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where, rows)
+    test = FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where, rows)
+    return test if damping is None else _evenly_damped(test, damping.above(_first(data, fit.state)))
+
+
+def _first(data: Responses, state: State) -> float:
+    """Well below the first flexible mode of the model [Hz]."""
+    omega = np.sqrt(np.maximum(state.lam, 0))
+    flexible = omega[omega > RIGID * data.s.imag.max()]
+    return BELOW * float(flexible.min(initial=np.inf)) / (2 * np.pi) if len(flexible) else 0.0
+
+
+def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
+    """The test, or that of the damping where it is the less likely of the two."""
+    if len(damping.ratio) < FEWEST:
+        return test
+    p, row = damping.tested()
+    test = replace(test, statistics=(*test.statistics, row))
+    if p >= min(test.p, LEAST):
+        return test
+    return replace(test, passes=False, p=p, what=damping.said()[0], where=damping.said()[1])
 
 
 def of_poles(data: Poles, state: State) -> FitTest:

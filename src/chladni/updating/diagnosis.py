@@ -111,7 +111,7 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     winner = diagnosis.found or diagnosis.null
     if diagnosis.found:
         winner = _about_itself(problem, winner)
-    fits = adequacy(winner, problem.mass_measurement, problem.labels)
+    fits = adequacy(winner, problem.mass_measurement, problem.labels, damping=problem.damping)
     if fits is None:
         return diagnosis
     name = winner.effect.name if diagnosis.found else "calibration alone"

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
+from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
 from .map_fit import Fit, MassMeasurement, beside, fit, unknowns
@@ -43,6 +44,7 @@ class UpdatingProblem:
     ----------
     base : ordinary parameters and nuisances, free in every fit
     nuisance : the nuisances alone
+    damping : of the modes that were identified, where responses are compared
     """
 
     reduced: ReducedProblem
@@ -52,6 +54,7 @@ class UpdatingProblem:
     nuisance: tuple[Effect, ...]
     setup: Setup
     labels: tuple[str, ...] = ()
+    damping: ModalDamping | None = None
 
     @property
     def where(self) -> Surroundings:

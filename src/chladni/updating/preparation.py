@@ -25,6 +25,7 @@ from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
+from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
 from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
@@ -116,6 +117,7 @@ def _by_responses(question: Question) -> Prepared:
             f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
         )
     notes += _mass_note(question)
+    problem = replace(problem, damping=modal_damping(found, low, fit_max))
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     few = too_little(seen, int(data[0].use.any(axis=0).sum()))
     return Prepared(
