@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from chladni.geometry.facets import point_normals, tangents
-from chladni.model.assembly import Assembly, Bushes, Masses
+from chladni.model.assembly import Assembly, Masses
 
 from .footing import Spots, nearest_rows, rows_of_part
 from .response_of_article import Coupling
@@ -112,28 +112,6 @@ def with_lumps(assembly: Assembly, rows: np.ndarray, mass: float) -> Assembly:
         np.concatenate([old.matrix, matrix]),
     )
     return replace(assembly, masses=new)
-
-
-def with_ground_springs(
-    assembly: Assembly, rows: np.ndarray, directions: np.ndarray, k: float
-) -> Assembly:
-    """Springs to ground k e eᵀ at rows of points along directions (n, 3)."""
-    old, n = assembly.bushes, len(rows)
-    first = int(old.ids.max(initial=2 * 10**6)) + 1
-    u, v = tangents(directions)
-    stiffness = np.zeros((n, 6))
-    stiffness[:, 0] = k
-    none = np.zeros((n, 6))
-    new = Bushes(
-        np.append(old.ids, first + np.arange(n)),
-        np.concatenate([old.nodes, np.column_stack([rows, np.full(n, -1)])]),
-        np.concatenate([old.frame, np.stack([directions, u, v], axis=1)]),
-        np.concatenate([old.place, assembly.points[rows]]),
-        np.concatenate([old.stiffness, stiffness]),
-        np.concatenate([old.viscous, none]),
-        np.concatenate([old.loss, none]),
-    )
-    return replace(assembly, bushes=new)
 
 
 def near_outputs(site: Site) -> np.ndarray:

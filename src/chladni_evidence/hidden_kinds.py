@@ -8,10 +8,11 @@ import numpy as np
 from chladni.errors import ModelError
 from chladni.geometry.facets import cell_normals
 from chladni.model.assembly import Assembly
+from chladni.model.ground_springs import with_ground_bushes
 from chladni.model.properties import Isotropic, Orthotropic, ShellSection
 
 from .footing import nearest_rows
-from .hidden import Hidden, Site, near_outputs, with_ground_springs, with_lumps
+from .hidden import Hidden, Site, near_outputs, with_lumps
 from .part_scatter import scaled
 
 STEEP = 0.95  # cosine between normal and grain: beyond, a shell keeps an axis of its own
@@ -42,7 +43,7 @@ def extra_support(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     row, k = site.row(rng), float(np.exp(rng.uniform(-3.0, -0.7))) * site.scale * size
     n = site.normal(row)
     truth = {"value": k, "point_m": site.article.points[row].tolist(), "direction": n.tolist()}
-    return Hidden(with_ground_springs(site.article, np.array([row]), n[None], k), truth)
+    return Hidden(with_ground_bushes(site.article, np.array([row]), n[None], k), truth)
 
 
 def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
@@ -59,7 +60,7 @@ def suspension(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     rows = np.array([_nearest(a, every, x) for x in site.hangers])
     k = float(np.exp(rng.uniform(-3.9, -2.5))) * site.scale * size
     n = np.array([site.normal(int(r)) for r in rows])
-    return Hidden(with_ground_springs(a, rows, n, k), {"value": k})
+    return Hidden(with_ground_bushes(a, rows, n, k), {"value": k})
 
 
 def _nearest(a: Assembly, parts: np.ndarray, point: np.ndarray) -> int:

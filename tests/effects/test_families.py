@@ -143,17 +143,22 @@ def test_begins_anew_where_it_moved_to(reduced, by_responses, kind):
     """Half a patch off its start it stays; a grid off, it begins at the grid it moved to."""
     where = by_responses.where
     effect = kind.near(where, where.grids.position(25))
-    assert effect.recentred(np.array([0.3, 0.5, -0.5]), where) is None
+    rest = np.zeros(len(effect.parameters) - 3)
+    assert effect.recentred(np.array([0.3, 0.5, -0.5, *rest]), where) is None
     size = effect.patch.size
     step = (
         where.grids.point[where.grids.position(26)] - effect.patch.origin
     ) @ effect.patch.plane.T
-    x = np.array([0.3, *(step / size)])
+    x = np.array([0.3, *(step / size), *rest])
     again, start = effect.recentred(x, where)
     assert again.grids == (26,)
     assert again.trials_factor == len(where.places)
     model = reduced.model_for(effect, x)
-    moved, anew, old = lam(model, effect, x), lam(model, again, start), np.array([0.3, 0.0, 0.0])
+    moved, anew, old = (
+        lam(model, effect, x),
+        lam(model, again, start),
+        np.array([0.3, 0.0, 0.0, *rest]),
+    )
     assert np.abs(anew - moved).max() < 0.5 * np.abs(lam(model, effect, old) - moved).max()
 
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from chladni.fem.energy import mass_properties
+from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.footing import Spots, footing
-from chladni_evidence.hidden import Hidden, Site, with_ground_springs, with_lumps
+from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import CATALOGUED, calibration, orthotropic, thinning
 from chladni_evidence.outside_kinds import crack, duplicated, foam, friction, resonator, rotor
 from chladni_evidence.part_scatter import WELDS, scattered
@@ -55,7 +56,7 @@ def test_a_coupled_spring_is_an_assembled_one(site):
     (Modal damping belongs to the modes of the whole, so that with it the two are not the same.)
     """
     row, coupling = spring(site, 2e4)
-    built = with_ground_springs(site.article, row, np.array([[0.0, 0, 1]]), 2e4)
+    built = with_ground_bushes(site.article, row, np.array([[0.0, 0, 1]]), 2e4)
     plain = response(site, Hidden(site.article, {}), 0.0)
     one = response(site, Hidden(site.article, {}, (coupling,)), 0.0)
     assert decades_apart(one, plain) > 0.1

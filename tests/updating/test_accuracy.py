@@ -42,7 +42,7 @@ def changes(reduced):
         "thinning": (thickness_distribution(groups, 0, 1), start),
         "mass": (PointMass.near(where, k), np.array([1.0, 0.2, 0.1])),
         "masses": (sensor_mass(where)[0], np.array([0.5])),
-        "spring": (ExtraSupport.near(where, k), np.array([2.0, 0.1, 0.2])),
+        "spring": (ExtraSupport.near(where, k), np.array([2.0, 0.1, 0.2, 0.0, 0.0])),
     }  # fmt: skip
 
 

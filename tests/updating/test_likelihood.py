@@ -27,7 +27,7 @@ def effects(reduced):
     ]  # fmt: skip
 
 
-X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.15, -0.3])
+X = np.array([0.03, -0.02, 0.2, 0.1, -0.2, -1.0, -0.1, 0.3, 0.2, -0.1, 0.15, -0.3])
 
 
 @pytest.fixture(scope="module")

@@ -4,20 +4,32 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+import scipy.sparse as sp
 
+from ..geometry.facets import tangents
 from ..model.assembly import Assembly
+from ..model.ground_springs import with_ground_bushes
+from .effect import Effect, Parameter, PointTerm
+from .estimate import Location
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, attachments, moved, patch, there
 from .points import strength, with_springs
 from .search_context import Candidate, SearchContext
 from .surroundings import Surroundings
 
+TILT = 0.5  # prior sd of the tangent of its tilt: folds of a sheet have normals up to 45 deg apart
+FLATTEST = 0.2  # cosine to a new normal below which the tilt is no longer followed
+ACROSS = 0.97  # cosine to the normal up to which a direction is not worth a word
 TRIED = np.exp(np.linspace(-4.5, 4.5, 9))  # multiples of the prior median
 
 
 @dataclass(frozen=True, eq=False)
 class ExtraSupport(MovableAttachment):
-    """A spring to ground at an unknown place."""
+    """A spring to ground at an unknown place, in about the direction of the normal.
+
+    x = (ln strength, place along both axes of the patch, tilt towards each of them): what touches
+    an edge or a fold seldom pushes along a normal.
+    """
 
     name = "extra-support"
     claim = "the structure touches something stiff that the model does not have"
@@ -27,28 +39,66 @@ class ExtraSupport(MovableAttachment):
         """A spring along the normal near the k-th grid."""
         K = strength("K", "N/m", where.setup.stiffness, 2.0, (-2.0, 0.0, 2.0))
         n = where.grids.normal[k]
-        return cls(moved(K), patch=patch(where, k, n[None]), direction=n, **there(where, k))
+        tilt = [Parameter(f"tilt {a}", "-", 0.0, TILT, kind="linear", step=0.2) for a in "uv"]
+        axes = np.stack([n, *tangents(n)])
+        return cls((*moved(K), *tilt), patch=patch(where, k, axes), direction=n, **there(where, k))
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """One spring along the tilted direction."""
+        assert self.patch is not None
+        at, (d, slopes) = self.patch.size * x[1:3], _tilted(x[3:])
+        every = self.patch.at(at)
+        c = self.parameters[0].value(x[0])
+        moving = {
+            1 + k: sp.csr_array(d[None] @ self.patch.slope(at, k)) * self.patch.size
+            for k in range(2)
+        } | {3 + k: sp.csr_array(slopes[k][None] @ every) for k in range(2)}
+        rows = sp.csr_array(d[None] @ every)
+        return (PointTerm("K", rows, np.array([c]), c * np.eye(5)[:1], moving),)
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """Across the sheet at the grids next to the start; within it, where it moves little."""
+        assert self.patch is not None
+        near = np.argsort((self.patch.flat**2).sum(axis=1))
+        across, *within = self.patch.rows
+        return sp.csr_array(sp.vstack([across[near[:7]], *(rows[near[:3]] for rows in within)]))
+
+    def pushes(self, x: np.ndarray) -> np.ndarray:
+        """Its direction in the basic frame (3,)."""
+        return np.asarray(_tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)]))
+
+    def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
+        """About the grid it moved to, pushing as it did."""
+        again = super().recentred(x, where)
+        if again is None:
+            return None
+        effect, start = again
+        assert isinstance(effect, ExtraSupport)
+        d, n = self.pushes(x), effect.direction
+        d = d * np.copysign(1.0, d @ n)
+        tilt = np.stack(tangents(n)) @ d / max(float(d @ n), FLATTEST)
+        return effect, np.append(start[:3], tilt)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground shared by the grids round the place."""
-        assert self.patch is not None
-        k, at = self.parameters[0].value(x[0]), self.patch.size * x[1:3]
-        for grid, part in self.shares(at):
-            assembly = with_springs(assembly, (grid,), self.direction[None], k * part)
-        return assembly
+        """CBUSH to ground at the place, led to from the nearest grid."""
+        row = assembly.rows([self.nearest(x)])
+        k, d = self.parameters[0].value(x[0]), self.pushes(x)
+        return with_ground_bushes(assembly, row, d[None], k, self.at(x)[None])
 
-    def shares(self, at: np.ndarray) -> list[tuple[int, float]]:
-        """The nearest grids and their shares of the spring, linear in the distance."""
-        assert self.patch is not None
-        d = np.linalg.norm(self.patch.flat - at, axis=1)
-        near = np.argsort(d)[:3]
-        if d[near[0]] < 0.15 * self.patch.size:
-            return [(int(self.patch.grids[near[0]]), 1.0)]
-        A = np.vstack([self.patch.flat[near].T, np.ones(3)])
-        w = np.clip(np.linalg.lstsq(A, np.append(at, 1.0), rcond=None)[0], 0.0, None)
-        return [
-            (int(self.patch.grids[k]), float(v / w.sum())) for k, v in zip(near, w, strict=True)
-        ]
+    def location(self, x: np.ndarray) -> Location:
+        """The place a fit moved it to, and how it pushes where that is not across the sheet."""
+        found, d = super().location(x), self.pushes(x)
+        if abs(d @ self.direction) > ACROSS:
+            return found
+        return replace(found, text=f"{found.text}, along ({', '.join(f'{v:.2f}' for v in d)})")
+
+
+def _tilted(tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unit vector (1, u, v)/√(1 + u² + v²) (3,), and its slopes along u and v (2, 3)."""
+    raw = np.array([1.0, *tilt])
+    size = float(np.linalg.norm(raw))
+    d = raw / size
+    return d, np.array([(e - d * d[k]) / size for k, e in zip((1, 2), np.eye(3)[1:], strict=True)])
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
@@ -72,6 +122,6 @@ FAMILY = Family(
     ExtraSupport,
     conceal,
     candidates=candidates,
-    cards=("CELAS2",),
+    cards=("CBUSH", "PBUSH", "CORD2R"),
     settled_by="lift the structure off whatever touches it there, and measure again",
 )

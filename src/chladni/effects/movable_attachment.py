@@ -99,10 +99,10 @@ class MovableAttachment(Effect):
 
     def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
         """About the grid it moved to, once that lies farther than ``FAR`` of the patch's size."""
-        if np.abs(x[1:]).max() < FAR:
+        if np.abs(x[1:3]).max() < FAR:
             return None
         k = where.grids.position(self.nearest(x))
-        return self.near(where, k), np.array([x[0], 0.0, 0.0])
+        return self.near(where, k), np.array([x[0], 0.0, 0.0, *x[3:]])
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
@@ -191,7 +191,8 @@ def attachments(
             finer = context.scan.point_scores(about, matrix, strengths, closer)
             best, level = np.unravel_index(np.argmin(finer), finer.shape)
             effect, c = near(where, grids.position(closer.grids[best])), strengths[level]
-            start = np.array([np.log(c / effect.parameters[0].scale), 0.0, 0.0])
+            start = np.array([p.mean for p in effect.parameters])
+            start[0] = np.log(c / effect.parameters[0].scale)
             out.append(Candidate(effect, start, base))
     return out
 

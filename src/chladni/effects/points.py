@@ -1,11 +1,12 @@
 """What sits at points: masses and springs at known or unknown places."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly, Scalars
+from ..model.assembly import Assembly
+from ..model.ground_springs import with_springs as with_springs
 from ..model.point_masses import with_masses as with_masses
 from .effect import Effect, Parameter, PointTerm
 
@@ -51,26 +52,3 @@ class MassEffect(AtPoints):
 def strength(name: str, unit: str, scale: float, sd: float, starts: tuple[float, ...]) -> Parameter:
     """A log-normal strength with median ``scale``."""
     return Parameter(name, unit, 0.0, sd, scale, step=1.0, starts=starts, nominal=NOTHING)
-
-
-def with_springs(
-    assembly: Assembly, grids: tuple[int, ...], directions: np.ndarray, k: float
-) -> Assembly:
-    """Springs k to ground, k d_i² along each axis of the grid's frame (cross terms neglected)."""
-    rows = assembly.rows(list(grids))
-    local = directions if assembly.axes is None else np.einsum(
-        "kij,kj->ki", assembly.axes[rows], directions
-    )  # fmt: skip
-    at, component = np.nonzero(np.abs(local) > 0.1)
-    values = k * local[at, component] ** 2
-    old, n = assembly.springs, len(at)
-    first = int(old.ids.max(initial=0)) + 1
-    ground = np.full(n, -1)
-    new = Scalars(
-        np.append(old.ids, first + np.arange(n)),
-        np.concatenate([old.nodes, np.stack([rows[at], ground], axis=1)]),
-        np.concatenate([old.component, np.stack([component + 1, component * 0 + 1], axis=1)]),
-        np.append(old.value, values),
-        np.append(old.damping, np.zeros(n)),
-    )
-    return replace(assembly, springs=new)

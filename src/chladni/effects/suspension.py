@@ -18,7 +18,7 @@ class Suspension(AtPoints):
     claim = "the suspension's stiffness is missing from the model"
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 to ground at each hanger."""
+        """A spring to ground at each hanger: CELAS2, or CBUSH where it is askew."""
         k = self.parameters[0].value(x[0])
         return with_springs(assembly, self.grids, self.directions, k)
 
@@ -56,6 +56,6 @@ FAMILY = Family(
     Suspension,
     conceal,
     placed=suspension,
-    cards=("CELAS2",),
+    cards=("CELAS2", "CBUSH", "PBUSH", "CORD2R"),
     settled_by="measure again on softer cords",
 )

@@ -193,7 +193,7 @@ def test_masses(deck, offset):
 
 
 def test_springs_to_ground(deck):
-    """An oblique spring is one along each axis; element ids stay unique beside new masses."""
+    """An oblique spring is a bush in its own frame; element ids stay unique beside new masses."""
     made, before, units = deck
     grids = tuple(int(i) for i in before.ids[[0, 17]])
     after = with_springs(before, grids, np.array([[0, 0, 1.0], [0.6, 0, 0.8]]), 4321.0)
@@ -203,9 +203,9 @@ def test_springs_to_ground(deck):
     np.testing.assert_allclose(got.frequency[2:], due.frequency[2:], rtol=1e-6, atol=0.05)
     np.testing.assert_allclose(found.springs.value, after.springs.value, rtol=1e-6)
     np.testing.assert_array_equal(found.springs.component[:, 0], after.springs.component[:, 0])
-    assert len({*found.springs.ids, *found.masses.ids, *found.shells.ids}) == 3 + 2 + len(
-        found.shells
-    )
+    np.testing.assert_allclose(found.bushes.frame[:, 0], [[0.6, 0, 0.8]], atol=1e-6)
+    ids = {*found.springs.ids, *found.bushes.ids, *found.masses.ids, *found.shells.ids}
+    assert len(ids) == 1 + 1 + 2 + len(found.shells)
     assert gone == []
 
 

@@ -15,7 +15,12 @@ from .. import Add, Deck, Replace, SetColumns, SetField
 from .changes import Change
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
-from .split_properties import bending_changes, split_changes, with_new_properties
+from .split_properties import (
+    bending_changes,
+    property_ids,
+    split_changes,
+    with_new_properties,
+)
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
@@ -37,7 +42,11 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after)
     out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
-    cards = [*_masses(before, after, units), *_springs(before, after, units)]
+    cards = [
+        *_masses(before, after, units),
+        *_springs(before, after, units),
+        *_bushes(deck, before, after, units),
+    ]
     if cards:
         out.append(Add(cards, "put in by the diagnosis"))
     return out
@@ -164,9 +173,7 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     z = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = z - x * (x @ z)
     z = z / np.linalg.norm(z)
-    cid = 1 + max(
-        (i for kind in deck.cards if kind[:4] == "CORD" for i in _cids(deck, kind)), default=900
-    )
+    cid = _free_system(deck)
     out: list[Change] = [
         Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
     ]
@@ -181,6 +188,12 @@ def _ids(deck: Deck, kind: str) -> list[int]:
         return []
     words = deck[kind].words(1).tolist()
     return [int(w) for w in words if w.isdigit()]
+
+
+def _free_system(deck: Deck) -> int:
+    """An id above those of all coordinate systems."""
+    kinds = [kind for kind in deck.cards if kind.startswith("CORD")]
+    return 1 + max((i for kind in kinds for i in _cids(deck, kind)), default=900)
 
 
 def _cids(deck: Deck, kind: str) -> list[int]:
@@ -247,6 +260,23 @@ def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     for k in range(n, len(s)):
         grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
         yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
+
+
+def _bushes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CBUSH that was added, with its PBUSH and the CORD2R of its frame."""
+    b = after.bushes
+    first = _free_id(after) + len(after.masses) + len(after.springs)
+    system, pid = _free_system(deck), 1 + max(property_ids(deck))
+    unit = units.force / units.length
+    for n, k in enumerate(range(len(before.bushes), len(b))):
+        if np.any(b.stiffness[k, 3:]) or np.any(b.viscous[k]) or np.any(b.loss[k]):
+            raise ModelError("a bush that turns or dissipates was added; CBUSH here is a spring")
+        x, _, z = b.frame[k]
+        yield ["CORD2R", system + n, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
+        yield ["PBUSH", pid + n, "K", *(b.stiffness[k, :3] / unit).tolist()]
+        ends = [int(after.ids[row]) if row >= 0 else None for row in b.nodes[k]]
+        place = (b.place[k] / units.length).tolist()
+        yield ["CBUSH", first + k, pid + n, *ends, *[None] * 3, system + n, None, 0, *place]
 
 
 def _free_id(assembly: Assembly) -> int:

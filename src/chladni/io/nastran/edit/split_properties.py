@@ -30,7 +30,7 @@ def with_new_properties(
     if (after.shells.part[moved] < known).any():
         raise ModelError("a shell went from one property of the deck to another one")
     old, new, split = list(before.parts), list(after.parts), Split()
-    free = 1 + max(max(p.id for p in new), *_property_ids(deck))
+    free = 1 + max(max(p.id for p in new), *property_ids(deck))
     for k in range(known, len(new)):
         sources = set(before.shells.part[after.shells.part == k].tolist())
         if len(sources) != 1:
@@ -77,7 +77,7 @@ def bending_changes(before: Assembly, after: Assembly) -> list[Change]:
     ]
 
 
-def _property_ids(deck: Deck) -> list[int]:
+def property_ids(deck: Deck) -> list[int]:
     """Ids of all cards that may be properties; 0 where there is none."""
     kinds = [kind for kind in deck.cards if kind.startswith("P")]
     words = [word for kind in kinds for word in deck[kind].words(1).tolist()]

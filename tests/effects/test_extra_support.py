@@ -1,0 +1,68 @@
+"""A support that pushes askew: what a deck then holds is what the fit meant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.surroundings import Setup, Surroundings
+from chladni.fem.assemble import structure
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import reduced_problem
+from chladni_specimens.plates import plate
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduced_problem(plate(0.4, 0.3, 8, 6, 1.5e-3), 250.0)
+
+
+@pytest.fixture(scope="module")
+def where(reduced):
+    setup = Setup((), (), float(reduced.groups.weight.sum()), 200.0)
+    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+
+
+@pytest.fixture(scope="module")
+def support(where):
+    """Soft enough that the sheet does not dent beneath it: the patch is smoother than a dent."""
+    return ExtraSupport.near(where, where.grids.position(25))
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.4, -0.7), (1.0, 0.0)])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.3, -0.25)])
+def test_the_deck_has_the_modes_of_the_fit(reduced, support, tilt, place):
+    """One spring along one direction where the fit put it, not one along each axis of a grid."""
+    x = np.array([-3.0, *place, *tilt])
+    model = reduced.model_for(support, x)
+    lam = evaluate(model, [support], x, False).lam[:12]
+    fitted = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+    written = support.apply(reduced.structure.assembly, x)
+    assert_allclose(written.bushes.place[-1], support.at(x))
+    full = normal_modes(structure(written).system, 12).frequency
+    assert_allclose(fitted[full > 1], full[full > 1], rtol=3e-3)
+    held = int((full > 0.2).sum())
+    assert held == 7  # one rigid motion is held, five are free
+
+
+def test_it_pushes_along_a_unit_vector(support):
+    for tilt in ((0.0, 0.0), (0.3, 0.2), (-2.0, 1.0)):
+        d = support.pushes(np.array([0.0, 0.0, 0.0, *tilt]))
+        assert_allclose(np.linalg.norm(d), 1)
+        assert_allclose(d @ support.direction, 1 / np.sqrt(1 + np.sum(np.square(tilt))))
+
+
+def test_begun_anew_it_pushes_as_before(where, support):
+    x = np.array([0.3, 1.0, 0.0, 0.2, -0.4])
+    again, start = support.recentred(x, where)
+    assert_allclose(again.pushes(start), support.pushes(x), atol=1e-9)
+    turned = replace(again, direction=-again.direction)
+    assert_allclose(np.abs(turned.pushes(start) @ turned.direction), again.pushes(start)[2])
+
+
+def test_a_tilt_worth_a_word_is_said(support):
+    assert "along" not in support.location(np.zeros(5)).text
+    assert "along (" in support.location(np.array([0, 0, 0, 1.0, 0])).text
