@@ -60,12 +60,15 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
         (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), 2.0, REST),
         (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
         (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
+        (1.9 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, LITTLE),
+        (2.1 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, REST),  # the data are at odds
     ],
 )
 def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, harm, called):
     """No name then, and nothing of it in the deck that is reported.
 
-    Where all data together still refute calibration alone, something is missing all the same.
+    Where all data together, or what was fitted by far, still refute calibration alone, something is
+    missing all the same.
     """
     monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
     scores = FittedScores(1.0, harm, 1.0)
@@ -76,7 +79,7 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
         hypothesis.model,
     )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
-    problem = SimpleNamespace(mass_measurement=None, labels=())
+    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None)
     judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
     assert judged.verdict == called
     assert (judged.written is not None) == (called == NAMED)

@@ -73,6 +73,7 @@ def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
     return own if own.any() else held
 
 
+CONFLICT = 2.0  # times the gain due: what was fitted refutes calibration, whatever else says
 HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
 
 
@@ -82,8 +83,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     The fitted data must carry a name after the fit was renewed.  The others refuse it as surely:
     where they speak against it by the gain that would be needed to name it, where less than that is
     left of all data together, or where the deck with the effect does harm.  Data that cannot feel
-    the effect are predicted alike without it and have no vote.  Where all data together still want
-    more than calibration, what is missing is not in the catalogue.
+    the effect are predicted alike without it and have no vote.  Where all data together, or what
+    was fitted by far, still want more than calibration, what is missing is not in the catalogue.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -107,15 +108,19 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
     refused = replace(diagnosis, verdict=plainly, notes=notes, written=None)
-    return tested(refused, problem) if together <= due else _unexplained(refused, lead, together)
+    if together > due:
+        return _unexplained(refused, lead, together, "all data")
+    if gain > CONFLICT * due:
+        return _unexplained(refused, lead, gain, "what was fitted")
+    return tested(refused, problem)
 
 
-def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, together: float) -> Diagnosis:
-    """Calibration alone is refuted by all data together, and what refuted it is refused."""
-    p = float(min(1.0, len(families()) * np.exp(-together / 2)))
+def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str) -> Diagnosis:
+    """Calibration alone is refuted by some data, and what refuted it is refused by others."""
+    p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = (
-        f"{lead.effect.name} explains all data e^{together / 2:.0f} times better than calibration "
-        "alone, yet not those that no fit saw"
+        f"{lead.effect.name} explains {of} e^{gain / 2:.0f} times better than calibration "
+        "alone, yet not the data that no fit saw"
     )
     fits = FitTest(False, p, what, lead.effect.text)
     note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
