@@ -11,7 +11,7 @@ from chladni.effects.ordinary import ordinary
 from chladni.effects.points import AtPoints
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.scan import baseline, direction_scores, point_scores, thickness_slopes
+from chladni.updating.scan import baseline, direction_scores, field_slopes, point_scores
 
 WEIGHED = MassMeasurement(1.45, 0.01)
 STRENGTHS = {"M": np.array([0.003, 0.04, 0.3]), "K": np.array([30.0, 2e3, 1e5])}
@@ -91,7 +91,7 @@ def test_score_has_the_base_profiled_out(base):
 
 
 def test_slopes_of_all_groups_together_are_the_slope_of_t(reduced, responses, base):
-    slopes = thickness_slopes(base, reduced.model, responses)
+    slopes = field_slopes(base, reduced.model, responses, "t")
     whole = ordinary(reduced.groups, "t", [0])
     state = evaluate(reduced.model, [*base.effects, whole], np.append(base.x, 0.0))
     _, J = responses.residual(state, True)

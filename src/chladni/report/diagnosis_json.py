@@ -15,6 +15,7 @@ from ..updating.result import (
     FitStatistic,
     FrequencyError,
     FrequencyRow,
+    LeftPlace,
     MassComparison,
     NamedEffect,
     Remainder,
@@ -68,7 +69,7 @@ def _effect(e: NamedEffect) -> dict[str, Any]:
         "name": e.name,
         "claim": e.claim,
         "log_evidence": e.log_evidence,
-        "where": _location(e.where),
+        "where": _lists(e.where),
         "parameters": [_estimate(p) for p in e.parameters],
     }
 
@@ -77,13 +78,17 @@ def _estimate(p: Estimate) -> dict[str, Any]:
     return dict(vars(p))
 
 
-def _location(where: Location) -> dict[str, Any]:
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in vars(where).items()}
+def _lists(place: Location | LeftPlace) -> dict[str, Any]:
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in vars(place).items()}
+
+
+def _tuples(place: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in place.items() if v is not None}
 
 
 def _alternative(a: Alternative) -> dict[str, Any]:
     row: dict[str, Any] = {"name": a.name, "log_evidence": a.log_evidence, "why_not": a.why_not}
-    return row if a.where is None else {**row, "where": _location(a.where)}
+    return row if a.where is None else {**row, "where": _lists(a.where)}
 
 
 def _fit(a: Agreement) -> dict[str, Any]:
@@ -101,12 +106,17 @@ def _scores(scores: Scores) -> dict[str, float | None]:
 
 
 def _adequate(found: Adequacy) -> dict[str, Any]:
-    return {**vars(found), "statistics": [dict(vars(row)) for row in found.statistics]}
+    return {
+        **vars(found),
+        "where": [_lists(place) for place in found.where],
+        "statistics": [dict(vars(row)) for row in found.statistics],
+    }
 
 
 def _read_adequate(d: Mapping[str, Any]) -> Adequacy:
     rows = tuple(_known(FitStatistic, row) for row in d.get("statistics") or ())
-    return Adequacy(d["passes"], d["p"], d["what"], tuple(d.get("where") or ()), rows)
+    where = tuple(_known(LeftPlace, _tuples(place)) for place in d.get("where") or ())
+    return Adequacy(d["passes"], d["p"], d["what"], where, rows)
 
 
 def from_json(d: Mapping[str, Any]) -> DiagnosisResult:

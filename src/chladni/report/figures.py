@@ -15,6 +15,7 @@ from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
 
 _GRID = 8  # channels in the overview
+CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
 Bands = Sequence[tuple[float, float]]
 
 
@@ -51,7 +52,7 @@ def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
     """Draw all that the result allows into ``folder``: {name known to the page: path}."""
     rows = [(r.test_hz, r.before_hz, r.after_hz) for r in result.frequencies]
     made = _places(folder, result, shown) | setup(folder, shown)
-    made |= _scores(folder, result)
+    made |= _scores(folder, result) | _left(folder, result, shown)
     made |= frequencies(folder, rows) | mac_picture(folder, shown)
     return made | curves(folder, shown)
 
@@ -108,6 +109,20 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
         rows = {s.name: (s.value, s.median, s.low, s.high) for s in result.adequate.statistics}
         made["fit_test"] = plots.fit_test(folder / "fit_test.png", rows)
     return made
+
+
+def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
+    """What the explanation leaves, on the mesh: grey where the test is blind."""
+    if result.left_where is None:
+        return {}
+    values = np.full(len(shown.seen.faces), np.nan)  # faces of shells come first
+    values[: len(result.left_where.gain)] = result.left_where.gain
+    top = max(float(np.nanmax(values)), CALM)
+    name = "gain of a local change of stiffness or mass [-2 ln p]"
+    path = scene.scalar_map(
+        folder / "left.png", shown.seen, values, name, cmap="magma_r", limits=(0.0, top)
+    )
+    return {"left": path}
 
 
 def _steps(q: Scores, named: bool) -> dict[str, float]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
-from ..updating.result import Agreement, NamedEffect, Scores
+from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
 from .words import interval, number, percent, quantity
@@ -41,6 +41,11 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
         "What the explanation leaves (dot), beside what draws of the model itself leave (bar: 99 % "
         "of them). A dot to the right of its bar is not explained; one to the left says that noise "
         "is believed larger than it is.",
+    ),
+    "left": (
+        "scores",
+        "Where a small local change of stiffness or mass would still gain, and how much, with what "
+        "is named in place; grey: so blind is the test there that half of either could be gone.",
     ),
     "deviation": ("scores", "Where the deviation is left: channel by band."),
     "frequencies": ("modes", "Deviation of each frequency from the test."),
@@ -163,7 +168,22 @@ def _glance(result: DiagnosisResult) -> list[Block]:
             mean, worst = 100 * sum(off) / len(off), 100 * max(off)
             text = f"mean {number(mean, 2)} %, worst {number(worst, 2)} % off"
             facts.append((f"Frequencies {name}", text))
+    if result.adequate is not None:
+        facts.append(("Does it fit", _fits(result.adequate)))
     return [Facts(facts)] if facts else []
+
+
+def _fits(test: Adequacy) -> str:
+    """The absolute test in one line."""
+    if test.passes:
+        return f"yes: a right model leaves as much in {number(100 * test.p, 2)} % of recordings"
+    place = "; ".join(_spot(place) for place in test.where)
+    return f"no: {test.what}{f' ({place})' if place else ''}"
+
+
+def _spot(place: LeftPlace) -> str:
+    parts = f"; on {', '.join(place.parts[:3])}" if place.parts else ""
+    return f"{place.text}{parts}{f', round grid {place.grid}' if place.grid else ''}"
 
 
 def _effects(effects: Sequence[NamedEffect]) -> list[Block]:

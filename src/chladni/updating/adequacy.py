@@ -41,6 +41,7 @@ class FitTest:
     what: str
     where: str
     statistics: tuple[FitStatistic, ...] = ()
+    modes_hz: tuple[float, ...] = ()  # natural frequencies nearest to what stands out
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +116,14 @@ def adequacy(
     sd = np.array([p.sd for p in unknowns(fit.effects)])
     own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
     p, least = ranked(seen, np.array(own))
-    where = _where(data, square, labels)
+    where, worst = _where(data, square, labels)
     ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
     rows = tuple(
         FitStatistic(name, float(value), *map(float, row))
         for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
     )
-    test = FitTest(p >= LEAST, p, NAMES[least].format(seen[least]), where, rows)
+    what = NAMES[least].format(seen[least])
+    test = FitTest(p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
     return test if damping is None else _evenly_damped(test, damping.above(_first(data, fit.state)))
 
 
@@ -140,7 +142,8 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     test = replace(test, statistics=(*test.statistics, row))
     if p >= min(test.p, LEAST):
         return test
-    return replace(test, passes=False, p=p, what=damping.said()[0], where=damping.said()[1])
+    what, where, modes = damping.said()
+    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
 
 
 def of_poles(data: Poles, state: State) -> FitTest:
@@ -189,10 +192,21 @@ def ranked(seen: np.ndarray, drawn: np.ndarray) -> tuple[float, int]:
     return float(np.mean(least <= least[0])), int(np.argmin(share[0]))
 
 
-def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> str:
-    """The line and the channel that leave most."""
+WORST = 3  # lines whose nearest modes are told
+
+
+def _where(data: Responses, square: np.ndarray, labels: tuple[str, ...]) -> tuple[str, np.ndarray]:
+    """The line and the channel that leave most, and the frequencies of the worst lines [Hz]."""
     f = data.s.imag / (2 * np.pi)
-    line = int(np.argmax(square.sum(axis=1) / np.maximum(data.use.sum(axis=1), 1)))
+    by_line = square.sum(axis=1) / np.maximum(data.use.sum(axis=1), 1)
     channel = int(np.argmax(square.sum(axis=0) / np.maximum(data.use.sum(axis=0), 1)))
     name = labels[channel] if channel < len(labels) else f"channel {channel + 1}"
-    return f"most near {f[line]:.0f} Hz and on {name}"
+    worst = f[np.argsort(-by_line)[:WORST]]
+    return f"most near {worst[0]:.0f} Hz and on {name}", worst
+
+
+def _modes_near(frequency: np.ndarray, state: State) -> tuple[float, ...]:
+    """The natural frequencies of the model nearest to some frequencies [Hz], each once."""
+    own = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+    nearest = {float(own[np.argmin(np.abs(own - f))]) for f in frequency}
+    return tuple(sorted(round(f, 2) for f in nearest))

@@ -15,7 +15,7 @@ from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
 from .reduced_model import evaluate
-from .scan import Baseline, baseline, direction_scores, point_scores, thickness_slopes
+from .scan import Baseline, baseline, direction_scores, field_slopes, point_scores
 
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
@@ -135,7 +135,7 @@ class Scan:
     def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
         base = self.context.baselines[about]
-        slopes = thickness_slopes(base, self.context.problem.reduced.model, self.data)
+        slopes = field_slopes(base, self.context.problem.reduced.model, self.data, "t")
         return direction_scores(base, slopes @ change)
 
 

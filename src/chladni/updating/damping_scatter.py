@@ -58,8 +58,8 @@ class ModalDamping:
         row = FitStatistic("uneven damping", float(seen[0]), float(median), float(low), float(high))
         return float(p.min()), row
 
-    def said(self) -> tuple[str, str]:
-        """What stands out, and where."""
+    def said(self) -> tuple[str, str, tuple[float, ...]]:
+        """What stands out, where, and at which frequencies [Hz]."""
         excess = np.log(self.ratio) - np.median(np.log(self.ratio))
         out = np.flatnonzero(excess > 3 * SCATTER)
         out = out if len(out) else np.array([int(np.argmax(excess))])
@@ -70,7 +70,8 @@ class ModalDamping:
             f"{len(out)} of {len(self.ratio)} modes are damped by {span}, the others by about "
             f"{usual:.1%}: something dissipates that stiffness and mass cannot explain"
         )
-        return what, "near " + ", ".join(f"{f:.4g}" for f in self.frequency[out][:8]) + " Hz"
+        modes = tuple(float(f) for f in self.frequency[out])
+        return what, "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz", modes
 
 
 def _statistics(log_ratio: np.ndarray) -> np.ndarray:

@@ -141,6 +141,17 @@ class FitStatistic:
     high: float
 
 
+@dataclass(frozen=True)
+class LeftPlace:
+    """Where what an explanation leaves sits: in words, by mode, by part and on the mesh."""
+
+    text: str
+    modes_hz: tuple[float, ...] = ()
+    parts: tuple[str, ...] = ()
+    grid: int | None = None
+    point_m: tuple[float, ...] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Adequacy:
     """The absolute test of the best explanation."""
@@ -148,5 +159,5 @@ class Adequacy:
     passes: bool
     p: float
     what: str
-    where: tuple[dict[str, object], ...] = ()
+    where: tuple[LeftPlace, ...] = ()
     statistics: tuple[FitStatistic, ...] = ()

@@ -112,17 +112,20 @@ def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Probe(Effect):
-    """Thickness of every group by itself."""
+    """A field, as t, E or rho, of every group by itself."""
+
+    field: str = "t"
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """ln t of each group is one parameter."""
-        return (FieldChange("t", x, np.eye(len(x))),)
+        """Its logarithm in each group is one parameter."""
+        return (FieldChange(self.field, x, np.eye(len(x))),)
 
 
-def thickness_slopes(base: Baseline, model: Reduced, data: Data) -> np.ndarray:
-    """∂r/∂ln t of every group, the row of the scales included (n, n_groups)."""
+def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
+    """∂r/∂ln t, E or rho of every group, the row of the scales included (n, n_groups)."""
     n = len(model.groups)
-    probe = _Probe(tuple(Parameter(f"t{g}", "m", 0.0, 1.0, kind="linear") for g in range(n)))
+    unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
+    probe = _Probe(unknown, field=field)
     state = evaluate(model, [*base.effects, probe], np.concatenate([base.x, np.zeros(n)]))
     _, J = data.scaled(state, True)
     if base.mass_measurement is not None:

@@ -27,6 +27,7 @@ from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.leaning import leaning
 from ..updating.least_data import withheld
+from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.outcome import (
     fitted_scores,
@@ -39,12 +40,14 @@ from ..updating.outcome import (
 from ..updating.preparation import prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
-from ..updating.result import Adequacy, MassComparison, Scores
+from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
+
+BLIND_SHARE = 0.05  # of the shells
 
 
 def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -156,6 +159,7 @@ def _result(
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
     left = remainder(prepared, found)
+    spot = left_where(last, asked.mass_measurement)
     weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
     return DiagnosisResult(
         verdict=found.verdict,
@@ -167,20 +171,23 @@ def _result(
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
-        adequate=_adequate(found),
-        notes=(*prepared.notes, *found.notes, *leaning(deck.fit), left.sentence),
+        adequate=_adequate(found, spot),
+        left_where=spot,
+        notes=(*prepared.notes, *found.notes, *leaning(deck.fit), left.sentence, *_blind(spot)),
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
     )
 
 
-def _adequate(found: Diagnosis) -> Adequacy | None:
+def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
     """The absolute test as the page has it."""
     test = found.adequacy
     if test is None:
         return None
-    place: dict[str, object] = {"text": test.where, "parts": [], "modes_hz": []}
+    place = LeftPlace(test.where, test.modes_hz)
+    if spot is not None:
+        place = replace(place, parts=spot.parts, grid=spot.grid, point_m=spot.point_m)
     where = () if test.passes else (place,)
     return Adequacy(test.passes, test.p, test.what, where, test.statistics)
 
@@ -189,6 +196,16 @@ def _article_mass(asked: Question, stages: UpdatedModels) -> float:
     """What the updated deck weighs: the structure as tested less its sensors [kg]."""
     sensors = sum(m for _, m in asked.carried)
     return mass_properties(stages.final.model.assembly)[0] - sensors
+
+
+def _blind(spot: LeftWhere | None) -> tuple[str, ...]:
+    """Where the sensors would not notice what is asked about, if that is much of the structure."""
+    if spot is None or spot.blind < BLIND_SHARE:
+        return ()
+    return (
+        f"on {spot.blind:.0%} of the sheet the test would not notice a local loss of half the "
+        "stiffness or mass (grey in the map of what is left)",
+    )
 
 
 def _scores(

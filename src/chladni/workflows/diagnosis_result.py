@@ -10,6 +10,7 @@ from ..dynamics.frf import FRF
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
+from ..updating.left_where import LeftWhere
 from ..updating.result import (
     Adequacy,
     Agreement,
@@ -74,6 +75,7 @@ class DiagnosisResult:
     searched : False where only ordinary parameters were fitted
     files : {what: name} of what was written beside it
     models : the structures; None where the result was read from a file
+    left_where : what the explanation leaves, on the mesh; None where frequencies were compared
     """
 
     verdict: str = ""
@@ -93,6 +95,7 @@ class DiagnosisResult:
     searched: bool = True
     files: dict[str, str | None] = field(default_factory=dict)
     models: UpdatedModels | None = None
+    left_where: LeftWhere | None = None
 
     @property
     def deck_changed(self) -> bool:

@@ -1,0 +1,92 @@
+"""Where on a structure lies what an explanation leaves, and where the test could not tell.
+
+Round every group of shells the stiffness, and the density, are changed a little, smoothly over a
+tenth of the sheet. To first order the best amount a of such a change lowers -2 ln p by
+(cᵀC⁻¹r)² / cᵀC⁻¹c with r the residual of the fit, c its slope along the change and C the covariance
+under all that the fit has free (Rao's score test, 1948). cᵀC⁻¹c is what the sensors know of it:
+where 1/√(cᵀC⁻¹c) is large, a place is blind.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.shell_groups import ShellGroups
+from .hypothesis_fit import HypothesisFit
+from .likelihood import Responses
+from .map_fit import MassMeasurement
+from .scan import baseline, direction_scores, field_slopes
+
+RADIUS = 0.1  # of a sheet's size, the square root of its area
+BLIND = 0.5  # relative change of stiffness and of mass that the data would not notice
+NEAR = 0.5  # of the best gain: parts that reach it are named too
+
+
+@dataclass(frozen=True, eq=False)
+class LeftWhere:
+    """What a small local change of stiffness or mass would still gain.
+
+    Attributes
+    ----------
+    gain : (m,)     in -2 ln evidence, of each shell of the assembly; NaN where the test is blind
+    parts : names of the parts that gain most, best first
+    grid, point_m : where the best change sits [m]
+    best : float    its gain
+    """
+
+    gain: np.ndarray
+    parts: tuple[str, ...]
+    grid: int
+    point_m: tuple[float, float, float]
+    best: float
+
+    @property
+    def blind(self) -> float:
+        """Share of the shells where the test would not notice half the stiffness or mass."""
+        return float(np.isnan(self.gain).mean())
+
+
+def left_where(
+    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
+) -> LeftWhere | None:
+    """The map of one explanation; None where frequencies were compared, or all is blind."""
+    data, fit, groups = hypothesis.data, hypothesis.fit, hypothesis.model.groups
+    if not isinstance(data, Responses) or data.error is None or not len(groups):
+        return None
+    base = baseline(hypothesis.model, fit.effects, data, mass_measurement, fit.x)
+    bumps = _bumps(groups)
+    gain = np.full(len(groups), np.nan)
+    for field in ("E", "rho"):
+        columns = field_slopes(base, hypothesis.model, data, field) @ bumps
+        score = direction_scores(base, columns)[1]
+        gained = base.score(base.residual[:, None])[0] - score
+        known = (columns**2).sum(axis=0) - ((base.Z @ columns) ** 2).sum(axis=0)
+        gained[known < 1 / BLIND**2] = np.nan
+        gain = np.fmax(gain, gained)
+    if np.isnan(gain).all():
+        return None
+    return _told(groups, gain)
+
+
+def _bumps(groups: ShellGroups) -> np.ndarray:
+    """A smooth change round each group, on its own sheet (g, g): one column each."""
+    sheet = groups.connected
+    area = np.bincount(sheet, groups.area)[sheet]
+    d2 = ((groups.centre[:, None] - groups.centre[None]) ** 2).sum(axis=2)
+    near = np.exp(-d2 / (2 * RADIUS**2 * area[None]))
+    return np.where(sheet[:, None] == sheet[None], near, 0.0)
+
+
+def _told(groups: ShellGroups, gain: np.ndarray) -> LeftWhere:
+    assembly = groups.structure.assembly
+    best = int(np.nanargmax(gain))
+    known = np.where(np.isnan(gain), -np.inf, gain)
+    order = [k for k in np.argsort(-known) if known[k] >= NEAR * known[best]]
+    parts = tuple(dict.fromkeys(assembly.parts[int(groups.part[k])].name for k in order))
+    rows = np.unique(groups.nodes[groups.group == best])
+    d = np.linalg.norm(assembly.points[rows] - groups.centre[best], axis=1)
+    row = int(rows[np.argmin(d)])
+    x, y, z = (float(v) for v in assembly.points[row])
+    return LeftWhere(
+        gain[groups.group], parts, int(assembly.ids[row]), (x, y, z), float(gain[best])
+    )
