@@ -5,7 +5,7 @@ E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is 
 eigenproblem; derivatives are exact, because K and M are known functions of the fields.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -19,6 +19,7 @@ from ..effects.shell_components import COMPONENTS, component_matrices
 from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
 from ..fem.energy import mass_properties
+from .matrix_stack import Bordered, MatrixStack, Whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +30,17 @@ class Reduced:
     ----------
     groups : of the structure's shells
     basis : (n, r)            M-orthonormal
-    linear, cubic : {component: (g, r, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
-    mass : (g, r, r)
+    linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
+    mass : (g, r)             these three are stacks of r by r matrices, one for each group
     K0, M0 : (r, r)           all that is no shell
     weight0 : float           mass beside the shells [kg]
     """
 
     groups: ShellGroups
     basis: np.ndarray
-    linear: dict[str, np.ndarray]
-    cubic: dict[str, np.ndarray]
-    mass: np.ndarray
+    linear: Mapping[str, MatrixStack]
+    cubic: Mapping[str, MatrixStack]
+    mass: MatrixStack
     K0: np.ndarray
     M0: np.ndarray
     weight0: float
@@ -67,26 +68,25 @@ class Reduced:
         if not new.shape[1]:
             return self
 
-        def grown(old: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+        def grown(old: MatrixStack, matrices: np.ndarray) -> Bordered:
             side = self.groups.project(matrices, self.basis, new)
-            return _bordered(old, side, self.groups.project(matrices, new))
+            return Bordered(old, side, self.groups.project(matrices, new))
 
-        def rest(old: np.ndarray, A: sp.csr_array, shells: np.ndarray) -> np.ndarray:
+        def rest(old: np.ndarray, A: sp.csr_array, shells: Sequence[Bordered]) -> np.ndarray:
             r = len(old)
             full = basis.T @ (A @ new)
-            out = _bordered(old, full[:r], full[r:])
-            out[:, r:] -= shells.sum(axis=0)[:, r:]
-            out[r:, :r] = out[:r, r:].T
-            return out
+            side = full[:r] - sum(stack.side.sum(axis=0) for stack in shells)
+            corner = full[r:] - sum(stack.corner.sum(axis=0) for stack in shells)
+            return np.block([[old, side], [side.T, corner]])
 
         pieces = self.pieces()
         linear = {k: grown(self.linear[k], A) for k, (A, _) in pieces.items()}
         cubic = {k: grown(self.cubic[k], B) for k, (_, B) in pieces.items()}
         mass = grown(self.mass, self.groups.mass)
-        stiff = sum(linear.values()) + sum(cubic.values())
+        stiff = [*linear.values(), *cubic.values()]
         return replace(
             self, basis=basis, linear=linear, cubic=cubic, mass=mass,
-            K0=rest(self.K0, system.K.real, np.asarray(stiff)), M0=rest(self.M0, system.M, mass),
+            K0=rest(self.K0, system.K.real, stiff), M0=rest(self.M0, system.M, [mass]),
             _seen={},
         )  # fmt: skip
 
@@ -104,16 +104,9 @@ class Reduced:
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
         pieces = component_matrices(self.groups.structure.assembly)
-        linear = {k: self.groups.project(A, self.basis) for k, (A, _) in pieces.items()}
-        cubic = {k: self.groups.project(B, self.basis) for k, (_, B) in pieces.items()}
+        linear = {k: Whole(self.groups.project(A, self.basis)) for k, (A, _) in pieces.items()}
+        cubic = {k: Whole(self.groups.project(B, self.basis)) for k, (_, B) in pieces.items()}
         return replace(self, linear=linear, cubic=cubic)
-
-
-def _bordered(old: np.ndarray, side: np.ndarray, corner: np.ndarray) -> np.ndarray:
-    """[[old, side], [sideᵀ, corner]] over the last two axes."""
-    top = np.concatenate([old, side], axis=-1)
-    low = np.concatenate([side.swapaxes(-1, -2), corner], axis=-1)
-    return np.concatenate([top, low], axis=-2)
 
 
 def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
@@ -125,7 +118,7 @@ def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
     M = basis.T @ (system.M @ basis)
     rest = mass_properties(groups.structure.assembly)[0] - float(groups.weight.sum())
     return Reduced(
-        groups, basis, {"": linear}, {"": cubic}, mass,
+        groups, basis, {"": Whole(linear)}, {"": Whole(cubic)}, Whole(mass),
         _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),
         _symmetric(M - mass.sum(axis=0)), max(rest, 0.0),
     )  # fmt: skip
@@ -261,31 +254,31 @@ def _shells(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """K, M and their derivatives (n_p, r, r) from the fields."""
-    r = model.K0.shape[0]
-    n_p = slopes["t"].shape[1]
-    K, M = model.K0.ravel().copy(), model.M0.ravel().copy()
-    dK, dM = np.zeros((n_p, r * r)), np.zeros((n_p, r * r))
+    r, n_p = len(model.K0), slopes["t"].shape[1]
+    K, M, dK, dM = model.K0.copy(), model.M0.copy(), np.zeros((n_p, r, r)), np.zeros((n_p, r, r))
     for stacks, power in ((model.linear, 1), (model.cubic, 3)):
         for name, stack in stacks.items():
-            w, flat = np.exp(stiffness_log(logs, name, power)), stack.reshape(len(stack), r * r)
-            K += w @ flat
-            if gradient:
-                dK += _weighted(w[:, None] * stiffness_log(slopes, name, power), flat)
-    w, flat = np.exp(mass_log(logs)), model.mass.reshape(len(model.mass), r * r)
-    M += w @ flat
-    if gradient:
-        dM += _weighted(w[:, None] * mass_log(slopes), flat)
-    shape = (n_p, r, r)
-    return K.reshape(r, r), M.reshape(r, r), dK.reshape(shape), dM.reshape(shape)
+            w = np.exp(stiffness_log(logs, name, power))
+            change = w[:, None] * stiffness_log(slopes, name, power)
+            _add(stack, w, change if gradient else None, K, dK)
+    w = np.exp(mass_log(logs))
+    _add(model.mass, w, w[:, None] * mass_log(slopes) if gradient else None, M, dM)
+    return K, M, dK, dM
 
 
-def _weighted(weights: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """weightsᵀ flat, only for the parameters that have any weight (n_p, r²)."""
-    out = np.zeros((weights.shape[1], flat.shape[1]))
-    active = np.flatnonzero(np.abs(weights).max(axis=0) > 0) if len(weights) else np.zeros(0, int)
-    if len(active):
-        out[active] = weights[:, active].T @ flat
-    return out
+def _add(
+    stack: MatrixStack, w: np.ndarray, change: np.ndarray | None, A: np.ndarray, dA: np.ndarray
+) -> None:
+    """Add Σ_g w_g A_g to A, and its slopes to those of the parameters that have any."""
+    if not len(w):
+        return
+    active = np.zeros(0, int)
+    if change is not None:
+        active = np.flatnonzero(np.abs(change).max(axis=0) > 0)
+        w = np.vstack([w, change[:, active].T])
+    every = stack.weighted(np.atleast_2d(w))
+    A += every[0]
+    dA[active] += every[1:]
 
 
 def _weight(
