@@ -13,6 +13,8 @@ from ..geometry.refine import refined
 from .effect import Effect, Parameter, PointTerm
 
 MOST = 60_000  # dofs of a structure that is still refined: four times as many take half a minute
+LARGE = 20_000  # dofs from which the refined modes are solved for no farther than they are compared
+ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 
 
@@ -50,7 +52,7 @@ class ModalDiscrepancy(Effect):
 
 
 def mesh_error(model: Modelled, f_max: float) -> MeshError | None:
-    """The mesh error of a structure up to 1.4 times the frequency ``f_max``; None if too large.
+    """The mesh error of a structure up to somewhat above ``f_max``; None if it is too large.
 
     With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
     ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
@@ -58,8 +60,9 @@ def mesh_error(model: Modelled, f_max: float) -> MeshError | None:
     built = model.structure
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
         return None
-    coarse = _flexible(model.up_to(1.4 * f_max), f_max)
-    finer = modelled(refined(built.assembly), 1.6 * f_max)
+    above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
+    coarse = _flexible(model.up_to(above[0] * f_max), f_max)
+    finer = modelled(refined(built.assembly), above[1] * f_max)
     fine = _flexible(finer.modes, f_max)
     rows = _rows_of(finer.structure, built)
     M_phi = built.system.M @ coarse.shapes
