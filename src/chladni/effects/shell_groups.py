@@ -61,18 +61,26 @@ class ShellGroups:
         self, matrices: np.ndarray, left: np.ndarray, right: np.ndarray | None = None
     ) -> np.ndarray:
         """Σ_{e in g} V_eᵀ A_e W_e for every group g (n_groups, r_left, r_right)."""
+        one = self.structure.T @ left
+        two = one if right is None else self.structure.T @ right
+        out = self._by_group(matrices, one, two)
+        return (out + out.transpose(0, 2, 1)) / 2 if right is None else out
+
+    def carried(self, left: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Σ_{e in g} V_eᵀ m_e R_e of a motion of all points (6 n_points, k): (n_groups, r, k)."""
+        return self._by_group(self.mass, self.structure.T @ left, motion)
+
+    def _by_group(self, matrices: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
         dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
         order = np.argsort(self.group, kind="stable")
         ends = np.searchsorted(self.group[order], np.arange(len(self) + 1))
-        one = self.structure.T @ left
-        two = one if right is None else self.structure.T @ right
         out = np.empty((len(self), one.shape[1], two.shape[1]))
         for g in range(len(self)):
             members = order[ends[g] : ends[g + 1]]
             V = one[dofs[members]].reshape(-1, one.shape[1])
             AW = matrices[members] @ two[dofs[members]]
             out[g] = V.T @ AW.reshape(-1, two.shape[1])
-        return (out + out.transpose(0, 2, 1)) / 2 if right is None else out
+        return out
 
 
 def group_of_shells(

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from ..geometry.facets import tangents
 from ..model.assembly import Assembly
 from .assemble import Structure
+from .base_motion import base_motion
 from .locate import Share, rows_of, shares_of
 
 
@@ -47,6 +48,19 @@ class MeasuredDofs:
         if len(real):
             found[real] = rows_of(built, self.grids[real], self.points[real], self.directions[real])
         return sp.csr_array(found)
+
+    def loads(self, built: Structure) -> sp.csr_array:
+        """What each input does to the free dofs, all forces or all motions of the base (k, n).
+
+        A unit force is its row; a unit acceleration of the base is less the inertia it carries.
+        """
+        if not self.base.any():
+            return self.rows(built)
+        return sp.csr_array(-base_motion(built, self.directions).force.T)
+
+    def carried_by(self, inputs: "MeasuredDofs") -> np.ndarray:
+        """Motion of each dof for a unit motion of the base, nothing deforming (k, n_in)."""
+        return np.where(inputs.base, self.directions @ inputs.directions.T, 0.0)
 
     def shares(self, assembly: Assembly) -> tuple[Share, ...]:
         """Grids each place hangs on with their weights; the motion of the base has none."""

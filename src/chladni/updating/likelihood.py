@@ -18,7 +18,7 @@ from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
-POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
+POWER = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
 
 class Data(Protocol):
@@ -43,6 +43,7 @@ class Responses:
     values : (n_f, n_out, n_in) complex    H_X(s)
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
+    direct : (n_out, n_in)                 what a moving base carries along, 0 for forces
     use : (n_f, n_out) bool                lines and channels the fit may see
     sigma_model : float                    sd of log10 H that neither noise nor δ explains
     """
@@ -60,6 +61,7 @@ class Responses:
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
+    direct: np.ndarray | float = 0.0
 
     @property
     def power(self) -> int:
@@ -71,15 +73,19 @@ class Responses:
         return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
 
     def model(self, state: State) -> np.ndarray:
-        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) (n_f, n_out, n_in)."""
+        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in)."""
         phi_o, phi_i, d = self.modal(state)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
-        return np.asarray(self.s[:, None, None] ** self.power * H)
+        return np.asarray(self.s[:, None, None] ** self.power * H + self.direct)
 
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r)."""
+        """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).
+
+        φ_i of a moving base is its load, which follows the mass of the state.
+        """
         d = 1 / (state.lam + self.s[:, None] ** 2)
-        return self.a @ state.phi, self.b @ state.phi, d
+        phi_i = self.b @ state.phi if state.drive is None else state.drive
+        return self.a @ state.phi, phi_i, d
 
     def deviation(self, state: State) -> np.ndarray:
         """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
@@ -132,17 +138,24 @@ class Responses:
         return r, np.concatenate([J.real, J.imag])
 
     def _slopes(self, state: State) -> np.ndarray:
-        """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D (dK + s² dM) D φ_i, over H ln 10."""
+        """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
+
+        dφ_i is that of a moving base; a force drives as it does.
+        """
         phi_o, phi_i, d = self.modal(state)
         n_p, r = len(state.dK), len(state.lam)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        H = H + self.direct / self.s[:, None, None] ** self.power
         out = np.empty((n_p, *H.shape), complex)
         for j in range(len(phi_i)):
             q = (phi_i[j] * d).T
             W = _real_times(state.dK.reshape(-1, r), q) + _real_times(
                 state.dM.reshape(-1, r), q * self.s**2
             )
-            W = W.reshape(n_p, r, len(d)) * d.T
+            W = W.reshape(n_p, r, len(d))
+            if state.ddrive is not None:
+                W = W - state.ddrive[:, j, :, None]
+            W = W * d.T
             out[:, :, :, j] = -np.einsum("or,prf->pfo", phi_o, W, optimize=True)
         out /= H * LN10
         if state.doffset is not None:

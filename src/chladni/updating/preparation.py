@@ -39,6 +39,7 @@ ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough 
 ZETA_Q = 0.02  # of the line on which Q is reported
 SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
+SAME_PLACE = 1e-6  # [m]: a sensor at the shaker
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
 FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
@@ -77,7 +78,8 @@ def _by_responses(question: Question) -> Prepared:
     nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    reduced = reduced_problem(nominal, f_max, sp.csr_array(sp.vstack([rows_o, rows_i])))
+    known = sp.csr_array(sp.vstack([rows_o, rows_i]))
+    reduced = reduced_problem(nominal, f_max, known, base=question.base)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -86,7 +88,10 @@ def _by_responses(question: Question) -> Prepared:
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
-        read = Responses(H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s))
+        read = Responses(
+            H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s),
+            direct=question.outputs.carried_by(question.inputs),
+        )  # fmt: skip
         data.append(read.over(reduced.model))
     nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
     if not question.gain_known:
@@ -109,6 +114,12 @@ def _by_responses(question: Question) -> Prepared:
         f"both sides were given {ZETA:.0%} damping to search and {ZETA_Q:.0%} to report Q "
         "(damping equalisation): no modes need pairing and damping cannot pose as stiffness",
     ]
+    if question.base is not None:
+        notes.append(
+            f"the input is the motion of the base ({', '.join(question.inputs.labels)}): responses "
+            "are transmissibilities, of unit 1, and the supports of the deck move together; what "
+            "is held to ground is held to the base"
+        )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     if (sd := _place_sd(question)) > 0:
@@ -172,7 +183,8 @@ def _held_sensors(question: Question) -> np.ndarray:
     wanted = question.held_sensors
     if isinstance(wanted, tuple):
         return np.array([label in wanted for label in labels])
-    driven = np.array([g in set(question.inputs.grids.tolist()) for g in question.outputs.grids])
+    away = question.outputs.points[:, None] - question.inputs.points[None]
+    driven = (np.linalg.norm(away, axis=2) < SAME_PLACE).any(axis=1)  # a moving base has no place
     count = min(len(labels) // 5 if wanted is None else wanted, max(len(labels) - 2, 0))
     order = np.random.default_rng(20250101).permutation(len(labels))
     chosen = [k for k in order if not driven[k]][:count]
@@ -232,7 +244,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     elif len(frequency) > 5:
         held[-max(1, len(frequency) // 5) :] = True
     rows_o = question.outputs.around(built) if len(question.outputs.labels) else None
-    rows_i = question.inputs.around(built) if len(question.inputs.labels) else None
+    rows_i = question.driven_around(built) if len(question.inputs.labels) else None
     band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,

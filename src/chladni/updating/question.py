@@ -3,9 +3,11 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
+from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
@@ -46,6 +48,15 @@ class Question:
             return assembly
         grids, m = zip(*self.carried, strict=True)
         return with_masses(assembly, grids, np.array(m))
+
+    @property
+    def base(self) -> np.ndarray | None:
+        """Directions (k, 3) in which the supports were moved; None where forces were applied."""
+        return self.inputs.directions if self.inputs.base.any() else None
+
+    def driven_around(self, built: Structure) -> sp.csr_array:
+        """How modes are driven: rows at the likely places of the shakers, or the base's load."""
+        return self.inputs.around(built) if self.base is None else self.inputs.loads(built)
 
     @property
     def weighed_with_sensors(self) -> MassMeasurement | None:

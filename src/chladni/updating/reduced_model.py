@@ -18,7 +18,9 @@ from ..effects.effect import Effect, count
 from ..effects.shell_components import COMPONENTS, component_matrices
 from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
+from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
+from .base_participation import BaseParticipation, Participating, participation
 from .matrix_stack import Bordered, MatrixStack, Whole
 
 
@@ -34,6 +36,7 @@ class Reduced:
     mass : (g, r)             these three are stacks of r by r matrices, one for each group
     K0, M0 : (r, r)           all that is no shell
     weight0 : float           mass beside the shells [kg]
+    base : what a moving base does to the basis, or None where forces drive the structure
     """
 
     groups: ShellGroups
@@ -44,6 +47,7 @@ class Reduced:
     K0: np.ndarray
     M0: np.ndarray
     weight0: float
+    base: BaseParticipation | None = None
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
 
     def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
@@ -87,7 +91,7 @@ class Reduced:
         return replace(
             self, basis=basis, linear=linear, cubic=cubic, mass=mass,
             K0=rest(self.K0, system.K.real, stiff), M0=rest(self.M0, system.M, [mass]),
-            _seen={},
+            base=None if self.base is None else self.base.extended(self.groups, new), _seen={},
         )  # fmt: skip
 
     def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -109,8 +113,8 @@ class Reduced:
         return replace(self, linear=linear, cubic=cubic)
 
 
-def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
-    """Project a structure on a basis."""
+def reduce(groups: ShellGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
+    """Project a structure on a basis; ``base`` where its supports are what moves."""
     system = groups.structure.system
     linear, cubic = groups.project(groups.linear, basis), groups.project(groups.cubic, basis)
     mass = groups.project(groups.mass, basis)
@@ -121,6 +125,7 @@ def reduce(groups: ShellGroups, basis: np.ndarray) -> Reduced:
         groups, basis, {"": Whole(linear)}, {"": Whole(cubic)}, Whole(mass),
         _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),
         _symmetric(M - mass.sum(axis=0)), max(rest, 0.0),
+        None if base is None else participation(groups, basis, base),
     )  # fmt: skip
 
 
@@ -135,6 +140,7 @@ class State:
     dK, dM : (n_p, r, r)   derivatives in *modal* coordinates φᵀ(∂K)φ, where asked for
     weight, dweight        mass on the scales [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
+    drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
     """
 
     lam: np.ndarray
@@ -145,6 +151,8 @@ class State:
     dweight: np.ndarray
     offset: np.ndarray | None
     doffset: np.ndarray | None
+    drive: np.ndarray | None = None
+    ddrive: np.ndarray | None = None
 
 
 def evaluate(
@@ -163,20 +171,27 @@ def evaluate(
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
+    base = _participating(model, logs, slopes)
     for effect, at in slices(effects):
         for term in effect.terms(x[at]):
             b = model.rows(term.rows, keep=not term.moving)
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
             target += (b.T * term.coefficient) @ b
+            moving = term.moving if gradient else {}
+            moved = {p: model.rows(rows, keep=False) for p, rows in moving.items()}
+            if base is not None:
+                base.add_points(term, b, moved, at)
             if gradient:
                 slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, b, optimize=True)
-                for p, rows in term.moving.items():
-                    half = (b.T * term.coefficient) @ model.rows(rows, keep=False)
+                for p, db in moved.items():
+                    half = (b.T * term.coefficient) @ db
                     slope[at.start + p] += half + half.T
         for part in effect.matrices(x[at]):
             A = model.operator(part.operator)
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
             target += part.coefficient * A
+            if base is not None:
+                base.add_operator(part, model.basis, at)
             if gradient:
                 slope[at] += part.gradient[:, None, None] * A
         extra, d_extra = effect.weight(x[at])
@@ -189,7 +204,18 @@ def evaluate(
     lam, phi = _eigen(K, M)
     if gradient:
         dK, dM = phi.T @ dK @ phi, phi.T @ dM @ phi
-    return State(lam, phi, dK, dM, weight, dweight, offset, doffset)
+    drive, ddrive = (None, None) if base is None else base.loads(phi)
+    return State(lam, phi, dK, dM, weight, dweight, offset, doffset, drive, ddrive)
+
+
+def _participating(
+    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
+) -> Participating | None:
+    """What the base does to the shells as these fields have them; None where it does not move."""
+    if model.base is None:
+        return None
+    w = np.exp(mass_log(logs))
+    return Participating(model.base, w, w[:, None] * mass_log(slopes))
 
 
 FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves

@@ -11,6 +11,7 @@ from ..effects.effect import Effect
 from ..effects.shell_groups import ShellGroups, shell_groups
 from ..effects.surroundings import ShellGrids, shell_grids
 from ..fem.assemble import Structure
+from ..fem.base_motion import base_motion
 from ..fem.modelled import Modelled, modelled
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
@@ -68,6 +69,7 @@ class ReducedProblem:
 def reduced_problem(
     model: Modelled | Assembly, f_max: float, rows: sp.csr_array | None = None, *, most: int = 200,
     groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
+    base: np.ndarray | None = None,
 ) -> ReducedProblem:  # fmt: skip
     """Make a structure ready.
 
@@ -79,6 +81,7 @@ def reduced_problem(
     extra : (n, m) further vectors for the basis
     most : candidate places
     reach : the basis holds modes up to this many times ``f_max``
+    base : (k, 3) unit vectors along which the supports move, where that is the input
     """
     if isinstance(model, Assembly):
         model = modelled(model, reach * f_max)
@@ -94,6 +97,9 @@ def reduced_problem(
         blocks.append(attachments(factor, rows))
     if extra is not None:
         blocks.append(extra)
+    moved = None if base is None else base_motion(built, base)
+    if moved is not None:
+        blocks.append(factor.solve(moved.force))
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
     shells = shell_groups(built, groups)
     grids = shell_grids(shells)
@@ -101,7 +107,7 @@ def reduced_problem(
     return ReducedProblem(
         built,
         shells,
-        reduce(shells, basis),
+        reduce(shells, basis, moved),
         modes.frequency,
         factor,
         hertz,

@@ -92,8 +92,9 @@ def _on_new_structure(
     model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     reduced = reduced_problem(
-        model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48
-    )
+        model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
+        base=question.base,
+    )  # fmt: skip
     of_test = [e for e in old.nuisance if e.outputs(np.zeros(len(e.parameters))) is not None]
     fresh = updating_problem(
         changed,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..effects.effect import Effect, FieldChange, Parameter
 from ..effects.surroundings import ShellGrids
-from .likelihood import LN10, POWER, Data, Responses
+from .likelihood import LN10, Data, Responses
 from .map_fit import MassMeasurement, unknowns
 from .reduced_model import Reduced, State, evaluate
 
@@ -81,13 +81,15 @@ def point_scores(
     residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
     """
     state = base.state
-    phi_o, phi_i = data.a @ state.phi, data.b @ state.phi
+    phi_o, phi_i, d = data.modal(state)
     phi_b = model.rows(places.rows) @ state.phi
-    d = 1 / (state.lam + data.s[:, None] ** 2)
     H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
     G_ob = np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True)
     G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
     G_bb = (phi_b**2) @ d.T + residual_flexibility[:, None]
+    if matrix == "M" and model.base is not None:  # a mass feels the motion of the base as well
+        carried = places.rows @ model.base.motion.free
+        G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
     out = np.empty((len(places), len(strengths)))
     for k, c in enumerate(strengths):
         D = c * data.s**2 if matrix == "M" else c + 0 * data.s
@@ -102,8 +104,8 @@ def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
     from ..ema.correlation import wrapped
 
-    scale = data.s[:, None, None] ** POWER[data.quantity] / data.values
-    delta = np.log(H * scale) / LN10
+    H = data.s[:, None, None] ** data.power * H + data.direct
+    delta = np.log(H / data.values) / LN10
     if state.offset is not None:
         delta = delta + state.offset[:, None]
     z = (wrapped(delta) / data.std())[:, data.use].reshape(len(H), -1)

@@ -60,10 +60,11 @@ def seen(
     if isinstance(score, Poles):
         lam = (2 * np.pi * modes.frequency) ** 2
         if score.outputs is not None and score.inputs is not None:
-            a, b = (p.around(built) @ basis for p in (question.outputs, question.inputs))
+            a = question.outputs.around(built) @ basis
+            b = question.driven_around(built) @ basis
             score = replace(score, a=a, b=b)
         return score, _state(lam, np.eye(len(lam)))
-    rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
+    rows_o, rows_i = question.outputs.rows(built), question.inputs.loads(built)
     flexible = modes.frequency[modes.frequency > 0.02 * f_max]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max
     still = attachments(

@@ -8,11 +8,8 @@ import scipy.sparse as sp
 from ..case import Case
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift
-from ..errors import FileError
-from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, node_points
-from ..fem.solve import inertia_load
 
 if TYPE_CHECKING:
     from ..view.scene import Marker
@@ -29,7 +26,7 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
     s, f = model.structure, test.frequency
     modal = model.modes.with_damping(damping)
     pick = case.outputs.rows(s).T.toarray()
-    load, carried = _drives(case, s)
+    load, carried = case.inputs.loads(s).T.toarray(), case.outputs.carried_by(case.inputs)
     shift = residual_shift(modal, f[-1])
     rest = residual_flexibility(s.system, modal, pick, load, points=node_points(s), shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
@@ -39,18 +36,6 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
         return FRF(H, f, test.outputs, test.inputs).to(test.quantity)
     T = carried - (2 * np.pi * f)[:, None, None] ** 2 * H
     return FRF(T, f, test.outputs, test.inputs, "transmissibility")
-
-
-def _drives(case: Case, s: Structure) -> tuple[np.ndarray, np.ndarray]:
-    """Loads (n_free, n_in) and the motion each carries along rigidly (n_out, n_in)."""
-    base = case.inputs.base
-    if base.any() and not base.all():
-        raise FileError(f"{case.path}: forces and a moving base cannot be inputs together")
-    if not base.any():
-        return case.inputs.rows(s).T.toarray(), np.zeros(1)
-    axes = case.inputs.directions.T  # (3, n_in)
-    load = s.T.T @ inertia_load(s.assembly, -axes)
-    return np.asarray(load), case.outputs.directions @ axes
 
 
 def markers(dofs: MeasuredDofs) -> list["Marker"]:

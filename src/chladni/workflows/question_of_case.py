@@ -18,19 +18,13 @@ def question(case: Case) -> Question:
     Raises
     ------
     FileError
-        If the recordings hold neither FRFs nor poles, the base was moved, or the deck's unit
-        system cannot be right.
+        If the recordings hold neither FRFs nor poles, or the deck's unit system cannot be right.
     """
     refuse_other_units(case)
     frfs = case.frfs
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
         raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
-    if frfs and case.inputs.base.any():
-        raise FileError(
-            f"{case.path}: diagnosis of a structure moved at its supports is not built yet; "
-            "give responses to a force"
-        )
     mass_measurement = None
     if case.setup.mass is not None:
         mass_measurement = MassMeasurement(case.setup.mass, case.setup.mass_sd)

@@ -1,0 +1,47 @@
+"""A structure whose supports are all moved together: the motion relative to them and its load.
+
+With u = T q + R b ξ (every point follows the base rigidly and moves by q beside it) the free dofs
+obey M q'' + V q' + K q = -Tᵀ M_full R b ξ'', and an output that the base carries by d answers
+X/ξ = d - s² r (K + s V + s² M)⁻¹ Tᵀ M_full R b: exact, no large mass (Craig and Kurdila 2006,
+Fundamentals of Structural Dynamics, section 9.5).  What holds the structure to ground holds it to
+the base.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .assemble import Structure
+from .energy import rigid_motions
+from .solve import inertia_load
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """Unit translations b of all supports along directions.
+
+    Attributes
+    ----------
+    whole : (6 n_points, k)    R b, rigid motion of every point in the basic frame [-]
+    free : (n_free, k)         the same over the free dofs
+    force : (n_free, k)        Tᵀ M_full R b [kg]: less this is the load of a unit acceleration
+    """
+
+    whole: np.ndarray
+    free: np.ndarray
+    force: np.ndarray
+
+
+def base_motion(built: Structure, directions: np.ndarray) -> BaseMotion:
+    """The supports moved along each of these unit vectors (k, 3) of the basic frame."""
+    b, assembly = np.asarray(directions, float).T, built.assembly
+    whole = rigid_motions(assembly)[:, :3] @ b
+    at, component = assembly.rows(built.system.dofs[:, 0]), built.system.dofs[:, 1] - 1
+    axes = np.broadcast_to(np.eye(3), (len(assembly.points), 3, 3))
+    if assembly.axes is not None:
+        axes = assembly.axes
+    moves = component < 3
+    if assembly.scalar_points is not None:
+        moves &= ~np.isin(at, assembly.scalar_points)
+    ways = np.where(moves[:, None], axes[at, component % 3], 0.0)
+    return BaseMotion(whole, ways @ b, np.asarray(built.T.T @ inertia_load(assembly, b)))
