@@ -80,6 +80,9 @@ _FILES = """\
   `variance` (the noise), `level` and `article` (one recording each).
 - FRF as `.npz`: arrays `frequency_hz` (n_f,), `values` (n_f, n_out, n_in), `outputs`, `inputs`;
   optional `coherence`, `variance`, `quantity`, `level`, `article`.
+- Where a table moves the supports, the input is `base:+X`, `base:+Y` or `base:+Z` and the quantity
+  transmissibility, acceleration per acceleration (unit 1). All grids that the deck holds by SPC
+  move together, and what is held to ground is held to them.
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
   never fitted), `state` (the first is compared, or the one `use` names).
 - Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes

@@ -154,7 +154,9 @@ def test_low_rank_reanalysis_is_the_evaluation(reduced, data, matrix):
     scores = point_scores(base, reduced.model, seen, places, matrix, strengths, rest)
     kind = MassEffect if matrix == "M" else AtPoints
     for k, c in np.ndindex(scores.shape):
-        one = kind((Parameter("c", "-", 0.0, 1.0, strengths[c]),), rows=places.rows[[k]], grids=(1,))
+        one = kind(
+            (Parameter("c", "-", 0.0, 1.0, strengths[c]),), rows=places.rows[[k]], grids=(1,)
+        )
         state = evaluate(reduced.model, [rho, one], np.array([0.03, 0.0]), False)
         r, _ = seen.residual(state, False)
         due = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]

@@ -109,8 +109,9 @@ SCHEMA = (
 COLUMNS = (
     Key("sensors.csv", "label", "text", "", "needed",
         "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _FRF),
-    Key("sensors.csv", "grid", "whole number", "", "the node of the label",
-        "Grid of the deck it sits at.", "412", _FRF),
+    Key("sensors.csv", "grid", "whole number, or base", "", "the node of the label",
+        "Grid of the deck it sits at; `base`: it measures the motion of all supports together, "
+        "the input of a transmissibility.", "412", _FRF),
     Key("sensors.csv", "x", "number", "m", "", "Place, basic frame, in place of a grid.", "0.25",
         _FRF),
     Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _FRF),

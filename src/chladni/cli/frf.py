@@ -41,8 +41,9 @@ def run(
     from ..report.response_page import response_page
 
     low, high = limits(band)
-    if quantity not in UNIT:
-        raise LabelError(f"no quantity {quantity!r}; there are {', '.join(UNIT)}")
+    per_force = [name for name in UNIT if name != "transmissibility"]
+    if quantity not in per_force:
+        raise LabelError(f"no quantity {quantity!r}; there are {', '.join(per_force)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
         given = _source(source, bool(input), units, allow or [])

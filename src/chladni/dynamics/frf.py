@@ -16,7 +16,7 @@ from .modes import ModalModel
 from .system import System
 
 Quantity = Literal["receptance", "mobility", "accelerance", "transmissibility"]
-UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N"}
+UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N", "transmissibility": "-"}
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
 
 

@@ -69,7 +69,7 @@ class Participating:
         """A part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
-        l = basis.T @ (part.operator @ self.motion.free)  # noqa: E741
+        l = basis.T @ (part.operator @ self.motion.free)
         self.value = self.value + part.coefficient * l
         self.slope[at] += part.gradient[:, None, None] * l
 

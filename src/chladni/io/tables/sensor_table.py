@@ -16,6 +16,9 @@ _OPTIONAL = (
 )
 
 
+BASE = "base"  # in place of a grid: the motion of all supports
+
+
 def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
     """Sensors and exciters from CSV; the grammar is that of DESIGN §7.
 
@@ -45,7 +48,8 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
         raise FileError(f"{where}: role {role!r}; there are output and input")
     xyz = np.array([number(c, np.nan) for c in "xyz"])
     normal = np.array([number(c, np.nan) for c in ("nx", "ny", "nz")])
-    grid = number("grid", np.nan)
+    moved = cell.get("grid", "") == BASE
+    grid = np.nan if moved else number("grid", np.nan)
     if np.isnan(xyz).any() and not np.isnan(xyz).all():
         raise FileError(f"{where}: a place needs x, y and z")
     if np.isfinite(grid) and np.isfinite(xyz).all():
@@ -55,7 +59,9 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
         raise FileError(f"{where}: mass {mass:g} kg and position_sd {sd:g} m cannot be negative")
     given = normal if np.isfinite(normal).any() else cell.get("direction", "")
     place = xyz if np.isfinite(xyz).all() else None
-    if np.isnan(grid) and place is None:
+    if moved and (place is not None or mass > 0):
+        raise FileError(f"{where}: the base is all supports together; it has no place and no mass")
+    if np.isnan(grid) and place is None and not moved:
         grid = _node(label, where)
     if np.isfinite(grid) and grid != int(grid):
         raise FileError(f"{where}: grid {grid:g} is no whole number")
@@ -72,7 +78,7 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
 
 def _node(label: str, where: str) -> float:
     node = label.partition(":")[0]
-    if node == "base":
+    if node == BASE:
         return np.nan
     if not (node.isdecimal() and node.isascii()):
         raise FileError(f"{where}: {label!r} names no node; give a grid or x, y, z")

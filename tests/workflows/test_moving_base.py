@@ -1,0 +1,161 @@
+"""A plate on its shaker table: transmissibilities are identified, fitted and explained as FRFs."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.effects.points import with_masses
+from chladni.errors import FileError
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
+from chladni.report.diagnosis_folder import write_diagnosis
+from chladni.updating.preparation import prepare
+from chladni.updating.written_scores import seen, written_Q
+from chladni.workflows.question_of_case import question
+from chladni_specimens.plates import plate
+
+SENSORS = [(0.09, 0.05), (0.12, 0.2), (0.15, 0.1), (0.18, 0.025), (0.21, 0.15), (0.24, 0.0),
+           (0.3, 0.05), (0.3, 0.175)]  # fmt: skip
+PLACE = (0.24, 0.15)  # of 20 g that the deck does not have
+CASE = """
+[model]
+deck = "plate.bdf"
+units = "SI"
+damping = 0.01
+[test]
+recordings = ["table.npz"]
+mass = {mass}
+[band]
+fit = [15.0, 420.0]
+"""
+
+
+def clamped(t=1.2e-3, finer=1):
+    """A plate held along its edge x = 0."""
+    made = plate(0.3, 0.2, 10 * finer, 8 * finer, t)
+    edge = np.flatnonzero(made.points[:, 0] == 0)
+    return replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
+
+
+def at(assembly, places):
+    """Grids at places in the plane."""
+    away = np.linalg.norm(assembly.points[None, :, :2] - np.asarray(places)[:, None], axis=2)
+    return tuple(int(assembly.ids[k]) for k in away.argmin(axis=1))
+
+
+def a_case(folder, article, seed):
+    """What the table's accelerometer and those on the article say, with 1 % noise."""
+    folder.mkdir(exist_ok=True)
+    write_assembly(clamped(), folder / "plate.bdf")
+    write_assembly(article, folder / "article.bdf")
+    model = chladni.load_model(folder / "article.bdf", "SI")
+    ends = [f"{g}:+Z" for g in at(article, SENSORS)]
+    T = chladni.frf(model, ends, ["base:+Z"], np.linspace(12, 480, 1200)).frfs[0]
+    noise = np.random.default_rng(seed).normal(size=(2, *T.values.shape))
+    values = T.values * (1 + 0.01 * (noise[0] + 1j * noise[1]) / np.sqrt(2))
+    labels = tuple(f"{g}:+Z" for g in at(clamped(), SENSORS))
+    write_npz(folder / "table.npz", replace(T, values=values, outputs=labels))
+    mass = round(chladni.modes(model, 3).mass, 5)
+    (folder / "case.toml").write_text(CASE.format(mass=mass))
+    return chladni.load_case(folder)
+
+
+@pytest.fixture(scope="module")
+def heavy(tmp_path_factory):
+    """A plate by a mesh twice as fine, with 20 g on it."""
+    plain = clamped(finer=2)
+    article = with_masses(plain, at(plain, [PLACE]), 0.02)
+    return a_case(tmp_path_factory.mktemp("table"), article, 1)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(heavy):
+    return chladni.diagnose(heavy)
+
+
+def test_a_concealed_mass_is_named(heavy, diagnosed):
+    """Where it is and how heavy; the deck with it is better on data no fit saw."""
+    (found,) = diagnosed.effects
+    assert (diagnosed.verdict, found.name) == ("missing physics", "point-mass")
+    assert np.linalg.norm(np.subtract(found.where.point_m[:2], PLACE)) < 0.04
+    (mass,) = [p for p in found.parameters if p.name == "M"]
+    assert mass.low < 0.02 < mass.high
+    held = diagnosed.agreement.held_out
+    assert held.with_effect < 0.5 * held.calibrated
+    assert diagnosed.adequate.passes
+    assert any("motion of the base" in note for note in diagnosed.notes)
+
+
+def test_a_null_stays_quiet(tmp_path):
+    """The same plate 3 % thicker: that is calibrated, and nothing is named."""
+    found = chladni.diagnose(a_case(tmp_path / "null", clamped(1.236e-3, 2), 3))
+    assert found.verdict in ("nothing missing", "calibration only")
+    assert not found.effects
+    assert not found.distrust
+    t = next(p.estimate for p in found.calibrated if p.estimate.name == "t")
+    assert t.low < 1.236e-3 < t.high
+    assert found.agreement.fitted.calibrated < found.agreement.fitted.nominal
+
+
+def test_the_reference_of_a_table_has_a_node_of_its_own(heavy, tmp_path):
+    """Node 901 is the accelerometer on the table: sensors.csv says that it is the base."""
+    for name in ("plate.bdf", "case.toml"):
+        (tmp_path / name).write_bytes((heavy.path.parent / name).read_bytes())
+    write_npz(tmp_path / "table.npz", replace(heavy.frfs[0], inputs=("901:+Z",)))
+    text = (tmp_path / "case.toml").read_text().replace("[band]", 'sensors = "s.csv"\n[band]')
+    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,base,input\n")
+    case = chladni.load_case(tmp_path)
+    assert case.inputs.base.tolist() == [True]
+    named, plain = (prepare(question(c)) for c in (case, heavy))
+    assert_allclose(named.problem.data.values, plain.problem.data.values)
+    (tmp_path / "s.csv").write_text("label,grid,role\n901:+Z,bas,input\n")
+    with pytest.raises(FileError, match=r"s.csv, line 2: .*bas"):
+        chladni.load_case(tmp_path)
+
+
+def test_what_is_compared_is_the_full_structures_transmissibility(heavy):
+    """Q of the deck by Ritz vectors, and the responses drawn, are of one structure."""
+    asked = question(heavy)
+    ready = prepare(asked)
+    data, state = seen(asked, ready.score, ready.nominal, ready.problem.setup.f_max)
+    drawn = ready.problem.data.over(ready.problem.reduced.model)
+    assert data.quantity == "transmissibility"
+    still = replace(data, s=2j * np.pi * np.array([1e-3]), values=np.ones((1, len(SENSORS), 1)))
+    assert_allclose(still.model(state), 1.0, atol=1e-6)  # the base carries everything along
+    assert drawn.direct.shape == (len(SENSORS), 1)
+    (Q,) = written_Q(asked, ready, ready.nominal, (ready.score.use,))
+    assert pytest.approx(data.Q(state, data.use)) == Q
+
+
+def test_the_page_and_the_deck(heavy, diagnosed, tmp_path):
+    """The page says what was moved; the deck that is written explains the recording."""
+    out = tmp_path / "out"
+    write_diagnosis(out, heavy, diagnosed)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "the input is the motion of the base (base:+Z)" in page
+    told = json.loads((out / "diagnosis.json").read_text())
+    (out / "plate.bdf").write_text((out / told["files"]["deck"]).read_text())
+    (out / "table.npz").write_bytes((heavy.path.parent / "table.npz").read_bytes())
+    (out / "case.toml").write_text(heavy.path.read_text())
+    asked = question(chladni.load_case(out))
+    ready = prepare(asked)
+    (Q,) = written_Q(asked, ready, ready.nominal, (ready.score.use,))
+    assert pytest.approx(told["fit"]["Q_with_effect"], rel=1e-6) == Q
+
+
+@pytest.mark.parametrize("command", ["calibrate", "diagnose", "correlate"])
+def test_a_base_without_supports_is_refused(heavy, tmp_path, command):
+    write_assembly(replace(clamped(), supports=np.zeros((0, 2), int)), tmp_path / "plate.bdf")
+    (tmp_path / "table.npz").write_bytes((heavy.path.parent / "table.npz").read_bytes())
+    (tmp_path / "case.toml").write_text(heavy.path.read_text())
+    done = CliRunner().invoke(application(), [command, str(tmp_path), "--out", str(tmp_path / "x")])
+    assert done.exit_code == 2
+    assert "the base moves, but the deck holds no grid by SPC" in done.stderr
+    assert not (tmp_path / "x").exists()
