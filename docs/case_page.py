@@ -88,7 +88,9 @@ _FILES = """\
 - Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes
   in which nodes measure, 55 shapes, 151 and 164 header and units.
 
-Time histories, spectra and mode shapes are named in the notes and not used.
+Time histories and spectra of responses, no force among them, give natural frequencies where a case
+holds neither FRFs nor poles: as if the force were white in the band. Elsewhere they, and mode
+shapes, are named in the notes and not used.
 """
 
 

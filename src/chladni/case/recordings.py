@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.frf import FRF
+from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
 from .toml_sections import TomlSection
@@ -125,7 +126,12 @@ def _poles(r: Recording) -> list[str]:
 def _idle(r: Recording) -> list[str]:
     """What a file holds beside FRFs and poles."""
     out = []
-    if r.functions:
+    if r.frf is None and r.poles is None and (used := responses(r.functions)):
+        out.append(
+            f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: correlate, "
+            "calibrate and diagnose take natural frequencies from them"
+        )
+    elif r.functions:
         kinds = ", ".join(dict.fromkeys(f.kind for f in r.functions))
         out.append(f"{r.name}: {len(r.functions)} records that are no FRFs are not used ({kinds})")
     if r.shapes is not None:

@@ -17,6 +17,7 @@ from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
+from .output_only import with_natural_frequencies
 from .unit_check import refuse_other_units
 
 BANDS = 6
@@ -62,7 +63,7 @@ def correlate(case: Case, progress: Progress = silent) -> Correlation:
     """
     refuse_other_units(case)
     with threadpool_limits(1):
-        return _correlated(case, progress)
+        return _correlated(with_natural_frequencies(case), progress)
 
 
 def _correlated(case: Case, progress: Progress) -> Correlation:

@@ -45,6 +45,7 @@ from ..updating.result_parts import agreement, alternatives, calibrated, named_e
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .output_only import with_natural_frequencies
 from .question_of_case import question
 
 BLIND_SHARE = 0.05  # of the shells
@@ -59,6 +60,7 @@ def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResul
                 f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
                 "calibrate and correlate take any deck"
             )
+        case = with_natural_frequencies(case)
         asked = question(case)
         prepared = prepare(asked)
         found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
+from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent
@@ -108,6 +109,10 @@ def _has(read: Sequence[Recording]) -> str:
     said = [f"records of kind {', '.join(kinds)}"] if kinds else []
     said += ["a table of poles"] * any(r.poles is not None for r in read)
     said += ["mode shapes"] * any(r.shapes is not None for r in read)
+    if any(responses(r.functions) for r in read):
+        said[0] += (
+            ", no force among them: correlate, calibrate and diagnose take frequencies of them"
+        )
     return f"; it holds {' and '.join(said)}" if said else ""
 
 

@@ -1,0 +1,64 @@
+"""A case whose recordings hold responses and no force: natural frequencies are taken from them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..case import Case
+from ..ema.identification import Identified
+from ..ema.identification import identify as identified
+from ..ema.response_correlations import ALIKE, one_sided, responses
+from ..ema.setup import PoleTable, Recording
+from ..errors import FileError
+from ..updating.measured_frequencies import LEAST_DELTA_CHI2
+from .identify import firm
+
+HIGHEST = 0.8  # of the highest frequency a record holds: above it filters fall off
+
+
+def with_natural_frequencies(case: Case) -> Case:
+    """The case with a table of poles where it holds neither FRFs nor poles but responses.
+
+    A case that holds anything else is returned as it is.
+    """
+    if any(r.frf is not None or r.poles is not None for r in case.recordings):
+        return case
+    usable = [r for r in case.recordings if responses(r.functions)]
+    if not usable:
+        return case
+    first = usable[0]
+    known, note = _identified(case, first)
+    r = known.order
+    table = PoleTable(
+        known.frequency, known.frequency_sd, np.full(r, np.nan), np.arange(1, r + 1), ("",) * r
+    )
+    others = [other for other in case.recordings if other is not first]
+    return replace(
+        case, recordings=(replace(first, poles=table), *others), notes=(*case.notes, note)
+    )
+
+
+def _identified(case: Case, recording: Recording) -> tuple[Identified, str]:
+    used = responses(recording.functions)
+    frf, sigma = one_sided(used)
+    low, high = case.band or (0.0, np.inf)
+    low = max(low, float(frf.frequency[1]) * 4)
+    high = min(high, HIGHEST * float(frf.frequency[-1]))
+    found = identified(frf, (low, high), use=case.lines(frf.frequency))
+    free = found.poles + sigma  # without what the window adds
+    found = replace(found, poles=free)
+    clear = found.relative_delta_chi2 > LEAST_DELTA_CHI2 * ALIKE
+    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear)
+    if not known.order:
+        raise FileError(
+            f"{recording.name}: no natural frequency stands out of its {len(used)} records of "
+            f"responses ({used[0].kind}) between {low:.4g} and {high:.4g} Hz, and no force was "
+            "measured"
+        )
+    note = (
+        f"{recording.name}: the force was not measured, so {known.order} natural frequencies were "
+        f"taken from {len(used)} records of responses ({used[0].kind}), as if the force were white "
+        "between "
+        f"{low:.4g} and {high:.4g} Hz; damping and levels are not used"
+    )
+    return known, note

@@ -1,0 +1,69 @@
+"""Responses to a white force alone tell the natural frequencies, and nothing else is claimed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter, ss2tf
+
+from chladni.ema.identification import identify
+from chladni.ema.response_correlations import one_sided, responses
+from chladni.ema.setup import Function
+
+F = np.array([11.0, 17.0, 31.0])
+ZETA = np.array([0.008, 0.01, 0.006])
+SHAPES = np.array([[1.0, 0.7, 0.5], [0.6, -0.9, 0.8], [0.9, 0.4, -0.7]])  # (outputs, modes)
+RATE = 128.0
+
+
+def simulated(seconds, seed, noise=0.02):
+    """Displacements of three modes under white noise, 2 % noise on every sensor."""
+    rng = np.random.default_rng(seed)
+    n = int(seconds * RATE)
+    force = rng.normal(size=n)
+    q = []
+    for f, zeta in zip(F, ZETA, strict=True):
+        w = 2 * np.pi * f
+        A, B = np.array([[0.0, 1.0], [-(w**2), -2 * zeta * w]]), np.array([[0.0], [w**1.5]])
+        made = cont2discrete((A, B, np.array([[1.0, 0.0]]), np.zeros((1, 1))), 1 / RATE)
+        b, a = ss2tf(*made[:4])
+        q.append(lfilter(b[0], a, force))
+    y = SHAPES @ np.array(q)
+    y += noise * y.std(axis=1, keepdims=True) * rng.normal(size=y.shape)
+    t = np.arange(n) / RATE
+    return tuple(Function("time", f"{k + 1}:+Z", "", t, row, "m/s^2") for k, row in enumerate(y))
+
+
+def frequencies(functions, band=(5.0, 45.0)):
+    frf, sigma = one_sided(functions)
+    found = identify(frf, band)
+    return np.abs(found.poles + sigma) / (2 * np.pi), found
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_natural_frequencies_of_time_histories(seed):
+    """As well as T seconds tell, sd f = f sqrt(ζ / (2π f T)) (Au 2014, MSSP 48, 15-33)."""
+    T = 240.0
+    known, found = frequencies(simulated(T, seed))
+    for f, zeta in zip(F, ZETA, strict=True):
+        k = np.abs(known - f).argmin()
+        assert abs(known[k] - f) < 4 * f * np.sqrt(zeta / (2 * np.pi * f * T))
+        assert found.relative_delta_chi2[k] > 3
+
+
+def test_auto_spectra_alone_have_the_same_poles():
+    """The exact spectrum of one mode under white noise, |H|²: its pole comes back."""
+    f = np.arange(0, 64, 0.02)
+    w, w0 = 2 * np.pi * f, 2 * np.pi * 17.0
+    S = 1 / np.abs(w0**2 - w**2 + 2j * 0.01 * w * w0) ** 2
+    known, _ = frequencies((Function("auto spectrum", "1:+Z", "", f, S),), (8.0, 40.0))
+    assert np.abs(known - 17.0).min() < 1e-3 * 17.0
+
+
+def test_a_record_with_a_force_is_left_to_others():
+    some = simulated(10, 1)
+    assert len(responses(some)) == 3
+    assert responses((*some, replace(some[0], unit="N"))) == ()
+    jumps = replace(some[0], x=np.cumsum(np.random.default_rng(0).uniform(1, 2, len(some[0].x))))
+    assert responses((jumps,)) == ()
+    assert responses(()) == ()

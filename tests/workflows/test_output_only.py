@@ -1,0 +1,75 @@
+"""Responses to a force nobody measured: natural frequencies are compared, and it is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import chladni
+from chladni.dynamics.eigen import normal_modes
+from chladni.ema.setup import Function, Recording
+from chladni.errors import FileError
+from chladni.fem.assemble import structure
+from chladni_specimens.plates import plate
+
+RATE, SECONDS = 1024.0, 60.0
+
+
+@pytest.fixture(scope="module")
+def ambient(case):
+    """A plate 4 % thicker than the deck under white noise at its corner, heard by four sensors."""
+    article = structure(plate(0.3, 0.22, 6, 6, 1.04e-3))
+    modal = normal_modes(article.system, 14)
+    f = modal.frequency[6:]
+    ends = np.array([[g, 3] for g in (2, 7, 18, 43)])
+    phi, drive = (article.rows(d) @ modal.shapes[:, 6:] for d in (ends, np.array([[1, 3]])))
+    n = int(RATE * SECONDS)
+    force = np.random.default_rng(5).normal(size=n)
+    y = np.zeros((4, n))
+    for k, one in enumerate(f):
+        pole = np.exp((-0.008 + 1j) * 2 * np.pi * one / RATE)
+        q = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force)
+        y += np.outer(phi[:, k] * drive[0, k], q)
+    t = np.arange(n) / RATE
+    heard = tuple(
+        Function("time", f"{g}:+Z", "", t, row, "m/s^2")
+        for (g, _), row in zip(ends, y, strict=True)
+    )
+    recording = Recording("ambient.uff", functions=heard)
+    mass = replace(case.setup, mass=None)
+    return replace(case, recordings=(recording,), setup=mass, notes=())
+
+
+def test_frequencies_are_paired_with_the_models(ambient):
+    """4 % of thickness is 4 % of every frequency of a flat plate."""
+    case = ambient
+    found = chladni.correlate(case)
+    at = found.pairs
+    ratio = found.f_test[at.test] / found.f_model[at.model]
+    assert len(at) >= 4
+    np.testing.assert_allclose(ratio, 1.04, rtol=0.01)
+    assert any("the force was not measured" in note for note in found.notes)
+
+
+def test_they_are_calibrated_with(ambient):
+    case = ambient
+    found = chladni.calibrate(case)
+    assert found.compared == "frequencies"
+    assert found.frequency_error.calibrated < 0.5 * found.frequency_error.before
+    assert any("the force was not measured" in note for note in found.notes)
+
+
+def test_identify_says_who_can_use_them(ambient):
+    with pytest.raises(FileError, match="no force among them: correlate, calibrate and diagnose"):
+        chladni.identify(ambient)
+
+
+def test_noise_has_no_natural_frequencies(ambient):
+    """White noise on every sensor: one sentence, no table."""
+    case = ambient
+    rng = np.random.default_rng(1)
+    (heard,) = case.recordings
+    hiss = tuple(replace(g, values=rng.normal(size=len(g.x))) for g in heard.functions)
+    with pytest.raises(FileError, match=r"ambient.uff: no natural frequency stands out"):
+        chladni.calibrate(replace(case, recordings=(replace(heard, functions=hiss),)))
