@@ -12,7 +12,7 @@ def page() -> str:
 
 
 def _section(name: str) -> str:
-    head = f"[[{name}]]" if name == "parameter" else f"[{name}]"
+    head = f"[[{name}]]" if name in ("parameter", "recording") else f"[{name}]"
     return f"## `{head}`\n\n{_table([k for k in SCHEMA if k.section == name])}"
 
 

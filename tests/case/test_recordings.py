@@ -61,7 +61,7 @@ def test_the_others_are_measured_against_it() -> None:
     double = FRF(2 * a.values, a.frequency, a.outputs, a.inputs, "accelerance")
     assert deviation(a, double) == pytest.approx(np.log10(2))
     said = notes_of([FIRST, Recording("d.npz", frf=double)])
-    assert any("d.npz (0.3 decades rms off)" in note for note in said)
+    assert any("d.npz (repeat; 0.3 decades rms off)" in note for note in said)
 
 
 def test_what_else_a_file_holds_is_named() -> None:

@@ -40,6 +40,11 @@ sensors = "sensors.csv"
 mass = 1.413
 mass_sd = 0.002
 hangers = [1, 35]
+[[recording]]
+file = "b.npz"
+article = "B"
+level = 2.0
+state = ""
 [band]
 fit = [5.0, 60.0]
 exclude = [[20.0, 21.0]]
@@ -66,7 +71,7 @@ OTHER = {  # another accepted value of every word
     ("model", "deck"): '"thicker.bdf"',
     ("model", "units"): '"mm-kg-ms"',
     ("model", "damping"): "0.02",
-    ("test", "recordings"): '["a.npz"]',
+    ("test", "recordings"): '["b.npz"]',
     ("test", "use"): '"b.npz"',
     ("test", "quantity"): '"mobility"',
     ("test", "gain"): '"unknown"',
@@ -74,6 +79,10 @@ OTHER = {  # another accepted value of every word
     ("test", "mass"): "1.42",
     ("test", "mass_sd"): "0.003",
     ("test", "hangers"): "[1]",
+    ("recording", "file"): '"a.npz"',
+    ("recording", "article"): '"C"',
+    ("recording", "level"): "3.0",
+    ("recording", "state"): '"with the bracket"',
     ("band", "fit"): "[5.0, 59.0]",
     ("band", "exclude"): "[[20.0, 22.0]]",
     ("held_out", "sensors"): "1",
@@ -206,7 +215,7 @@ def test_no_column_is_dropped(folder: Path, as_it_stands: str, column: str) -> N
 
 
 def test_sections_know_their_words() -> None:
-    assert sections() == ("model", "test", "band", "held_out", "parameter")
+    assert sections() == ("model", "test", "recording", "band", "held_out", "parameter")
     for section in sections():
         assert len(set(known(section))) == len(known(section))
     assert all(set(k.used) <= set(COMMANDS) and k.used for k in (*SCHEMA, *COLUMNS))

@@ -24,6 +24,7 @@ from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
 from ..units import UNITS, Units
 from .free_parameters import free_parameter
+from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
 from .sensor_places import ROLES, carried, grid_row, labels, places, unrecorded
@@ -127,7 +128,7 @@ def load_case(path: str | Path) -> Case:
     units = UNITS[model.text("units", due=True, among=key("model", "units").choices) or "SI"]
     deck = read_deck(_file(model, "deck", str(model.text("deck", due=True))))
     made = assembly(deck, units)
-    recordings = _recordings(test)
+    recordings = _recordings(test, keys.sections("recording", known("recording")))
     setup = _setup(test, made)
     notes = notes_of(recordings)
     band, exclude = _bands(keys, recordings, notes)
@@ -173,14 +174,21 @@ def _file(section: TomlSection, key: str, name: str) -> Path:
     return path
 
 
-def _recordings(test: TomlSection) -> tuple[Recording, ...]:
-    """All recordings, the FRFs with the labels of the first in its order."""
+def _recordings(test: TomlSection, more: Sequence[TomlSection]) -> tuple[Recording, ...]:
+    """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
+    listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
+    named = {name for _, _, name in listed}
+    for section in more:
+        name = str(section.text("file", due=True))
+        if name not in named:
+            named.add(name)
+            listed.append((section, "file", name))
     read: list[Recording] = []
-    for name in test.list("recordings", str) or []:
-        found = read_recordings(_file(test, "recordings", name), quantity)
-        read += [without_dead_channels(r) for r in found]
-    ranked = compared_first(test, read)
+    for section, word, name in listed:
+        found = read_recordings(_file(section, word, name), quantity)
+        read += [without_dead_channels(r) for r in described(more, name, found)]
+    ranked = compared_first(test, stacked(read))
     held = [r for r in ranked if r.frf is not None]
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
 

@@ -9,6 +9,7 @@ from ..dynamics.frf import FRF
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
+from .recording_groups import relation
 from .toml_sections import TomlSection
 
 
@@ -52,7 +53,8 @@ def _names(r: Recording) -> list[str]:
     """All a recording may be called by."""
     level = "" if r.level is None else f"{r.level:g}"
     states = () if r.poles is None else r.poles.states
-    names = (r.name, r.name.partition(", ")[0], r.article, level, *states)
+    files = [part.partition(", ")[0] for part in r.name.split(" + ")]
+    names = (r.name, *files, r.article, level, r.state, *states)
     return [n for n in dict.fromkeys(names) if n]
 
 
@@ -74,9 +76,15 @@ def notes_of(recordings: Sequence[Recording]) -> list[str]:
     if not recordings:
         return out
     first = recordings[0]
-    others = [_other(first, r) for r in recordings[1:]]
-    if others:
-        out.append(f"{first.name} is compared with the model; not used: {'; '.join(others)}")
+    held = [_other(first, r) for r in recordings[1:] if first.frf is not None and r.frf is not None]
+    idle = [r.name for r in recordings[1:] if first.frf is None or r.frf is None]
+    if held:
+        out.append(
+            f"{first.name} is compared with the model; no fit sees the others, calibrate and "
+            f"diagnose score the decks on them: {'; '.join(held)}"
+        )
+    if idle:
+        out.append(f"{first.name} is compared with the model; not used: {'; '.join(idle)}")
     if first.frf is None and first.poles is not None:
         out += _poles(first)
     elif first.level is not None or first.article:
@@ -89,12 +97,15 @@ def notes_of(recordings: Sequence[Recording]) -> list[str]:
 
 
 def _other(first: Recording, r: Recording) -> str:
-    if first.frf is None or r.frf is None:
-        return r.name
+    """Name, what it is beside the first, and how far from it."""
+    assert first.frf is not None
+    assert r.frf is not None
     away = deviation(first.frf, r.frf)
-    return (
-        f"{r.name} (at other lines)" if away is None else f"{r.name} ({away:.2g} decades rms off)"
-    )
+    far = "at other lines" if away is None else f"{away:.2g} decades rms off"
+    said = [f"state {r.state!r}"] * (r.state != first.state)
+    said += [f"article {r.article}"] * (r.article != first.article)
+    said += [f"level {r.level:g}"] if r.level is not None and r.level != first.level else []
+    return f"{r.name} ({', '.join(said) or relation(first, r)}; {far})"
 
 
 def deviation(a: FRF, b: FRF) -> float | None:

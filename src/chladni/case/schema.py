@@ -61,12 +61,13 @@ SCHEMA = (
         "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz or .csv: FRFs or poles. One file may hold several articles or "
-        "levels. The first is compared with the model (or the one `use` names), the others are "
-        "measured against it and named in the notes; `identify` reads all.",
+        "levels. The first is compared with the model (or the one `use` names). Recordings of one "
+        "article, level and state that were driven at other places are stacked with it; the rest "
+        "is held out and scored. `identify` reads all.",
         '["article_A.uff", "article_B.uff"]', _READ),
     Key("test", "use", "text", "", "the first",
-        "Which recording is compared: the name of its file, its article, its level or, of a table "
-        "of poles, its state.", '"article_B.uff"', _READ),
+        "Which recording is compared: the name of its file, its article, its level or its state.",
+        '"article_B.uff"', _READ),
     Key("test", "quantity", "word", "", "what the file says", "What the FRFs are.",
         '"accelerance"', _READ, get_args(Quantity)),
     Key("test", "gain", "word", "", "known",
@@ -81,6 +82,16 @@ SCHEMA = (
     Key("test", "hangers", "list of grids", "", "none",
         "Where cords hold the article: the springs of `suspension` sit there.", "[101, 102]",
         ("diagnose",)),
+    Key("recording", "file", "file", "", "needed",
+        "One more recording, or one of `recordings` of which more is to be said.",
+        '"article_B.uff"', _READ),
+    Key("recording", "article", "text", "", "what the file says",
+        "Which of several nominally equal objects it is. Repeats and articles give the spread that "
+        "no fit is asked to go below.", '"B"', _READ),
+    Key("recording", "level", "number", "N or m/s²", "what the file says",
+        "Level of excitation; frequencies that move with it are named in the notes.", "2.0", _READ),
+    Key("recording", "state", "text", "", "one state",
+        "What was done to the object before this was measured.", '"with the bracket"', _READ),
     Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
         "Band that is identified and fitted.", "[26.0, 195.0]", ("identify", *_TEST)),
     Key("band", "exclude", "list of [low, high]", "Hz", "none",

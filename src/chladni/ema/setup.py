@@ -112,6 +112,7 @@ class Recording:
     functions : tuple            time histories, spectra
     level : float or None        excitation [N], or [m/s²] for base excitation
     article : str                which of several nominally equal objects
+    state : str                  what was done to the object, where it was measured as it changed
     notes : tuple of str         what was found odd and how it was read
     """
 
@@ -126,6 +127,7 @@ class Recording:
     level: float | None = None
     article: str = ""
     notes: tuple[str, ...] = ()
+    state: str = ""
 
 
 @dataclass(frozen=True, eq=False)

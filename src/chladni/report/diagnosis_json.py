@@ -18,6 +18,7 @@ from ..updating.result import (
     LeftPlace,
     MassComparison,
     NamedEffect,
+    RecordingScore,
     Remainder,
     Scores,
 )
@@ -61,6 +62,7 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "searched": r.searched,
         "files": dict(r.files),
         "frequency_rms_percent": None if error is None else vars(error),
+        "recordings": [dict(vars(row)) for row in r.recordings],
     }
 
 
@@ -147,6 +149,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         compared=cast(Compared, d.get("compared", "responses")),
         searched=bool(d.get("searched", alternatives is None or len(alternatives) > 0)),
         files=dict(d.get("files") or {}),
+        recordings=tuple(_known(RecordingScore, r) for r in d.get("recordings") or ()),
     )
 
 

@@ -7,6 +7,7 @@ from ..effects.estimate import Estimate, Location
 from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
+from .recording_scores import recording_scores
 from .words import interval, number, percent, quantity
 
 HEADING = {
@@ -128,7 +129,7 @@ def sections(
         Section("What was found", _effects(result.effects)),
         Section("What was calibrated", _calibrated(result)),
         Section("Test and model", shown("frf")),
-        Section("Scores", [*_scores(result), *shown("scores")]),
+        Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),
         Section("Why not something else", [*_alternatives(result), *shown("why")]),
         Section("The test", shown("test")),

@@ -55,7 +55,9 @@ def _test_modes(prepared: Prepared) -> tuple[np.ndarray, np.ndarray | None]:
     keep &= found.relative_delta_chi2 > 3.0
     if found.residues.shape[1] < 4:
         return found.frequency[keep], None
-    residues = found.residues[keep, :, 0]
+    every = found.residues[keep]
+    strongest = np.linalg.norm(every, axis=1).argmax(axis=1)
+    residues = every[np.arange(len(every)), :, strongest]
     turn = np.exp(-0.5j * np.angle((residues**2).sum(axis=1)))
     return found.frequency[keep], (residues * turn[:, None]).real.T
 

@@ -31,6 +31,7 @@ from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
+from .other_recordings import level_notes, measured_spread, others_identified, spread_note
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
@@ -83,13 +84,17 @@ def _by_responses(question: Question) -> Prepared:
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
-    data = []
+    others, said = others_identified(question, reach)
+    data, spreads = [], []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
+        noise, spread = _noise(frf, found, s), measured_spread(H, others, s)
+        spreads.append(spread)
         read = Responses(
-            H, s, rows_o, rows_i, use, found.quantity, noise=_noise(frf, found, s),
+            H, s, rows_o, rows_i, use, found.quantity,
+            noise=noise if spread is None else np.maximum(noise, spread),
             direct=question.outputs.carried_by(question.inputs),
         )  # fmt: skip
         data.append(read.over(reduced.model))
@@ -129,11 +134,17 @@ def _by_responses(question: Question) -> Prepared:
         )
     notes += _mass_note(question)
     problem = replace(problem, damping=modal_damping(found, low, fit_max))
+    notes += [
+        *said, *spread_note(spreads[1], data[1].use, others), *level_notes(question, found, others)
+    ]  # fmt: skip
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
+    if spreads[1] is not None:
+        noise = np.maximum(noise, spreads[1] ** 2)
     few = too_little(seen, int(data[0].use.any(axis=0).sum()))
     return Prepared(
-        problem, data[1], held, what, tuple(notes), nominal, noise, found, few, unseen=unseen
-    )
+        problem, data[1], held, what, tuple(notes), nominal, noise, found, few, unseen=unseen,
+        others=tuple(others),
+    )  # fmt: skip
 
 
 def _modes_seen(found: Identified, low: float, high: float) -> int:

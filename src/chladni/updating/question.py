@@ -1,6 +1,7 @@
 """What a diagnosis is asked: a structure, what was measured on it and where (SI, Hz)."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +17,19 @@ from ..model.point_masses import with_masses
 from .hypothesis_fit import UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import MassMeasurement
+
+if TYPE_CHECKING:
+    from .other_recordings import OtherTest
+
+
+@dataclass(frozen=True, eq=False)
+class OtherRecording:
+    """A recording of the same labels that is not fitted: repeat, article or level."""
+
+    name: str
+    relation: str
+    frf: FRF
+    level: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +55,8 @@ class Question:
     gain_known: bool = True
     parameters: tuple[FreeParameter, ...] = ()  # what the user frees; none: a default set
     carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
+    others: tuple[OtherRecording, ...] = ()
+    level: float | None = None  # of excitation, of the recording that is fitted [N], [m/s²]
 
     def tested(self, assembly: Assembly) -> Assembly:
         """An article with the sensors of known mass on it, as it was measured."""
@@ -81,6 +97,7 @@ class Prepared:
     nominal : the structure of the deck, its modes solved as far as anyone here asks
     unseen : the held-out samples in the shape of ``problem.data.use``
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
+    others : recordings that no fit sees, with their modes
     """
 
     problem: UpdatingProblem
@@ -94,3 +111,4 @@ class Prepared:
     too_little: str = ""  # why the data cannot bear a name
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    others: tuple["OtherTest", ...] = ()

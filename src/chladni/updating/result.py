@@ -58,6 +58,25 @@ class Scores:
 
 
 @dataclass(frozen=True)
+class RecordingScore:
+    """Q of the decks on a recording that was not fitted, over all lines and channels.
+
+    Attributes
+    ----------
+    name, relation : what it is beside the recording that was fitted: repeat, article, level
+    apart : Q of the fitted recording itself on this one: no deck is asked to do better
+    nominal, calibrated, with_effect : of the decks as they are written
+    """
+
+    name: str
+    relation: str
+    apart: float | None = None
+    nominal: float | None = None
+    calibrated: float | None = None
+    with_effect: float | None = None
+
+
+@dataclass(frozen=True)
 class Agreement:
     """How well the decks agree with the recording.
 

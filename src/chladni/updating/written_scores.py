@@ -44,11 +44,19 @@ def written_Q(
     offset = np.zeros(n, complex)
     if fault is not None and (change := fault.effect.outputs(fault.fit.of(fault.effect))):
         offset = offset + change.value
-    if not question.gain_known:
-        delta = data.deviation(replace(state, offset=offset))
-        offset = offset - delta[prepared.score.use].real.mean()
+    offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)
+
+
+def gain_offset(
+    question: Question, prepared: Prepared, data: Responses, state: State
+) -> np.ndarray:
+    """log10 of the factor on every channel (n_out,) that an unknown gain is; else zero."""
+    none = np.zeros(len(data.a), complex)
+    if question.gain_known:
+        return none
+    return np.asarray(none - data.deviation(state)[prepared.score.use].real.mean())
 
 
 def seen(

@@ -29,6 +29,7 @@ from ..updating.leaning import leaning
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
+from ..updating.other_recordings import scored_others
 from ..updating.outcome import (
     fitted_scores,
     held_out,
@@ -179,6 +180,7 @@ def _result(
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
+        recordings=scored_others(asked, prepared, [model for _, model in every]),
     )
 
 

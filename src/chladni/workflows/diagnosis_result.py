@@ -20,6 +20,7 @@ from ..updating.result import (
     FrequencyRow,
     MassComparison,
     NamedEffect,
+    RecordingScore,
     Remainder,
 )
 
@@ -76,6 +77,7 @@ class DiagnosisResult:
     files : {what: name} of what was written beside it
     models : the structures; None where the result was read from a file
     left_where : what the explanation leaves, on the mesh; None where frequencies were compared
+    recordings : Q of the decks on the recordings that were not fitted
     """
 
     verdict: str = ""
@@ -96,6 +98,7 @@ class DiagnosisResult:
     files: dict[str, str | None] = field(default_factory=dict)
     models: UpdatedModels | None = None
     left_where: LeftWhere | None = None
+    recordings: tuple[RecordingScore, ...] = ()
 
     @property
     def deck_changed(self) -> bool:

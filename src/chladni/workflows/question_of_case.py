@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..case import Case
+from ..case.recording_groups import relation
 from ..errors import FileError
 from ..updating.map_fit import MassMeasurement
 from ..updating.preparation import prepare
-from ..updating.question import Prepared, Question
+from ..updating.question import OtherRecording, Prepared, Question
 from .unit_check import refuse_other_units
 
 
@@ -43,9 +44,21 @@ def question(case: Case) -> Question:
         carried=case.carried,
     )
     if frfs:
-        return replace(asked, frf=frfs[0])
+        first = case.recordings[0]
+        return replace(asked, frf=frfs[0], others=_others(case), level=first.level)
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+
+
+def _others(case: Case) -> tuple[OtherRecording, ...]:
+    """Repeats, articles and levels of the recording that is fitted; other states are none."""
+    first = case.recordings[0]
+    kinds = [(r, relation(first, r)) for r in case.recordings[1:] if r.frf is not None]
+    return tuple(
+        OtherRecording(r.name, kind, r.frf, r.level)
+        for r, kind in kinds
+        if r.frf is not None and kind != "state"
+    )
 
 
 def prepared(case: Case) -> Prepared:

@@ -1,0 +1,149 @@
+"""Several recordings of one case: what each says of itself, and which of them are one test.
+
+Recordings of one article, level and state that were driven at different places are one test with
+several inputs: their columns are stacked. Driven at the same places they are repeats.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.setup import Recording
+from ..errors import FileError
+from .toml_sections import TomlSection
+
+Relation = Literal["state", "article", "level", "repeat"]
+LEAST_SHARED = 0.5  # of the lines of each recording that all must have to be stacked
+SAME_LINE = 1e-6  # relative
+
+
+def described(
+    sections: Sequence[TomlSection], file: str, read: Sequence[Recording]
+) -> list[Recording]:
+    """The recordings of a file with what its [[recording]] says of them.
+
+    Raises
+    ------
+    FileError
+        If a word of a [[recording]] is said twice, or differently by the file itself.
+    """
+    found = [s for s in sections if s.text("file", due=True) == file]
+    if len(found) > 1:
+        raise FileError(f"{found[1].at('file')} = {file!r} is described twice")
+    if not found:
+        return list(read)
+    return [_told(found[0], r) for r in read]
+
+
+def _told(section: TomlSection, r: Recording) -> Recording:
+    article, state = section.text("article") or r.article, section.text("state") or r.state
+    level = section.number("level", low=0.0)
+    for word, said, own in (("article", article, r.article), ("level", level, r.level)):
+        if own not in ("", None) and said not in (None, own):
+            raise FileError(f"{section.at(word)} = {said!r}, but {r.name} itself says {own!r}")
+    if state and r.poles is not None and any(r.poles.states):
+        raise FileError(f"{section.at('state')}: {r.name} has a column state of its own")
+    if state and r.poles is not None:
+        r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
+    return replace(r, article=article, level=r.level if level is None else level, state=state)
+
+
+def relation(first: Recording, other: Recording) -> Relation:
+    """What another recording is beside the one that is compared; a level not told is the same."""
+    if first.state != other.state:
+        return "state"
+    if first.article != other.article:
+        return "article"
+    levels = {first.level, other.level} - {None}
+    return "level" if len(levels) > 1 else "repeat"
+
+
+def stacked(read: Sequence[Recording]) -> list[Recording]:
+    """Recordings of one article, level and state that differ in their inputs, as one each."""
+    out: list[Recording] = []
+    for r in read:
+        at = next((k for k, other in enumerate(out) if _one_test(other, r)), None)
+        if at is None:
+            out.append(r)
+        else:
+            out[at] = _joined(out[at], r)
+    return out
+
+
+def _one_test(a: Recording, b: Recording) -> bool:
+    if a.frf is None or b.frf is None or relation(a, b) != "repeat":
+        return False
+    apart = not set(a.frf.inputs) & set(b.frf.inputs)
+    return apart and a.frf.quantity == b.frf.quantity and bool(_shared(a.frf, b.frf))
+
+
+def _shared(a: FRF, b: FRF) -> list[str]:
+    """Outputs both have, in the order of the first."""
+    return [o for o in a.outputs if o in b.outputs]
+
+
+def _joined(a: Recording, b: Recording) -> Recording:
+    """One test with the inputs of both, on the lines and outputs they share."""
+    assert a.frf is not None
+    assert b.frf is not None
+    i, j = _lines(a.frf.frequency, b.frf.frequency)
+    most = max(len(a.frf.frequency), len(b.frf.frequency))
+    if len(i) < LEAST_SHARED * most:
+        raise FileError(
+            f"{a.name} and {b.name} drive one article at different places, but only {len(i)} of "
+            f"{most} lines are the same: measure them at the same lines, or name them as articles "
+            "of their own ([[recording]] article)"
+        )
+    outputs = _shared(a.frf, b.frf)
+    parts = [_rows(a.frf, i, outputs), _rows(b.frf, j, outputs)]
+    left = sorted(set(a.frf.outputs) ^ set(b.frf.outputs))
+    inputs = len(a.frf.inputs) + len(b.frf.inputs)
+    said = f"{b.name}: stacked with {a.name} as one test with {inputs} inputs"
+    if left:
+        said += f"; outputs that only one of them has are left out: {', '.join(left[:6])}"
+    if len(i) < most:
+        said += f"; {most - len(i)} lines that only one of them has are left out"
+    return replace(
+        a, name=f"{a.name} + {b.name}", frf=_side_by_side(parts), nodes={**b.nodes, **a.nodes},
+        axes={**b.axes, **a.axes}, functions=(*a.functions, *b.functions),
+        notes=(*a.notes, *b.notes, said),
+    )  # fmt: skip
+
+
+def _lines(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the lines both have."""
+    near = np.clip(np.searchsorted(g, f * (1 - SAME_LINE)), 0, len(g) - 1)
+    i = np.flatnonzero(np.abs(g[near] - f) <= SAME_LINE * np.maximum(f, 1e-12))
+    return i, near[i]
+
+
+def _rows(frf: FRF, lines: np.ndarray, outputs: Sequence[str]) -> FRF:
+    """Some lines and outputs of an FRF."""
+    at = np.array([frf.outputs.index(o) for o in outputs])
+    part = {name: a[lines][:, at] for name, a in _arrays(frf).items()}
+    return FRF(
+        frequency=frf.frequency[lines], outputs=tuple(outputs), inputs=frf.inputs,
+        quantity=frf.quantity, **part,
+    )  # fmt: skip
+
+
+def _side_by_side(parts: Sequence[FRF]) -> FRF:
+    """The columns of all; variance and coherence where every one has them."""
+    arrays = [_arrays(p) for p in parts]
+    common = [name for name in arrays[0] if all(name in a for a in arrays)]
+    whole = {name: np.concatenate([a[name] for a in arrays], axis=2) for name in common}
+    first = parts[0]
+    inputs = tuple(i for p in parts for i in p.inputs)
+    return FRF(
+        frequency=first.frequency, outputs=first.outputs, inputs=inputs,
+        quantity=first.quantity, **whole,
+    )  # fmt: skip
+
+
+def _arrays(frf: FRF) -> dict[str, np.ndarray]:
+    """Everything over lines, outputs and inputs that an FRF has."""
+    every = {"values": frf.values, "variance": frf.variance, "coherence": frf.coherence}
+    return {name: a for name, a in every.items() if a is not None}

@@ -1,0 +1,110 @@
+"""Recordings that are one test are stacked; what a [[recording]] says is heard, once."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.case import load_case
+from chladni.case.recording_groups import described, relation, stacked
+from chladni.case.toml_sections import TomlSection
+from chladni.dynamics.frf import FRF
+from chladni.ema.setup import PoleTable, Recording
+from chladni.errors import FileError
+from chladni.io.tables.write_tables import write_npz
+
+from .test_case import a_frf, deck
+
+OUT = ("12:+Z", "16:+Z", "22:+Z")
+
+
+def told(**values: object) -> TomlSection:
+    return TomlSection(Path("case.toml"), "recording", dict(values), {}, 1)
+
+
+def one(name: str, input: str, **more: object) -> Recording:
+    return Recording(name, frf=a_frf(OUT, (input,)), **more)  # type: ignore[arg-type]
+
+
+def test_other_shaker_places_are_columns() -> None:
+    a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
+    (both,) = stacked([a, b])
+    assert both.frf is not None
+    assert a.frf is not None
+    assert b.frf is not None
+    assert both.frf.inputs == ("8:+Z", "3:+Z")
+    np.testing.assert_array_equal(both.frf.values[:, :, :1], a.frf.values)
+    np.testing.assert_array_equal(both.frf.values[:, :, 1:], b.frf.values)
+    assert "b.npz: stacked with a.npz as one test with 2 inputs" in both.notes
+
+
+def test_lines_and_outputs_that_one_has_alone_are_left_out_and_named() -> None:
+    a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
+    assert a.frf is not None
+    assert b.frf is not None
+    f, values = b.frf.frequency, b.frf.values
+    fewer = FRF(values[1:, :2], f[1:], OUT[:2], ("3:+Z",), b.frf.quantity)
+    (both,) = stacked([a, replace(b, frf=fewer)])
+    assert both.frf is not None
+    assert both.frf.outputs == OUT[:2]
+    np.testing.assert_array_equal(both.frf.values[:, :, 0], a.frf.values[1:, :2, 0])
+    assert "22:+Z" in both.notes[-1]
+    assert "1 lines that only one of them has" in both.notes[-1]
+
+
+def test_a_test_at_other_lines_is_refused() -> None:
+    a, b = one("a.npz", "8:+Z"), one("b.npz", "3:+Z")
+    assert b.frf is not None
+    other = replace(b.frf, frequency=b.frf.frequency + 0.013)
+    with pytest.raises(FileError, match=r"a.npz and b.npz drive one article .* only 0 of"):
+        stacked([a, replace(b, frf=other)])
+
+
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [
+        ({"article": "B"}, "article"),
+        ({"level": 2.0, "article": "B"}, "article"),
+        ({"level": 2.0}, "level"),
+        ({"state": "loaded", "level": 2.0}, "state"),
+        ({}, "repeat"),
+    ],
+)
+def test_what_differs_keeps_recordings_apart(more: dict, what: str) -> None:
+    a = one("a.npz", "8:+Z", level=1.0)
+    b = one("b.npz", "3:+Z" if more else "8:+Z", **more)
+    assert relation(a, b) == what
+    assert len(stacked([a, b])) == 2
+
+
+def test_a_word_is_said_once_and_not_against_the_file() -> None:
+    a = one("a.npz", "8:+Z", level=1.0, article="A")
+    (named,) = described([told(file="a.npz", state="cold")], "a.npz", [a])
+    assert (named.state, named.article, named.level) == ("cold", "A", 1.0)
+    with pytest.raises(FileError, match=r"level = 2\.0, but a\.npz itself says 1\.0"):
+        described([told(file="a.npz", level=2.0)], "a.npz", [a])
+    with pytest.raises(FileError, match="described twice"):
+        described([told(file="a.npz"), told(file="a.npz")], "a.npz", [a])
+    nothing = np.full(1, np.nan)
+    table = PoleTable(np.ones(1), nothing, nothing, np.ones(1, int), ("bare",))
+    with pytest.raises(FileError, match="has a column state of its own"):
+        described([told(file="p.csv", state="x")], "p.csv", [Recording("p.csv", poles=table)])
+
+
+def test_a_case_with_two_shakers_is_one_test(tmp_path: Path) -> None:
+    (tmp_path / "plate.bdf").write_text(deck())
+    for name, input in (("a.npz", "8:+Z"), ("b.npz", "3:+Z")):
+        H = a_frf(OUT, (input,))
+        write_npz(tmp_path / name, FRF(H.values, H.frequency, OUT, (input,), "accelerance"))
+    head = '[model]\ndeck = "plate.bdf"\nunits = "mm-t-s"\n'
+    (tmp_path / "case.toml").write_text(
+        f'{head}[[recording]]\nfile = "a.npz"\n[[recording]]\nfile = "b.npz"\n'
+    )
+    case = load_case(tmp_path)
+    assert case.inputs.labels == ("8:+Z", "3:+Z")
+    assert len(case.recordings) == 1
+    assert any("stacked" in note for note in case.notes)
+    (tmp_path / "case.toml").write_text(f'{head}[[recording]]\nfile = "c.npz"\n')
+    with pytest.raises(FileError, match=r"\[recording\] file: there is no file 'c.npz'"):
+        load_case(tmp_path)
