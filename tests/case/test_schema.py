@@ -45,6 +45,7 @@ file = "b.npz"
 article = "B"
 level = 2.0
 state = ""
+mass = 1.4
 [band]
 fit = [5.0, 60.0]
 exclude = [[20.0, 21.0]]
@@ -83,6 +84,7 @@ OTHER = {  # another accepted value of every word
     ("recording", "article"): '"C"',
     ("recording", "level"): "3.0",
     ("recording", "state"): '"with the bracket"',
+    ("recording", "mass"): "1.5",
     ("band", "fit"): "[5.0, 59.0]",
     ("band", "exclude"): "[[20.0, 22.0]]",
     ("held_out", "sensors"): "1",

@@ -130,7 +130,7 @@ def load_case(path: str | Path) -> Case:
     made = assembly(deck, units)
     recordings = _recordings(test, keys.sections("recording", known("recording")))
     setup = _setup(test, made)
-    notes = notes_of(recordings)
+    notes = notes_of(recordings, "use" in test)
     band, exclude = _bands(keys, recordings, notes)
     held_sensors, held_band = _held(keys, recordings, notes)
     outputs, inputs = (

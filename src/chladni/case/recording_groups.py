@@ -48,7 +48,9 @@ def _told(section: TomlSection, r: Recording) -> Recording:
         raise FileError(f"{section.at('state')}: {r.name} has a column state of its own")
     if state and r.poles is not None:
         r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
-    return replace(r, article=article, level=r.level if level is None else level, state=state)
+    mass = section.number("mass", low=1e-9)
+    level = r.level if level is None else level
+    return replace(r, article=article, level=level, state=state, mass=mass)
 
 
 def relation(first: Recording, other: Recording) -> Relation:
@@ -59,6 +61,24 @@ def relation(first: Recording, other: Recording) -> Relation:
         return "article"
     levels = {first.level, other.level} - {None}
     return "level" if len(levels) > 1 else "repeat"
+
+
+def states(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """States of the object in the order of the recordings that are compared."""
+    if not recordings:
+        return ()
+    if recordings[0].frf is None:
+        first = recordings[0].poles
+        return ("",) if first is None else first.states
+    return tuple(dict.fromkeys(r.state for r in recordings if r.frf is not None))
+
+
+def of_state(recordings: Sequence[Recording], state: str) -> tuple[Recording, ...]:
+    """The recordings of one state."""
+    first = recordings[0]
+    if first.frf is None and first.poles is not None:
+        return (replace(first, poles=first.poles.of(state)),)
+    return tuple(r for r in recordings if r.frf is not None and r.state == state)
 
 
 def stacked(read: Sequence[Recording]) -> list[Recording]:
@@ -109,7 +129,7 @@ def _joined(a: Recording, b: Recording) -> Recording:
     return replace(
         a, name=f"{a.name} + {b.name}", frf=_side_by_side(parts), nodes={**b.nodes, **a.nodes},
         axes={**b.axes, **a.axes}, functions=(*a.functions, *b.functions),
-        notes=(*a.notes, *b.notes, said),
+        notes=(*a.notes, *b.notes, said), mass=a.mass or b.mass,
     )  # fmt: skip
 
 

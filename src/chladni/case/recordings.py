@@ -9,7 +9,7 @@ from ..dynamics.frf import FRF
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from .recording_groups import relation
+from .recording_groups import relation, states
 from .toml_sections import TomlSection
 
 
@@ -70,14 +70,24 @@ def _state_first(poles: PoleTable, state: str) -> PoleTable:
     )
 
 
-def notes_of(recordings: Sequence[Recording]) -> list[str]:
-    """Which recording is compared, what is not, and how far the others are from it."""
+def notes_of(recordings: Sequence[Recording], alone: bool = True) -> list[str]:
+    """Which recording is compared, what is not, and how far the others are from it.
+
+    Parameters
+    ----------
+    alone : whether one state alone is asked about
+    """
     out = [note for r in recordings for note in r.notes]
     if not recordings:
         return out
     first = recordings[0]
-    held = [_other(first, r) for r in recordings[1:] if first.frf is not None and r.frf is not None]
-    idle = [r.name for r in recordings[1:] if first.frf is None or r.frf is None]
+    among = states(recordings) if first.frf is not None else ()
+    if len(among) > 1 and not alone:
+        out.append(_every_state(among))
+    both = [r for r in recordings[1:] if first.frf is not None and r.frf is not None]
+    held = [_other(first, r) for r in both if r.state == first.state]
+    idle = [_other(first, r) for r in both if alone and r.state != first.state]
+    idle += [r.name for r in recordings[1:] if first.frf is None or r.frf is None]
     if held:
         out.append(
             f"{first.name} is compared with the model; no fit sees the others, calibrate and "
@@ -86,14 +96,23 @@ def notes_of(recordings: Sequence[Recording]) -> list[str]:
     if idle:
         out.append(f"{first.name} is compared with the model; not used: {'; '.join(idle)}")
     if first.frf is None and first.poles is not None:
-        out += _poles(first)
+        out += _poles(first, alone)
     elif first.level is not None or first.article:
         level = "" if first.level is None else f"level {first.level:g}"
         said = ", ".join(s for s in (first.article and f"article {first.article}", level) if s)
-        out.append(f"{first.name} ({said}) is one state of the object; nothing scales with level")
+        out.append(f"{first.name} ({said}) is what is fitted; nothing scales with level")
     for r in recordings:
         out += _idle(r)
     return out
+
+
+def _every_state(among: Sequence[str]) -> str:
+    """How states are gone about."""
+    named = ", ".join(repr(s) for s in among)
+    return (
+        f"states {named}: calibrate and diagnose take each of them, what is common is shared; "
+        "other commands take the first ([test] use names another)"
+    )
 
 
 def _other(first: Recording, r: Recording) -> str:
@@ -105,6 +124,8 @@ def _other(first: Recording, r: Recording) -> str:
     said = [f"state {r.state!r}"] * (r.state != first.state)
     said += [f"article {r.article}"] * (r.article != first.article)
     said += [f"level {r.level:g}"] if r.level is not None and r.level != first.level else []
+    if r.mass is not None:
+        far += f"; its mass of {r.mass:g} kg is not used"
     return f"{r.name} ({', '.join(said) or relation(first, r)}; {far})"
 
 
@@ -118,12 +139,14 @@ def deviation(a: FRF, b: FRF) -> float | None:
     return float(np.sqrt(np.mean(np.log10(y[use] / x[use]) ** 2)))
 
 
-def _poles(r: Recording) -> list[str]:
+def _poles(r: Recording, alone: bool) -> list[str]:
     """What of a table of poles is left."""
     assert r.poles is not None
     out = []
     states = r.poles.states
-    if len(states) > 1:
+    if len(states) > 1 and not alone:
+        out.append(_every_state(states))
+    elif len(states) > 1:
         rest = ", ".join(repr(s) for s in states[1:])
         out.append(
             f"{r.name}: the poles of state {states[0]!r} are compared; not used: {rest} "

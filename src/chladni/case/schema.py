@@ -91,7 +91,12 @@ SCHEMA = (
     Key("recording", "level", "number", "N or m/s²", "what the file says",
         "Level of excitation; frequencies that move with it are named in the notes.", "2.0", _READ),
     Key("recording", "state", "text", "", "one state",
-        "What was done to the object before this was measured.", '"with the bracket"', _READ),
+        "What was done to the object before this was measured. `calibrate` and `diagnose` take "
+        "every state (or the one `use` names): E, rho, t are shared, an effect is a state's own. "
+        "The deck and `mass` are those of the first, or of the one used.",
+        '"with the bracket"', _READ),
+    Key("recording", "mass", "number", "kg", "not weighed in this state",
+        "Weighed mass in this state.", "1.95", _FIT),
     Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
         "Band that is identified and fitted.", "[26.0, 195.0]", ("identify", *_TEST)),
     Key("band", "exclude", "list of [low, high]", "Hz", "none",

@@ -113,6 +113,7 @@ class Recording:
     level : float or None        excitation [N], or [m/s²] for base excitation
     article : str                which of several nominally equal objects
     state : str                  what was done to the object, where it was measured as it changed
+    mass : float or None         weighed in this state [kg]
     notes : tuple of str         what was found odd and how it was read
     """
 
@@ -128,6 +129,7 @@ class Recording:
     article: str = ""
     notes: tuple[str, ...] = ()
     state: str = ""
+    mass: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

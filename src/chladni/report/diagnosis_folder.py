@@ -13,6 +13,7 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from .diagnosis_json import diagnosis_json
 from .figures import Shown, figures
 from .page import write_page
+from .states_table import state_folder
 
 
 def write_diagnosis(
@@ -29,6 +30,7 @@ def write_diagnosis(
     command : the line that makes this run again
     """
     folder.mkdir(parents=True, exist_ok=True)
+    result = _with_states(folder, case, result, progress)
     files = _decks(folder, case, result)
     files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
     result = replace(result, files=files)
@@ -38,6 +40,20 @@ def write_diagnosis(
     title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
     write_page(folder, result, drawn, result.notes, command=command, title=title)
     return result
+
+
+def _with_states(
+    folder: Path, case: Case, result: DiagnosisResult, progress: Progress
+) -> DiagnosisResult:
+    """Every state but the first into a folder of its own; the first is the run itself."""
+    done = list(result.states)
+    for k, state in enumerate(result.states):
+        if k:
+            place = folder / state_folder(result, k)
+            done[k] = replace(
+                state, result=write_diagnosis(place, case, state.result, "", progress)
+            )
+    return replace(result, states=tuple(done))
 
 
 def _decks(folder: Path, case: Case, result: DiagnosisResult) -> dict[str, str | None]:

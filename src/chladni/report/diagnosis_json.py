@@ -22,7 +22,7 @@ from ..updating.result import (
     Remainder,
     Scores,
 )
-from ..workflows.diagnosis_result import Compared, DiagnosisResult
+from ..workflows.diagnosis_result import Compared, DiagnosisResult, StateResult
 
 Row = TypeVar("Row")
 _Q = {  # key: field of Scores
@@ -45,10 +45,7 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "effects": [_effect(e) for e in r.effects],
         "alternatives": [_alternative(a) for a in r.alternatives],
         "fit": None if r.agreement is None else _fit(r.agreement),
-        "calibrated": [
-            {"where": c.where, **_estimate(c.estimate), "deck_value": c.deck_value}
-            for c in r.calibrated
-        ],
+        "calibrated": [_calibrated(c) for c in r.calibrated],
         "adequate": None if r.adequate is None else _adequate(r.adequate),
         "one_of": [list(names) for names in r.one_of],
         "mass": None if m is None else vars(m),
@@ -63,7 +60,13 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "files": dict(r.files),
         "frequency_rms_percent": None if error is None else vars(error),
         "recordings": [dict(vars(row)) for row in r.recordings],
+        "states": [{"state": s.name, **diagnosis_json(s.result)} for s in r.states],
+        "shared": [_calibrated(c) for c in r.shared],
     }
+
+
+def _calibrated(c: CalibratedParameter) -> dict[str, Any]:
+    return {"where": c.where, **_estimate(c.estimate), "deck_value": c.deck_value}
 
 
 def _effect(e: NamedEffect) -> dict[str, Any]:
@@ -132,10 +135,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         effects=tuple(_read_effect(e) for e in d.get("effects") or ()),
         alternatives=tuple(_read_alternative(a) for a in alternatives or ()),
         agreement=_read_fit(d["fit"]) if d.get("fit") else None,
-        calibrated=tuple(
-            CalibratedParameter(c.get("where", ""), _read_estimate(c), c.get("deck_value"))
-            for c in d.get("calibrated") or ()
-        ),
+        calibrated=_read_calibrated(d.get("calibrated")),
         mass=MassComparison(**mass) if mass else None,
         frequencies=tuple(_known(FrequencyRow, r) for r in d.get("frequencies") or ()),
         frequency_error=_known(FrequencyError, error) if error else None,
@@ -150,6 +150,17 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         searched=bool(d.get("searched", alternatives is None or len(alternatives) > 0)),
         files=dict(d.get("files") or {}),
         recordings=tuple(_known(RecordingScore, r) for r in d.get("recordings") or ()),
+        states=tuple(
+            StateResult(str(s.get("state", "")), from_json(s)) for s in d.get("states") or ()
+        ),
+        shared=_read_calibrated(d.get("shared")),
+    )
+
+
+def _read_calibrated(rows: Sequence[Mapping[str, Any]] | None) -> tuple[CalibratedParameter, ...]:
+    return tuple(
+        CalibratedParameter(c.get("where", ""), _read_estimate(c), c.get("deck_value"))
+        for c in rows or ()
     )
 
 

@@ -8,6 +8,7 @@ from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Score
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
 from .recording_scores import recording_scores
+from .states_table import states_table
 from .words import interval, number, percent, quantity
 
 HEADING = {
@@ -67,6 +68,13 @@ _FILES = {
 
 
 def sentence(result: DiagnosisResult) -> str:
+    """The verdict in words; of several states one sentence each."""
+    if not result.states:
+        return _sentence(result)
+    return " ".join(f"{s.name or 'The first state'}: {_sentence(s.result)}" for s in result.states)
+
+
+def _sentence(result: DiagnosisResult) -> str:
     """The verdict in one sentence."""
     verdict, gain = result.verdict, _gain(result.agreement)
     names = " and ".join(e.name for e in result.effects)
@@ -125,6 +133,7 @@ def sections(
     rest = [Picture(p, n) for n, p in figures.items() if n not in PLACES and n != "where"]
     return [
         Section("Not to be trusted", [Items(result.distrust)] if result.distrust else []),
+        Section("States", states_table(result)),
         Section("At a glance", _glance(result)),
         Section("What was found", _effects(result.effects)),
         Section("What was calibrated", _calibrated(result)),

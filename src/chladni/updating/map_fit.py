@@ -4,9 +4,10 @@
 (MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 27-28).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -120,6 +121,29 @@ def fit(
         r0, J0 = beside(effects, mass_measurement, x, state)
         return np.append(r, r0), np.concatenate([J, J0]) if gradient else J, state
 
+    x, r, J, state, status = descend(objective, start, limit, max_steps, tol)
+    cost = float(r @ r)
+    A = J.T @ J
+    S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
+    S += sum(2 * np.log(effect.trials_factor) for effect in effects)
+    own = r[: len(r) - len(x) - (mass_measurement is not None)]
+    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
+
+
+Objective = Callable[[np.ndarray, bool], tuple[np.ndarray, np.ndarray, Any]]
+
+
+def descend(
+    objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any, Status]:
+    """Levenberg-Marquardt: x, residuals, slopes and whatever the objective hands along, there.
+
+    Parameters
+    ----------
+    objective : x, whether slopes are asked for -> residuals (n,), slopes (n, n_p), anything
+    limit : (n_p,)     longest step
+    tol : stop when a step improves the sum of squares by less
+    """
     x, damping = start.copy(), 1e-2
     status = Status.OUT_OF_STEPS if len(x) else Status.CONVERGED
     r, J, state = objective(x, True)
@@ -135,11 +159,7 @@ def fit(
         if improved < tol:
             status = Status.CONVERGED
             break
-    A = J.T @ J
-    S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
-    S += sum(2 * np.log(effect.trials_factor) for effect in effects)
-    own = r[: len(r) - len(x) - (mass_measurement is not None)]
-    return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
+    return x, r, J, state, status
 
 
 def _step(objective, x, r, J, cost, damping, limit):  # type: ignore[no-untyped-def]

@@ -167,7 +167,9 @@ def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> State:
     x, at = problem.mean(), 0
     for e in problem.base:
         n = len(e.parameters)
-        if e.kind == "nuisance" and e.writable:
+        if e.kind == "ordinary":
+            x[at : at + n] = [p.nominal for p in e.parameters]
+        elif e.writable:
             x[at : at + n] = null.fit.of(e)
         at += n
     return evaluate(null.model, problem.base, x, False)

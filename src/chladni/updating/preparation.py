@@ -350,10 +350,11 @@ def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProbl
     return reduced
 
 
+NOT_WEIGHED = "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"
+
+
 def _mass_note(question: Question) -> list[str]:
     if question.mass_measurement is None:
-        return [
-            "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"
-        ]
+        return [NOT_WEIGHED]
     w = question.mass_measurement
     return [f"the weighed mass, {w.mass:.4g} kg +- {w.sd:.2g} kg, is a datum like any other"]

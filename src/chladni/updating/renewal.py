@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from ..fem.modelled import modelled
 from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
+from .joint_fit import with_priors
 from .likelihood import Poles, Responses
 from .preparation import SOLVED, nuisances, updating_problem
 from .question import Prepared, Question
@@ -103,4 +104,5 @@ def _on_new_structure(
         [*nuisances(reduced, model, f_max, not rows), *of_test],
         f_max,
     )
+    fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
     return fresh, fresh.fitted_with(effect.with_reference_state(x), x, fresh.mean())

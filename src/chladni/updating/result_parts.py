@@ -4,6 +4,7 @@ import numpy as np
 
 from .diagnosis import Diagnosis, threshold
 from .hypothesis_fit import HypothesisFit
+from .joint_fit import JointFit
 from .likelihood import LN10, Poles
 from .outcome import real_poles
 from .question import Prepared
@@ -101,11 +102,25 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         fit = whole if effect in whole.effects else deck.fit
         rows = effect.reported(deck.fit.of(effect), fit.sd(effect))
         for parameter, row in zip(effect.parameters, rows, strict=True):
-            given = parameter.value(parameter.mean)
+            given = parameter.value(parameter.nominal)
             called = getattr(effect, "called", "")  # by the user
             where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
             out.append(CalibratedParameter(where, row, given))
     return tuple(out)
+
+
+def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
+    """Ordinary parameters that several states share, fitted to all of them at once."""
+    seen: dict[tuple[str, str], CalibratedParameter] = {}
+    for one in joint.fits:
+        for effect in (e for e in one.fit.effects if e.kind == "ordinary"):
+            rows = effect.reported(one.fit.of(effect), one.fit.sd(effect))
+            for parameter, row in zip(effect.parameters, rows, strict=True):
+                given = parameter.value(parameter.nominal)
+                seen.setdefault(
+                    (effect.text, row.name), CalibratedParameter(effect.text, row, given)
+                )
+    return tuple(seen.values())
 
 
 def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:

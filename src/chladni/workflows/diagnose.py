@@ -2,8 +2,8 @@
 
 from ..case import Case
 from ..progress import Progress, silent
-from .diagnosis_pipeline import answered
 from .diagnosis_result import DiagnosisResult
+from .states import answered
 
 
 def diagnose(case: Case, progress: Progress = silent) -> DiagnosisResult:

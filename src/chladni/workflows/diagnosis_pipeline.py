@@ -7,10 +7,9 @@
 5. the result is written into the deck, and every number is taken from the decks as written.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..dynamics.frf import FRF
@@ -25,6 +24,7 @@ from ..updating.confusers import with_confusers
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
+from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import leaning
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
@@ -38,7 +38,7 @@ from ..updating.outcome import (
     prudently_calibrated,
     real_poles,
 )
-from ..updating.preparation import prepare
+from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
@@ -46,36 +46,61 @@ from ..updating.result_parts import agreement, alternatives, calibrated, named_e
 from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
-from .output_only import with_natural_frequencies
 from .question_of_case import question
 
 BLIND_SHARE = 0.05  # of the shells
 
 
-def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
-    """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
-    with threadpool_limits(1):
-        progress("identifying the recording", 0.0)
-        if diagnosing and not len(case.assembly.shells):
-            raise FileError(
-                f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
-                "calibrate and correlate take any deck"
-            )
-        case = with_natural_frequencies(case)
-        asked = question(case)
-        prepared = prepare(asked)
-        found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
-        if diagnosing:
-            found = withheld(prepared, found)
-        found, distrust = _judged(asked, prepared, found)
-        if diagnosing and prepared.too_little:
-            distrust = (f"nothing is named: {prepared.too_little}", *distrust)
-        progress("the updated deck", 0.85)
-        stages, lost = _updated(case, asked, prepared, found)
-        progress("scores", 0.95)
-        result = _result(asked, prepared, found, stages)
-        notes = (*result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
-        return replace(result, notes=notes, distrust=distrust, searched=diagnosing)
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """A case with its explanation, before anything is written."""
+
+    case: Case
+    asked: Question
+    prepared: Prepared
+    found: Diagnosis
+    distrust: tuple[str, ...]
+
+
+def explained(
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
+) -> Explained:
+    """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case.
+
+    Parameters
+    ----------
+    known : what other states say of what this one shares with them
+    """
+    progress("identifying the recording", 0.0)
+    if diagnosing and not len(case.assembly.shells):
+        raise FileError(
+            f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
+            "calibrate and correlate take any deck"
+        )
+    asked = question(case)
+    prepared = prepare(asked)
+    if known:
+        base = tuple(informed(prepared.problem.base, known))
+        notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
+        prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
+    found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
+    if diagnosing:
+        found = withheld(prepared, found)
+    found, distrust = _judged(asked, prepared, found)
+    if diagnosing and prepared.too_little:
+        distrust = (f"nothing is named: {prepared.too_little}", *distrust)
+    return Explained(case, asked, prepared, found, distrust)
+
+
+def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
+    """The result of an explanation: the decks as they are written, and every number from them."""
+    case, asked, prepared, found = known.case, known.asked, known.prepared, known.found
+    progress("the updated deck", 0.85)
+    stages, lost = _updated(case, asked, prepared, found)
+    progress("scores", 0.95)
+    result = _result(asked, prepared, found, stages)
+    notes = (*result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
+    return replace(result, notes=notes, distrust=known.distrust, searched=diagnosing)
 
 
 def _judged(

@@ -78,6 +78,8 @@ class DiagnosisResult:
     models : the structures; None where the result was read from a file
     left_where : what the explanation leaves, on the mesh; None where frequencies were compared
     recordings : Q of the decks on the recordings that were not fitted
+    states : of an object measured in several states each one's result; this one is the first's
+    shared : what the states share, fitted to all of them at once
     """
 
     verdict: str = ""
@@ -99,6 +101,8 @@ class DiagnosisResult:
     models: UpdatedModels | None = None
     left_where: LeftWhere | None = None
     recordings: tuple[RecordingScore, ...] = ()
+    states: tuple["StateResult", ...] = ()
+    shared: tuple[CalibratedParameter, ...] = ()
 
     @property
     def deck_changed(self) -> bool:
@@ -116,3 +120,11 @@ class DiagnosisResult:
         if self.distrust:
             raise AccuracyError("; ".join(self.distrust))
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class StateResult:
+    """One state of an object, and what was found in it."""
+
+    name: str
+    result: DiagnosisResult

@@ -26,14 +26,11 @@ def question(case: Case) -> Question:
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
         raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
-    mass_measurement = None
-    if case.setup.mass is not None:
-        mass_measurement = MassMeasurement(case.setup.mass, case.setup.mass_sd)
     asked = Question(
         case.assembly,
         case.outputs,
         case.inputs,
-        mass_measurement=mass_measurement,
+        mass_measurement=_weighed(case),
         hangers=case.setup.hangers,
         band=case.band or (0.0, np.inf),
         exclude=case.exclude,
@@ -48,6 +45,17 @@ def question(case: Case) -> Question:
         return replace(asked, frf=frfs[0], others=_others(case), level=first.level)
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
+
+
+MASS_SD = 0.002  # of the mass, where the user gives none
+
+
+def _weighed(case: Case) -> MassMeasurement | None:
+    """What the scales say of the recording that is fitted, itself or the article as a whole."""
+    mass, sd = case.recordings[0].mass, case.setup.mass_sd
+    if mass is not None:
+        return MassMeasurement(mass, sd or MASS_SD * mass)
+    return None if case.setup.mass is None else MassMeasurement(case.setup.mass, sd)
 
 
 def _others(case: Case) -> tuple[OtherRecording, ...]:

@@ -1,0 +1,53 @@
+"""An object in several states: what was found in each, and what they share."""
+
+import re
+
+from ..effects.estimate import Estimate
+from ..workflows.diagnosis_result import DiagnosisResult, StateResult
+from .blocks import Block, Table
+from .words import number
+
+
+def state_folder(result: DiagnosisResult, k: int) -> str:
+    """Folder of the k-th state within that of the run; the first state's is the run's own."""
+    word = re.sub(r"[^A-Za-z0-9]+", "-", result.states[k].name).strip("-").lower()
+    return f"state-{k + 1}-{word}".rstrip("-") if k else "."
+
+
+def states_table(result: DiagnosisResult) -> list[Block]:
+    """Each state with its effect, its Q and its folder; then what they share."""
+    if not result.states:
+        return []
+    rows = [_row(s, state_folder(result, k)) for k, s in enumerate(result.states)]
+    heads = ("state", "verdict", "effect", "where", "size", "Q before", "Q after", "folder")
+    words = ("state", "verdict", "effect", "where", "size", "folder")
+    note = "Each state has decks and a page of its own; an effect is of its state."
+    out: list[Block] = [Table(heads, rows, words, note)]
+    if result.shared:
+        shared = [
+            (p.where, number(p.deck_value), _size(p.estimate), p.estimate.unit)
+            for p in result.shared
+        ]
+        said = "Shared by all states, fitted to their recordings at once."
+        out.append(Table(("parameter", "deck", "all states", "unit"), shared, ("parameter",), said))
+    return out
+
+
+def _row(s: StateResult, folder: str) -> tuple[str, ...]:
+    effect = s.result.effects[0] if s.result.effects else None
+    fit = s.result.agreement.fitted if s.result.agreement else None
+    return (
+        s.name or "(no name)",
+        s.result.verdict,
+        effect.name if effect else "–",
+        effect.where.text if effect else "–",
+        ", ".join(f"{p.name} = {_size(p)} {p.unit}" for p in effect.parameters) if effect else "–",
+        number(fit.nominal) if fit else "–",
+        number(fit.after) if fit else "–",
+        folder,
+    )
+
+
+def _size(p: Estimate) -> str:
+    """The value and its interval."""
+    return f"{number(p.value)} ({number(p.low)} to {number(p.high)})"

@@ -1,0 +1,161 @@
+"""Several states of one object fitted together: what is common is shared, what moves is each one's.
+
+The residuals of all states are stacked; E, rho, t of a part, mesh error and the like are one
+unknown for all of them, with their prior counted once, and an effect or a gain is of its state:
+-2 ln posterior = Σ_states |r_s(x_shared, x_s)|² + priors.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..effects.effect import WIDER, Effect
+from .hypothesis_fit import HypothesisFit
+from .map_fit import MassMeasurement, beside, descend
+from .reduced_model import State, evaluate
+
+SharedKey = tuple[str, str, int]  # an effect's name, where it acts, number of the parameter
+Posterior = dict[SharedKey, tuple[float, float]]  # mean and standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """All states at their most probable x.
+
+    Attributes
+    ----------
+    x, covariance : (n,), (n, n)   of every unknown
+    where : for each state, positions of its parameters in x
+    shared : {(effect, text, number): position in x} of what all states that have it share
+    fits : the states one by one, with their part of x and of the covariance
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    where: tuple[np.ndarray, ...]
+    shared: dict[SharedKey, int]
+    fits: tuple[HypothesisFit, ...]
+
+    def posterior(self) -> Posterior:
+        """Mean and standard deviation of what is shared."""
+        sd = np.sqrt(np.diag(self.covariance))
+        return {key: (float(self.x[k]), float(sd[k])) for key, k in self.shared.items()}
+
+
+def joint_fit(
+    states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None],
+    *, max_steps: int = 30, tol: float = 0.05,
+) -> JointFit:  # fmt: skip
+    """Fit all states at once from where each stands.
+
+    Parameters
+    ----------
+    states : one fit each; the first that has a shared parameter says its prior
+    masses : what each was weighed
+    """
+    where, shared, first = _positions(states)
+    n = 1 + max(int(at.max(initial=-1)) for at in where)
+    start, priors = np.zeros(n), [p for p, _ in sorted(first, key=lambda pair: pair[1])]
+    for fit, at in zip(reversed(states), reversed(where), strict=True):
+        start[at] = fit.fit.x
+    mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
+
+    def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, list[State]]:
+        found, rows, slopes = [], [(x - mean) / sd], [np.diag(1 / sd)]
+        for one, at, mass in zip(states, where, masses, strict=True):
+            state = evaluate(one.model, one.fit.effects, x[at], gradient)
+            r, J = one.data.residual(state, gradient)
+            weighed, slope = _weighed(one, mass, x[at], state)
+            found.append(state)
+            rows += [r, weighed]
+            if gradient:
+                slopes += [_spread(J, at, n), _spread(slope, at, n)]
+        return np.concatenate(rows), np.concatenate(slopes), found
+
+    limit = np.array([p.step for p in priors])
+    x, _, J, found, _ = descend(objective, start, limit, max_steps, tol)
+    covariance = np.linalg.inv(J.T @ J)
+    fits = tuple(
+        _of_state(one, x[at], covariance[np.ix_(at, at)], state)
+        for one, at, state in zip(states, where, found, strict=True)
+    )
+    return JointFit(x, covariance, tuple(where), shared, fits)
+
+
+def _weighed(
+    one: HypothesisFit, mass: MassMeasurement | None, x: np.ndarray, state: State
+) -> tuple[np.ndarray, np.ndarray]:
+    """The row of the scales alone."""
+    r, J = beside(one.fit.effects, mass, x, state)
+    return r[len(x) :], J[len(x) :]
+
+
+def _spread(J: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
+    """Columns of one state among those of all."""
+    out = np.zeros((len(J), n))
+    out[:, at] = J
+    return out
+
+
+def _positions(
+    states: Sequence[HypothesisFit],
+) -> tuple[list[np.ndarray], dict[SharedKey, int], list]:
+    """Positions of every state's parameters, of what is shared, and (prior, position) of all."""
+    shared: dict[SharedKey, int] = {}
+    where, first, n = [], [], 0
+    for one in states:
+        at = []
+        for effect in one.fit.effects:
+            common = effect is not one.effect and of_the_object(effect)
+            for k, p in enumerate(effect.parameters):
+                key = (effect.name, effect.text, k)
+                known = shared.get(key) if common else None
+                if known is None:
+                    known, n = n, n + 1
+                    first.append((p, known))
+                    if common:
+                        shared[key] = known
+                at.append(known)
+        where.append(np.array(at, dtype=int))
+    return where, shared, first
+
+
+def of_the_object(effect: Effect) -> bool:
+    """Whether an effect belongs to the object in all its states, and not to one test of it."""
+    idle = effect.outputs(np.zeros(len(effect.parameters)))
+    return effect.kind in ("ordinary", "nuisance") and idle is None
+
+
+def _of_state(
+    one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
+) -> HypothesisFit:
+    fit = replace(one.fit, x=x, covariance=covariance, state=state)
+    return HypothesisFit(one.effect, fit, one.model)
+
+
+def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
+    """The effects with what other states say of them as their prior.
+
+    Laplace's deviations are too narrow by about ``WIDER``; a prior never becomes wider than it was.
+    """
+    return [_informed(e, posterior) if of_the_object(e) else e for e in effects]
+
+
+def _informed(effect: Effect, posterior: Posterior) -> Effect:
+    own = []
+    for k, p in enumerate(effect.parameters):
+        mean, sd = posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
+        own.append(replace(p, mean=mean, sd=min(WIDER * sd, p.sd)))
+    return replace(effect, parameters=tuple(own))
+
+
+def with_priors(effects: Sequence[Effect], known: Sequence[Effect]) -> list[Effect]:
+    """The effects with the priors that their ordinary namesakes have elsewhere."""
+    priors = {(e.name, e.text): e.parameters for e in known if e.kind == "ordinary"}
+    return [
+        replace(e, parameters=priors.get((e.name, e.text), e.parameters))
+        if e.kind == "ordinary"
+        else e
+        for e in effects
+    ]

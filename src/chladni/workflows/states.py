@@ -1,0 +1,106 @@
+"""One state of an object, or several: each is explained, what is common is shared.
+
+1. the states are explained one after the other; what those before say of E, rho, t, mesh and
+   scatter (their joint fit, each with its own effect) is the prior of the next;
+2. the explanations as decks can hold them are fitted once more, all at once, with E, rho, t shared;
+3. every state's deck is written with the shared values and its own effect.
+"""
+
+from dataclasses import replace
+
+from threadpoolctl import threadpool_limits
+
+from ..case import Case
+from ..case.recording_groups import of_state, states
+from ..progress import Progress, within
+from ..updating.diagnosis import Diagnosis
+from ..updating.hypothesis_fit import HypothesisFit, as_written
+from ..updating.joint_fit import JointFit, joint_fit
+from ..updating.result import CalibratedParameter
+from ..updating.result_parts import shared_values
+from .diagnosis_pipeline import Explained, explained, told
+from .diagnosis_result import DiagnosisResult, StateResult
+from .output_only import with_natural_frequencies
+
+
+def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
+    """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
+    with threadpool_limits(1):
+        case = with_natural_frequencies(case)
+        names = states(case.recordings)
+        if len(names) < 2 or ("test", "use") in case.given:
+            return told(explained(case, diagnosing, progress), diagnosing, progress)
+        return _in_states(case, names, diagnosing, progress)
+
+
+def _in_states(
+    case: Case, names: tuple[str, ...], diagnosing: bool, progress: Progress
+) -> DiagnosisResult:
+    every: list[Explained] = []
+    for k, name in enumerate(names):
+        stage = within(progress, 0.8 * k / len(names), 0.8 * (k + 1) / len(names))
+        known = _joint(every, [_lead(e.found) for e in every]).posterior() if every else None
+        every.append(explained(_one_state(case, names, name), diagnosing, stage, known))
+    joint = _joint(every, [_as_deck(e) for e in every])
+    changed = any(e.found.verdict != "nothing missing" for e in every)
+    every = [_with(e, fit, changed) for e, fit in zip(every, joint.fits, strict=True)]
+    shared = shared_values(joint)
+    results = []
+    for k, (name, one) in enumerate(zip(names, every, strict=True)):
+        stage = within(progress, 0.8 + 0.2 * k / len(names), 0.8 + 0.2 * (k + 1) / len(names))
+        results.append(StateResult(name, _said(told(one, diagnosing, stage), name, names, shared)))
+    first = results[0].result
+    distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
+    return replace(first, states=tuple(results), shared=shared, distrust=distrust)
+
+
+def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:
+    """The case with the recordings of one state; the weighing is that of the first."""
+    setup, notes = case.setup, case.notes
+    recordings = of_state(case.recordings, name)
+    if name != names[0]:
+        setup = replace(setup, mass=None)
+        if case.setup.mass is not None and recordings[0].mass is None:
+            notes = (*notes, f"state {name!r} was not weighed: [test] mass is that of {names[0]!r}")
+    return replace(case, recordings=recordings, setup=setup, notes=notes)
+
+
+def _lead(found: Diagnosis) -> HypothesisFit:
+    """The explanation with all that was fitted beside it."""
+    return found.found or found.null
+
+
+def _as_deck(one: Explained) -> HypothesisFit:
+    """The explanation as a deck can hold it, beside the learned error of the model."""
+    if one.found.written is not None:
+        return one.found.written
+    return as_written(_lead(one.found), one.prepared.problem.mass_measurement)
+
+
+def _joint(every: list[Explained], fits: list[HypothesisFit]) -> JointFit:
+    """All states at once; priors are those of the first, which knew of no other."""
+    return joint_fit(fits, [e.prepared.problem.mass_measurement for e in every])
+
+
+def _with(one: Explained, fit: HypothesisFit, changed: bool) -> Explained:
+    """The explanation with the values that all states share in its deck.
+
+    A state that asks for no other values than the deck's has them too where another state does.
+    """
+    found = one.found
+    if found.found is not None:
+        return replace(one, found=replace(found, written=fit))
+    if changed and found.verdict == "nothing missing":
+        found = replace(found, verdict="calibration only")
+    return replace(one, found=replace(found, plain=fit))
+
+
+def _said(
+    result: DiagnosisResult, name: str, names: tuple[str, ...],
+    shared: tuple[CalibratedParameter, ...],
+) -> DiagnosisResult:  # fmt: skip
+    """The result with a note on what it shares."""
+    rest = ", ".join(repr(n) for n in names if n != name)
+    what = ", ".join(p.where for p in shared) or "nothing"
+    note = f"state {name!r} was fitted together with {rest}: {what} shared, an effect is its own"
+    return replace(result, notes=(note, *result.notes))

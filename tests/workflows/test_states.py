@@ -1,0 +1,184 @@
+"""Several recordings and several states of one object in one case."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.effects.points import with_masses
+from chladni.ema.setup import PoleTable
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz, write_poles
+from chladni.report.diagnosis_folder import write_diagnosis
+from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
+from chladni_specimens.plates import plate
+
+SENSORS = [(0.0, 0.11), (0.05, 0.22), (0.15, 0.11), (0.2, 0.1833), (0.25, 0.0), (0.3, 0.22)]
+SHAKERS = [(0.0, 0.0), (0.3, 0.0367)]
+PLACE, MASS, T = (0.25, 0.1833), 0.02, 1.015e-3
+DECK = plate(0.3, 0.22, 6, 6, 1e-3)
+HEAD = """[model]
+deck = "plate.bdf"
+units = "SI"
+[test]
+mass = {mass}
+[band]
+fit = [20.0, 190.0]
+"""
+
+
+def at(assembly, places):
+    away = np.linalg.norm(assembly.points[None, :, :2] - np.asarray(places)[:, None], axis=2)
+    return tuple(int(assembly.ids[k]) for k in away.argmin(axis=1))
+
+
+def labels(assembly, places):
+    return tuple(f"{g}:+Z" for g in at(assembly, places))
+
+
+def record(path, t=T, mass=0.0, shakers=SHAKERS[:1], seed=0):
+    """Accelerances of a plate by a mesh twice as fine, 0.5 % noise; what it weighs [kg]."""
+    article = plate(0.3, 0.22, 12, 12, t)
+    if mass:
+        article = with_masses(article, at(article, [PLACE]), mass)
+    write_assembly(article, path.with_suffix(".bdf"))
+    model = chladni.load_model(path.with_suffix(".bdf"), "SI")
+    ends, drives = (list(labels(article, p)) for p in (SENSORS, shakers))
+    H = chladni.frf(model, ends, drives, np.linspace(15, 230, 900)).frfs[0].to("accelerance")
+    z = np.random.default_rng(seed).normal(size=(2, *H.values.shape))
+    values = H.values * (1 + 0.005 * (z[0] + 1j * z[1]) / np.sqrt(2))
+    named = labels(DECK, SENSORS), labels(DECK, shakers)
+    write_npz(path, replace(H, values=values, outputs=named[0], inputs=named[1]))
+    return round(chladni.modes(model, 7).mass, 5)
+
+
+def a_case(folder, mass, *recordings):
+    """A case.toml with these [[recording]]."""
+    write_assembly(DECK, folder / "plate.bdf")
+    more = ["[[recording]]\n" + "\n".join(f"{k} = {json.dumps(v)}" for k, v in r.items())
+            for r in recordings]  # fmt: skip
+    (folder / "case.toml").write_text(HEAD.format(mass=mass) + "\n".join(more) + "\n")
+    return chladni.load_case(folder)
+
+
+@pytest.fixture(scope="module")
+def changed(tmp_path_factory):
+    """A plate 1.5 % thicker than its deck, bare and with 20 g on it."""
+    folder = tmp_path_factory.mktemp("states")
+    mass = record(folder / "bare.npz")
+    record(folder / "loaded.npz", mass=MASS, seed=1)
+    return a_case(
+        folder, mass, {"file": "bare.npz", "state": "bare"},
+        {"file": "loaded.npz", "state": "with 20 g"},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def diagnosed(changed):
+    return chladni.diagnose(changed)
+
+
+def test_the_effect_is_found_in_the_state_that_has_it(diagnosed):
+    bare, loaded = diagnosed.states
+    assert (bare.name, loaded.name) == ("bare", "with 20 g")
+    assert not bare.result.effects
+    (found,) = loaded.result.effects
+    assert found.name == "point-mass"
+    assert np.linalg.norm(np.subtract(found.where.point_m[:2], PLACE)) < 0.03
+    M = next(p for p in found.parameters if p.name == "M")
+    assert M.low < MASS < M.high
+
+
+def test_what_is_common_is_one_number(diagnosed):
+    """E, rho, t are the same in every deck, and the thickness is the plate's."""
+    values = [
+        {(c.where, c.estimate.name): c.estimate.value for c in s.result.calibrated}
+        for s in diagnosed.states
+    ]
+    assert values[0] == pytest.approx(values[1])
+    shared = {p.estimate.name: p.estimate for p in diagnosed.shared}
+    assert set(shared) == {"E", "rho", "t"}
+    assert shared["t"].low < T < shared["t"].high
+    assert all("was fitted together with" in s.result.notes[0] for s in diagnosed.states)
+
+
+def test_every_state_has_its_deck_and_its_place_on_the_page(changed, diagnosed, tmp_path):
+    written = write_diagnosis(tmp_path, changed, diagnosed)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "with 20 g" in page
+    assert "Shared by all states" in page
+    loaded = tmp_path / "state-2-with-20-g"
+    assert (loaded / "report.html").exists()
+    assert "CONM2" in (loaded / "updated.bdf").read_text()
+    assert "CONM2" not in (tmp_path / "updated.bdf").read_text()
+    again = read_diagnosis(tmp_path)
+    assert diagnosis_json(from_json(diagnosis_json(written))) == diagnosis_json(written)
+    assert [s.name for s in again.states] == ["bare", "with 20 g"]
+    assert again.states[1].result.effects[0].name == "point-mass"
+
+
+def test_one_state_alone_where_it_is_asked_for(changed, tmp_path):
+    text = changed.path.read_text().replace("[test]", '[test]\nuse = "with 20 g"')
+    for name in ("plate.bdf", "bare.npz", "loaded.npz"):
+        (tmp_path / name).write_bytes((changed.path.parent / name).read_bytes())
+    (tmp_path / "case.toml").write_text(text)
+    found = chladni.calibrate(chladni.load_case(tmp_path))
+    assert not found.states
+    assert any("loaded.npz is compared with the model; not used: bare.npz" in n
+               for n in found.notes)  # fmt: skip
+
+
+def test_states_of_a_table_of_poles_share_their_parameters(tmp_path):
+    """Natural frequencies of one plate, twice: E, rho and t are one."""
+    found = chladni.modes(_article(tmp_path), 14)
+    f = found.modal.frequency[6:]
+    nothing = np.full(len(f), np.nan)
+    both = PoleTable(
+        np.concatenate([f, f * 1.002]), np.full(2 * len(f), 0.05), np.tile(nothing, 2),
+        np.tile(np.arange(1, len(f) + 1), 2), ("cold",) * len(f) + ("warm",) * len(f),
+    )  # fmt: skip
+    write_poles(tmp_path / "poles.csv", both)
+    case = a_case(tmp_path, round(found.mass, 5), {"file": "poles.csv"})
+    found = chladni.calibrate(case)
+    assert [s.name for s in found.states] == ["cold", "warm"]
+    values = [[c.estimate.value for c in s.result.calibrated] for s in found.states]
+    np.testing.assert_allclose(values[0], values[1])
+    decks = [{edit.value for edit in s.result.models.final.changes} for s in found.states]
+    assert decks[0] == decks[1] != set()
+    t = next(p.estimate for p in found.shared if p.estimate.name == "t")
+    assert t.low < T < t.high
+
+
+def _article(folder):
+    write_assembly(plate(0.3, 0.22, 12, 12, T), folder / "article.bdf")
+    return chladni.load_model(folder / "article.bdf", "SI")
+
+
+def test_two_shakers_an_article_and_a_level(tmp_path):
+    """Stacked, spread, held out and scored, and the level that moves is named."""
+    mass = record(tmp_path / "a.npz")
+    record(tmp_path / "b.npz", shakers=SHAKERS[1:], seed=1)
+    record(tmp_path / "other.npz", t=1.003 * T, shakers=SHAKERS, seed=2)
+    record(tmp_path / "hard.npz", t=0.985 * T, shakers=SHAKERS, seed=3)
+    a_case(
+        tmp_path, mass, {"file": "a.npz", "level": 1.0}, {"file": "b.npz", "level": 1.0},
+        {"file": "other.npz", "article": "B"}, {"file": "hard.npz", "level": 5.0},
+    )  # fmt: skip
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), ["calibrate", str(tmp_path), "--out", str(out)])
+    assert done.exit_code == 0, (done.output, done.exception)
+    told = json.loads((out / "diagnosis.json").read_text())
+    rows = {r["name"]: r for r in told["recordings"]}
+    assert rows["other.npz"]["relation"] == "article"
+    assert rows["hard.npz"]["relation"] == "level"
+    assert rows["other.npz"]["apart"] < rows["hard.npz"]["apart"]
+    notes = " ".join(told["notes"])
+    assert "stacked with a.npz as one test with 2 inputs" in notes
+    assert "other.npz and the recording that is fitted differ by" in notes
+    assert "nonlinear: natural frequencies move with level: " in notes
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "no deck is asked to come nearer" in page
