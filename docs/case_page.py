@@ -88,6 +88,13 @@ _FILES = """\
 - Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes
   in which nodes measure, 55 shapes, 151 and 164 header and units.
 
+Several recordings are told apart by article, level and state, as the files or `[[recording]]` say.
+Of one article, level and state, other shaker places are stacked as inputs of one test; the same
+places again are repeats. Repeats and articles give a measured spread below which no fit is asked to
+go; levels, whose frequencies are compared, do not. The first is fitted, the others score the decks.
+States are one object changed: each is diagnosed with what the others say of E, rho and t, all are
+then fitted at once with these shared, and each has its own effect, deck and page.
+
 Time histories and spectra of responses, no force among them, give natural frequencies where a case
 holds neither FRFs nor poles: as if the force were white in the band. Elsewhere they, and mode
 shapes, are named in the notes and not used.

@@ -8,12 +8,13 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
-from chladni.ema.identification import identify
+from chladni.ema.identification import equalised, identify
+from chladni.ema.level_shift import level_notes
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.other_recordings import (
-    level_notes,
+    levels,
     measured_spread,
     others_identified,
     scored_others,
@@ -65,8 +66,6 @@ def test_the_spread_of_articles_is_the_slope_of_their_frequencies():
     assert not notes
     first = identify(question.frf, (20.0, 170.0))
     s = 2 * np.pi * np.linspace(40, 150, 60) * (0.08 + 1j)
-    from chladni.ema.identification import equalised
-
     spread = measured_spread(equalised(first, s), others, s)
     moved = np.log10(equalised(others[0].identified, s) / equalised(first, s))
     due = np.abs(moved) / np.sqrt(2)  # two values, K - 1 = 1: |d|²/2
@@ -86,11 +85,12 @@ def test_frequencies_that_move_with_level_are_named(stretch, moves):
     other = OtherRecording("hard", "level", recorded(DECK, 7, stretch), 4.0)
     question = asked(other, level=1.0)
     others, _ = others_identified(question, (20.0, 170.0))
-    (note,) = level_notes(question, identify(question.frf, (20.0, 170.0)), others)
+    first = (question.level, identify(question.frf, (20.0, 170.0)))
+    (note,) = level_notes([first, *levels(others)])
     assert note.startswith("nonlinear" if moves else "no natural frequency moves with level (1, 4")
     if moves:
-        assert " Hz at 1 N, " in note
-        assert " Hz at 4 N" in note
+        assert " Hz at level 1, " in note
+        assert " Hz at level 4" in note
 
 
 def test_the_fit_is_not_asked_to_go_below_the_spread_and_others_are_scored():

@@ -5,7 +5,7 @@ frequencies move with the excitation; all of them score the decks.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,23 +13,13 @@ from ..ema.identification import Identified, equalised, identify
 from ..errors import ChladniError
 from ..fem.modelled import Modelled
 from .likelihood import LN10, Responses
-from .measured_frequencies import LEAST_DELTA_CHI2, counted, widened
-from .question import OtherRecording, Prepared, Question
+from .measured_frequencies import counted, widened
+from .question import OtherTest, Prepared, Question
 from .result import RecordingScore
 from .written_scores import gain_offset, seen
 
 ALIKE = ("repeat", "article")  # whose differences are the spread of one test
 WINDOW = 9  # lines over which a spread is averaged: a few half-bandwidths of the equalised lines
-PARTNER = 0.05  # of a frequency: farther away is another mode
-MOVED = 1e-3, 4.0  # a frequency has moved: by this share of it and this many standard deviations
-
-
-@dataclass(frozen=True, eq=False)
-class OtherTest:
-    """Another recording with its modes."""
-
-    recording: OtherRecording
-    identified: Identified
 
 
 def others_identified(
@@ -46,6 +36,11 @@ def others_identified(
             continue
         found.append(OtherTest(other, modes))
     return found, notes
+
+
+def levels(others: Sequence[OtherTest]) -> list[tuple[float | None, Identified]]:
+    """Level and modes of those that were measured at another level."""
+    return [(o.recording.level, o.identified) for o in others if o.recording.relation == "level"]
 
 
 def measured_spread(
@@ -90,54 +85,6 @@ def spread_note(
         f"{', '.join(names)} and the recording that is fitted differ by {rms:.2g} decades rms (one "
         "standard deviation): no fit is asked to go below that"
     ]
-
-
-def level_notes(question: Question, fitted: Identified, others: Sequence[OtherTest]) -> list[str]:
-    """Whether natural frequencies move with the level of excitation."""
-    levels = [(question.level, fitted)]
-    levels += [(o.recording.level, o.identified) for o in others if o.recording.relation == "level"]
-    known = [(level, found) for level, found in levels if level is not None]
-    if len(known) < 2:
-        return []
-    known = sorted(known, key=lambda pair: pair[0])
-    unit = "m/s²" if question.base is not None else "N"
-    tracks = [_track(fitted, int(k), known) for k in np.flatnonzero(_clear(fitted))]
-    moved = [t for t in tracks if _moves(t)]
-    said = ", ".join(f"{level:g}" for level, _ in known)
-    if not moved:
-        return [f"no natural frequency moves with level ({said} {unit})"]
-    rows = [
-        ", ".join(f"{f:.5g} Hz at {level:g} {unit}" for level, f, _ in track) for track in moved
-    ]
-    return [f"nonlinear: natural frequencies move with level: {'; '.join(rows)}"]
-
-
-Track = list[tuple[float, float, float]]  # (level, frequency, its standard deviation)
-
-
-def _clear(found: Identified) -> np.ndarray:
-    """Modes that stand out (r,)."""
-    return np.asarray(found.inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2))
-
-
-def _track(fitted: Identified, mode: int, known: Sequence[tuple[float, Identified]]) -> Track:
-    """A mode of the fitted recording at every level where it has a partner."""
-    f, out = fitted.frequency[mode], []
-    for level, found in known:
-        near = np.flatnonzero(_clear(found))
-        if not len(near):
-            continue
-        k = near[np.abs(np.log(found.frequency[near] / f)).argmin()]
-        if abs(np.log(found.frequency[k] / f)) < PARTNER:
-            out.append((level, float(found.frequency[k]), float(found.frequency_sd[k])))
-    return out
-
-
-def _moves(track: Track) -> bool:
-    """Whether the frequencies of a mode differ by more than they are known."""
-    (_, f, sd), away = track[0], np.array(track)
-    change = np.abs(away[:, 1] - f)
-    return bool(np.any(change > np.maximum(MOVED[0] * f, MOVED[1] * np.hypot(away[:, 2], sd))))
 
 
 def scored_others(

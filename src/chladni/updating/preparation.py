@@ -20,6 +20,7 @@ from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import Identified, equalised, frf_variance, identify
+from ..ema.level_shift import level_notes
 from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -31,7 +32,7 @@ from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
-from .other_recordings import level_notes, measured_spread, others_identified, spread_note
+from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
@@ -135,7 +136,8 @@ def _by_responses(question: Question) -> Prepared:
     notes += _mass_note(question)
     problem = replace(problem, damping=modal_damping(found, low, fit_max))
     notes += [
-        *said, *spread_note(spreads[1], data[1].use, others), *level_notes(question, found, others)
+        *said, *spread_note(spreads[1], data[1].use, others),
+        *level_notes([(question.level, found), *levels(others)]),
     ]  # fmt: skip
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:

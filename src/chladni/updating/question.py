@@ -1,7 +1,6 @@
 """What a diagnosis is asked: a structure, what was measured on it and where (SI, Hz)."""
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,9 +17,6 @@ from .hypothesis_fit import UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import MassMeasurement
 
-if TYPE_CHECKING:
-    from .other_recordings import OtherTest
-
 
 @dataclass(frozen=True, eq=False)
 class OtherRecording:
@@ -30,6 +26,14 @@ class OtherRecording:
     relation: str
     frf: FRF
     level: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class OtherTest:
+    """Such a recording with its modes."""
+
+    recording: OtherRecording
+    identified: Identified
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,4 +115,4 @@ class Prepared:
     too_little: str = ""  # why the data cannot bear a name
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
-    others: tuple["OtherTest", ...] = ()
+    others: tuple[OtherTest, ...] = ()

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
+from ..ema.level_shift import level_notes
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
@@ -99,7 +100,7 @@ def identify(
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
             found.append(_modes(recording, band, gaps, averages))
-    notes = [*said, *(note for note in _notes(held, gaps) if note not in said)]
+    notes = [*said, *(note for note in _notes(held, gaps) if note not in said), *_levels(found)]
     return Identification(tuple(found), tuple(notes), _doubts(found))
 
 
@@ -149,6 +150,17 @@ def _notes(held: Sequence[Recording], gaps: Sequence[tuple[float, float]]) -> tu
         said = ", ".join(f"{low:g} to {high:g} Hz" for low, high in gaps)
         notes.append(f"Left out, as the case says: {said}.")
     return tuple(notes)
+
+
+def _levels(found: Sequence[RecordingModes]) -> list[str]:
+    """Frequencies against level, of each article and state by itself."""
+    alike: dict[tuple[str, str], list[RecordingModes]] = {}
+    for one in found:
+        alike.setdefault((one.recording.article, one.recording.state), []).append(one)
+    notes = []
+    for group in alike.values():
+        notes += level_notes([(one.recording.level, one.whole) for one in group])
+    return notes
 
 
 def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
