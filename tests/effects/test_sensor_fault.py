@@ -1,10 +1,12 @@
 """What a sensor fault reports is the factor on the recording."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from chladni.effects.sensor_fault import sensor_fault
+from chladni.effects.sensor_fault import candidates, sensor_fault
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
@@ -27,3 +29,18 @@ def test_the_reported_factor_explains_the_recording(factor: float) -> None:
     fault = sensor_fault("30:+Z", 1, 2, int(np.sign(factor)), 0.0)
     assert fault.reported(x, np.array([0.1]))[0].value == pytest.approx(factor)
     assert off.deviation(evaluate(reduced.model, [fault], x, False)) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("channels", "turned", "found"), [(1, False, 0), (1, True, 2), (2, False, 4)]
+)
+def test_the_level_of_the_only_channel_is_nobodys_fault(
+    channels: int, turned: bool, found: int
+) -> None:
+    """No other channel shows it to be odd; a reversed sign is seen all the same."""
+    delta = np.full((30, channels, 1), 0.2 + 1j * np.pi / np.log(10) * turned)
+    null = np.zeros(1)
+    context = SimpleNamespace(
+        scan=SimpleNamespace(deviation=delta), labels=("1:+Z", "2:+Z"), null=null, bases=(null,)
+    )
+    assert len(candidates(context)) == found

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from numpy.testing import assert_allclose
 
-from chladni.effects.effect import Effect, MatrixTerm, Parameter
+from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import ordinary
 from chladni.effects.point_mass import PointMass
@@ -127,7 +127,8 @@ def test_slopes(reduced, data):
         *(ordinary(reduced.groups, q, [0]) for q in ("E", "rho", "t")), density,
         PointMass.near(where, int(inside[3])), ExtraSupport.near(where, int(inside[-2])),
     ]  # fmt: skip
-    x = np.array([0.03, -0.02, 0.01, 0.05, 0.2, 0.1, -0.2, -1.0, 0.1, 0.1])
+    x = np.full(count(effects), 0.1)
+    x[:8] = 0.03, -0.02, 0.01, 0.05, 0.2, 0.1, -0.2, -1.0
     model = reduced.model
     seen = replace(data, values=data.model(evaluate(model, effects, 0.98 * x, False)))
     _, J = seen.residual(evaluate(model, effects, x), True)

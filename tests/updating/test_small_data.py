@@ -17,6 +17,7 @@ from chladni.units import UNITS
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
 from chladni.updating.measured_frequencies import widened
+from chladni.updating.preparation import _own_modes
 from chladni.updating.reduced_model import _eigen
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
@@ -198,3 +199,10 @@ def test_a_rigid_mode_in_the_middle_is_no_negative_stiffness() -> None:
     assert _eigen(np.diag(lam), np.eye(7))[0][-1] == pytest.approx(2.5e6)
     with pytest.raises(ChladniError, match="negative stiffness"):
         _eigen(np.diag([-100.0, *lam[1:]]), np.eye(7))
+
+
+def test_what_a_rig_rings_with_bears_no_name():
+    """Modes are counted as far as the deck has any there, a little beyond the band included."""
+    deck = SimpleNamespace(modes=SimpleNamespace(frequency=np.array([0.0, 100.0, 250.0, 900.0])))
+    assert _own_modes(deck, 40.0, 200.0) == 2
+    assert _own_modes(deck, 0.0, 100.0) == 1

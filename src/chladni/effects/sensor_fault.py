@@ -54,6 +54,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
     """The two channels whose level or sign departs most from the calibrated model.
 
     Each begins from that model and from the nominal one: a wrong channel bends the calibration.
+    The level of the only channel is that of the whole recording: no other shows it to be odd, so it
+    is none of a sensor's (``gain = "unknown"`` frees it).
     """
     if context.scan is None:
         return []
@@ -63,6 +65,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     return [
         Candidate(sensor_fault(context.labels[i], i, n, sign, start), np.array([start]), base)
         for _, i, sign, start in best
+        if n > 1 or sign < 0
         for base in (context.null, context.bases[0])
     ]
 

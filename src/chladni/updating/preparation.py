@@ -142,7 +142,8 @@ def _by_responses(question: Question) -> Prepared:
     noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
         noise = np.maximum(noise, spreads[1] ** 2)
-    few = too_little(seen, int(data[0].use.any(axis=0).sum()))
+    borne = min(seen, _own_modes(nominal, low, fit_max))  # what a rig rings with bears no name
+    few = too_little(borne, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         problem, data[1], held, what, tuple(notes), nominal, noise, found, few, unseen=unseen,
         others=tuple(others),
@@ -153,6 +154,15 @@ def _modes_seen(found: Identified, low: float, high: float) -> int:
     """How many poles that stand out lie between two frequencies."""
     inside = (found.frequency >= low) & (found.frequency <= high)
     return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
+
+
+NEAR = 1.3  # factor on the band within which a mode of the deck may be one that was seen in it
+
+
+def _own_modes(nominal: Modelled, low: float, high: float) -> int:
+    """How many flexible modes of the deck may have been seen between two frequencies."""
+    f = nominal.modes.frequency
+    return int(((f > max(low / NEAR, 1e-3 * high)) & (f < NEAR * high)).sum())
 
 
 def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
