@@ -113,3 +113,12 @@ def test_one_that_cannot_be_identified_is_named():
     others, notes = others_identified(asked(OtherRecording("C", "repeat", empty)), (20.0, 170.0))
     assert not others
     assert "C (repeat) is not used: " in notes[0]
+
+
+def test_where_frequencies_are_compared_others_are_named_as_not_used():
+    """Places are uncertain by 2 cm, so no response of the second article is looked at."""
+    question = asked(OtherRecording("B", "article", recorded(DECK, 1)))
+    vague = replace(question.outputs, sd=np.full(len(GRIDS), 0.02))
+    ready = prepare(replace(question, outputs=vague))
+    assert not ready.others
+    assert any("not used" in note and "B (article)" in note for note in ready.notes)

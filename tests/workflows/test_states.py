@@ -104,6 +104,7 @@ def test_what_is_common_is_one_number(diagnosed):
     assert set(shared) == {"E", "rho", "t"}
     assert shared["t"].low < T < shared["t"].high
     assert all("was fitted together with" in s.result.notes[0] for s in diagnosed.states)
+    assert "point-mass is in 'with 20 g' only" in diagnosed.notes
 
 
 def test_every_state_has_its_deck_and_its_place_on_the_page(changed, diagnosed, tmp_path):

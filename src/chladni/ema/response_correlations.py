@@ -93,7 +93,9 @@ def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:
 
 
 def _transformed(r: np.ndarray, rate: float) -> np.ndarray:
-    """∫ w(τ) r(τ) exp(-sτ) dτ of lags (n, ...), the one at zero, where noise piles up, halved."""
+    """Σ w(τ) r(τ) exp(-sτ) Δτ of lags (n, ...).
+
+    What noise adds at lag zero is a constant, which the residual terms of the fit take.
+    """
     w = window("exponential", len(r), DECAY)
-    w[0] /= 2
     return np.asarray(np.fft.rfft(r * w[:, None, None], axis=0) / rate)

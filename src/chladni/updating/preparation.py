@@ -276,9 +276,17 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     nuisance = nuisances(reduced, nominal, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
-    notes = (*notes, *_mass_note(question))
+    notes = (*notes, *_unscored(question), *_mass_note(question))
     few = too_little(len(frequency), 0)
     return Prepared(problem, data, held, what, notes, nominal, None, found, few, ~held, held)
+
+
+def _unscored(question: Question) -> list[str]:
+    """A sentence on other recordings, where natural frequencies alone are compared."""
+    if not question.others:
+        return []
+    names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
+    return [f"not used, for natural frequencies are compared: {names}"]
 
 
 def nuisances(

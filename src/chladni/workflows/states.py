@@ -20,6 +20,7 @@ from ..updating.result import CalibratedParameter
 from ..updating.result_parts import shared_values
 from .diagnosis_pipeline import Explained, explained, told
 from .diagnosis_result import DiagnosisResult, StateResult
+from .effects_by_state import by_state
 from .output_only import with_natural_frequencies
 
 
@@ -51,7 +52,8 @@ def _in_states(
         results.append(StateResult(name, _said(told(one, diagnosing, stage), name, names, shared)))
     first = results[0].result
     distrust = tuple(f"state {s.name!r}: {why}" for s in results for why in s.result.distrust)
-    return replace(first, states=tuple(results), shared=shared, distrust=distrust)
+    notes = (*first.notes, *by_state(results))
+    return replace(first, states=tuple(results), shared=shared, distrust=distrust, notes=notes)
 
 
 def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:
