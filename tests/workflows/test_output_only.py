@@ -73,3 +73,13 @@ def test_noise_has_no_natural_frequencies(ambient):
     hiss = tuple(replace(g, values=rng.normal(size=len(g.x))) for g in heard.functions)
     with pytest.raises(FileError, match=r"ambient.uff: no natural frequency stands out"):
         chladni.calibrate(replace(case, recordings=(replace(heard, functions=hiss),)))
+
+
+def test_records_that_are_no_use_are_refused_in_a_sentence(ambient):
+    """A force beside the responses, and no FRF: nothing is compared with anything."""
+    (heard,) = ambient.recordings
+    force = replace(heard.functions[0], unit="N")
+    odd = replace(ambient, recordings=(replace(heard, functions=(*heard.functions, force)),))
+    for workflow in (chladni.correlate, chladni.calibrate, chladni.diagnose):
+        with pytest.raises(FileError, match="neither FRFs nor a table of poles"):
+            workflow(odd)

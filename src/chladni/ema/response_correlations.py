@@ -15,6 +15,8 @@ from .setup import Function
 from .signals import window
 
 FORCES = ("N", "kN", "mN", "lbf", "lb", "kgf")
+FEWEST = 64  # samples of a record
+ROUNDED = 0.2  # of a step: six digits of the time of a long record
 SEGMENTS = 8  # of the record: the lags that are used, and the spread of their correlations
 DECAY = 0.01  # of the window at the last lag
 ALIKE = -np.log(DECAY) / 2  # lines of one noise: the window's equivalent noise bandwidth
@@ -32,9 +34,17 @@ def responses(functions: Sequence[Function]) -> tuple[Function, ...]:
     spectral = ("auto spectrum", "cross spectrum", "psd")
     found = time or tuple(f for f in functions if f.kind in spectral)
     alike = tuple(f for f in found if len(f.x) == len(found[0].x) and np.allclose(f.x, found[0].x))
-    step = np.diff(alike[0].x) if alike else np.zeros(1)
-    even = len(step) > 16 and step[0] > 0 and np.allclose(step, step[0], rtol=1e-3)
-    return alike if even else ()
+    return alike if alike and len(alike[0].x) > FEWEST and _even(alike[0].x) else ()
+
+
+def _even(x: np.ndarray) -> bool:
+    """Whether samples follow each other evenly, as files with few digits have them."""
+    due = np.linspace(x[0], x[-1], len(x))
+    return bool(x[-1] > x[0] and np.abs(x - due).max() < ROUNDED * _step(x))
+
+
+def _step(x: np.ndarray) -> float:
+    return float(x[-1] - x[0]) / (len(x) - 1)
 
 
 def one_sided(functions: Sequence[Function]) -> tuple[FRF, float]:
@@ -55,7 +65,7 @@ def _of_time(functions: Sequence[Function]) -> tuple[FRF, float]:
     """Correlations of each segment of the record, their mean and its variance."""
     y = np.array([np.real(f.values) for f in functions])
     y = y - y.mean(axis=1, keepdims=True)
-    rate = 1 / float(functions[0].x[1] - functions[0].x[0])
+    rate = 1 / _step(functions[0].x)
     order = np.argsort(-(y**2).sum(axis=1), kind="stable")[:REFERENCES]
     n = y.shape[1] // SEGMENTS
     lags = n // 2
@@ -79,7 +89,7 @@ def _of_time(functions: Sequence[Function]) -> tuple[FRF, float]:
 def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:
     """Spectra turned into correlations and back; auto spectra alone are a reference each."""
     f = functions[0].x
-    step = float(f[1] - f[0])
+    step = _step(f)
     n_f = round(float(f[-1]) / step) + 1
     rows = np.zeros((n_f, len(functions)), complex)
     rows[-len(f) :] = np.array([g.values for g in functions]).T

@@ -107,7 +107,10 @@ def _f_max(case: Case, test: FRF | None) -> float:
 
 
 def _by_poles(case: Case, near: ModalModel) -> Correlation:
-    poles = next(r.poles for r in case.recordings if r.poles is not None)
+    tables = [r.poles for r in case.recordings if r.poles is not None]
+    if not tables:
+        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+    poles = tables[0]
     f = poles.of(poles.states[0]).frequency
     return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),
                        notes=tuple(case.said("correlate")))  # fmt: skip
