@@ -19,6 +19,7 @@ from .workflows.recordings_of import load_recordings as load_recordings
 from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
 from .workflows.plan import plan as plan
+from .workflows.evaluation import evaluate_recordings as evaluate_recordings
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate
 from .workflows.calibrate import calibrate as calibrate

@@ -79,7 +79,7 @@ def form_bench(name: str, seed: int) -> Bench:
     n = int(rng.integers(10, 16))
     ends = (0.75 * f[0], (f[n - 1] + f[n]) / 2, (f[n + 3] + f[n + 4]) / 2)
     moving = (built.T @ modes.shapes[:, 6 : 6 + n]).reshape(len(deck.points), 6, -1)[:, :3]
-    every = _candidates(deck)
+    every = glue_candidates(deck)
     spots = every.only(_spread(every, int(rng.integers(8, 31)), rng))
     return Bench(
         name=name,
@@ -105,7 +105,7 @@ def panel_bench(name: str, seed: int) -> Bench:
     built = structure(deck)
     modes = normal_modes(built.system, 20)
     moving = (built.T @ modes.shapes[:, 6:]).reshape(len(deck.points), 6, -1)[:, :3]
-    every = _candidates(deck)
+    every = glue_candidates(deck)
     other: dict[str, Callable[[], Assembly]] = {
         "plate": lambda: holed_plate(0.5, 0.4, (0.2, 0.22, 0.05), 0.021, 1.2e-3),
         "panel": lambda: folded_panel(0.6, 0.3, 0.04, 0.01, 0.017, 1e-3),
@@ -162,7 +162,7 @@ def tailgate_bench() -> Bench:
     )
 
 
-def _candidates(deck: Assembly) -> Spots:
+def glue_candidates(deck: Assembly) -> Spots:
     """Grids where a sensor can be glued: flat on a sheet, or on a tube across it."""
     n = point_normals(deck.points, deck.shells.nodes)
     part, way = np.full(len(deck.points), -1), n.copy()

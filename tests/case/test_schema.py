@@ -16,7 +16,7 @@ from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
 from chladni.io.nastran import assembly, read_deck
-from chladni.io.tables.read_tables import read_table
+from chladni.io.tables.csv_table import read_table
 from chladni.io.tables.sensor_table import _OPTIONAL
 from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS

@@ -161,5 +161,5 @@ def test_the_quantity_must_be_known(tmp_path: Path, H: FRF) -> None:
     write_csv(tmp_path / "a.csv", replace(H, variance=None))
     with pytest.raises(FileError, match="does not say its quantity: one of receptance"):
         read_recordings(tmp_path / "a.csv")
-    with pytest.raises(FileError, match=r"end in .uff, .unv, .npz or .csv, not '.txt'"):
+    with pytest.raises(FileError, match=r"end in .uff, .unv, .npz, .csv, .mat or .wav, not '.txt'"):
         read_recordings(tmp_path / "a.txt")

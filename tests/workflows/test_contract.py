@@ -18,6 +18,7 @@ WORKFLOW = {  # command: the function it calls
     "demo": "chladni.workflows.diagnose.diagnose",
     "calibrate": "chladni.workflows.calibrate.calibrate",
     "correlate": "chladni.workflows.correlate.correlate",
+    "test": "chladni.workflows.evaluation.evaluate_recordings",
     "identify": "chladni.workflows.identify.identify",
     "modes": "chladni.workflows.modes.modes",
     "frf": "chladni.workflows.frf.frf",

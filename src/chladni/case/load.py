@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
-from ..ema.setup import Recording, TestSetup
+from ..ema.setup import Recording, Sensor, TestSetup
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
@@ -24,6 +24,7 @@ from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
 from ..units import UNITS, Units
 from .free_parameters import free_parameter
+from .mended_recordings import mended, with_frf
 from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
@@ -128,8 +129,9 @@ def load_case(path: str | Path) -> Case:
     units = UNITS[model.text("units", due=True, among=key("model", "units").choices) or "SI"]
     deck = read_deck(_file(model, "deck", str(model.text("deck", due=True))))
     made = assembly(deck, units)
-    recordings = _recordings(test, keys.sections("recording", known("recording")))
     setup = _setup(test, made)
+    sensors = (*setup.outputs, *setup.inputs)
+    recordings = _recordings(test, keys.sections("recording", known("recording")), sensors)
     notes = notes_of(recordings, "use" in test)
     band, exclude = _bands(keys, recordings, notes)
     held_sensors, held_band = _held(keys, recordings, notes)
@@ -174,9 +176,14 @@ def _file(section: TomlSection, key: str, name: str) -> Path:
     return path
 
 
-def _recordings(test: TomlSection, more: Sequence[TomlSection]) -> tuple[Recording, ...]:
+def _recordings(
+    test: TomlSection, more: Sequence[TomlSection], sensors: Sequence[Sensor]
+) -> tuple[Recording, ...]:
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
+    factor, delay = test.number("factor"), test.number("delay")
+    if factor == 0:
+        raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
     named = {name for _, _, name in listed}
     for section in more:
@@ -187,7 +194,9 @@ def _recordings(test: TomlSection, more: Sequence[TomlSection]) -> tuple[Recordi
     read: list[Recording] = []
     for section, word, name in listed:
         found = read_recordings(_file(section, word, name), quantity)
-        read += [without_dead_channels(r) for r in described(more, name, found)]
+        for r in described(more, name, [with_frf(r)[0] for r in found]):
+            alive = without_dead_channels(r)
+            read.append(mended(alive, 1.0 if factor is None else factor, delay or 0.0, sensors))
     ranked = compared_first(test, stacked(read))
     held = [r for r in ranked if r.frf is not None]
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)

@@ -11,11 +11,21 @@ from typing import get_args
 from ..dynamics.frf import Quantity
 from ..units import UNITS
 
-COMMANDS = ("identify", "correlate", "calibrate", "diagnose", "frf", "modes", "render", "plan")
+COMMANDS = (
+    "test",
+    "identify",
+    "correlate",
+    "calibrate",
+    "diagnose",
+    "frf",
+    "modes",
+    "render",
+    "plan",
+)
 _FIT = ("calibrate", "diagnose")
 _TEST = ("correlate", *_FIT)
 _FRF = ("frf", *_TEST)
-_READ = ("identify", *_FRF)
+_READ = ("test", "identify", *_FRF)
 
 
 @dataclass(frozen=True)
@@ -60,10 +70,11 @@ SCHEMA = (
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
         "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
     Key("test", "recordings", "list of files", "", "none",
-        "Universal files, .npz or .csv: FRFs or poles. One file may hold several articles or "
-        "levels. The first is compared with the model (or the one `use` names). Recordings of one "
-        "article, level and state that were driven at other places are stacked with it; the rest "
-        "is held out and scored. `identify` reads all.",
+        "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data, whose FRFs are "
+        "estimated as `chladni test` does. One file may hold several articles or levels. The "
+        "first is compared with the model (or the one `use` names). Recordings of one article, "
+        "level and state that were driven at other places are stacked with it; the rest is held "
+        "out and scored. `identify` reads all.",
         '["article_A.uff", "article_B.uff"]', _READ),
     Key("test", "use", "text", "", "the first",
         "Which recording is compared: the name of its file, its article, its level or its state.",
@@ -73,8 +84,13 @@ SCHEMA = (
     Key("test", "gain", "word", "", "known",
         "Unknown: one real factor common to all channels is free.", '"unknown"', _TEST,
         ("known", "unknown")),
+    Key("test", "factor", "number, not 0", "", "1",
+        "What the FRFs are multiplied by: 9.80665 where g were taken for m/s².", "9.80665", _READ),
+    Key("test", "delay", "number", "s", "0",
+        "By how much all responses lag the forces; it is taken off.", "0.0005", _READ),
     Key("test", "sensors", "file", "", "nodes of the recording are grids of the deck",
-        "Where sensors and shakers sit: the table below.", '"sensors.csv"', _FRF),
+        "Where sensors and shakers sit, which channels are left out or of a wrong gain: the table "
+        "below.", '"sensors.csv"', _READ),
     Key("test", "mass", "number", "kg", "not weighed",
         "Weighed mass of the article, its sensors taken off.", "10.508", _TEST),
     Key("test", "mass_sd", "number above 0", "kg", "0.2 % of the mass",
@@ -142,6 +158,11 @@ COLUMNS = (
     Key("sensors.csv", "mass", "number", "kg", "0",
         "Mass on the article while it is measured. It is in the model before anything is asked and "
         "in no deck that is written. Rows of one place and role are one device.", "0.005", _FRF),
+    Key("sensors.csv", "gain", "number, not 0", "", "1",
+        "The recording shows this many times what was there; the channel is divided by it.", "0.5",
+        _READ),
+    Key("sensors.csv", "use", "word", "", "yes", "Whether the output is used.", "no", _READ,
+        ("yes", "no")),
     Key("sensors.csv", "position_sd", "number", "m", "0",
         "Uncertainty of the place. Above 5 mm natural frequencies are compared, not FRFs.",
         "0.01", _FIT),

@@ -133,7 +133,7 @@ def _nodes_said(
 
 def unrecorded(setup: TestSetup, outputs: MeasuredDofs, inputs: MeasuredDofs) -> list[str]:
     """A sentence on rows of the table of sensors that no recording has."""
-    rows = [s.label for s in setup.outputs if s.label not in outputs.labels]
+    rows = [s.label for s in setup.outputs if s.use and s.label not in outputs.labels]
     rows += [s.label for s in setup.inputs if s.label not in inputs.labels]
     if not rows:
         return []

@@ -14,6 +14,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "demo",
     "calibrate",
     "correlate",
+    "test",
     "identify",
     "modes",
     "frf",

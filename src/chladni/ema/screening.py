@@ -1,12 +1,16 @@
 """Which lines and channels of a recording can be used, and whether the structure is linear."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import gammaincc
 
 from ..dynamics.frf import FRF
 from ..errors import ShapeError
 from .correlation import wrapped
+from .finding import Check, Finding
+from .setup import Recording
 
 _LN10 = np.log(10.0)
 
@@ -103,6 +107,7 @@ class Homogeneity:
     line : (n_f,)           ratio of each line
     limit : float           ratio that chance does not reach
     linear : bool
+    p : float               of so large a ratio by chance, N ratio being of a gamma distribution
     """
 
     ratio: float
@@ -112,6 +117,7 @@ class Homogeneity:
     line: np.ndarray
     limit: float
     linear: bool
+    p: float = float("nan")
 
 
 def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
@@ -151,7 +157,53 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
         line=whitened.mean(axis=(1, 2)),
         limit=float(limit),
         linear=bool(ratio <= limit or rms <= least),
+        p=float(gammaincc(whitened.size, whitened.size * ratio)),
     )
+
+
+def levels_checked(
+    recording: Recording, others: Sequence[Recording]
+) -> tuple[list[Finding], list[Check]]:
+    """Recordings of the same channels against this one: other levels, and repeats of its own."""
+    found: list[Finding] = []
+    said: dict[str, list[str]] = {"homogeneity": [], "repeatability": []}
+    odd: set[str] = set()
+    for other in others:
+        if (compared := _compared(recording, other)) is None:
+            continue
+        name = "homogeneity" if recording.level != other.level else "repeatability"
+        text = f"{compared.ratio:.3g} times the noise, p = {compared.p:.2g}, rms {compared.rms:.2g}"
+        said[name].append(f"{other.name}: {text} decades")
+        if compared.linear or name == "repeatability":
+            continue
+        odd.add(name)
+        worst = float(compared.frequency[compared.line.argmax()])
+        sentence = (
+            f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: they are "
+            f"apart {compared.ratio:.3g} times as much as their noise (p = {compared.p:.2g}, "
+            f"{compared.rms:.2g} decades rms), most near {worst:.4g} Hz: not linear."
+        )
+        mend = "name one level by use in case.toml, and read the result as that level's own"
+        found.append(Finding("not linear", sentence, "warning", (), mend, compared.ratio))
+    needs = {"homogeneity": "needs two levels", "repeatability": "needs a second recording"}
+    checks = [
+        Check(name, "; ".join(lines) or needs[name], name not in odd if lines else None)
+        for name, lines in said.items()
+    ]
+    return found, checks
+
+
+def _compared(one: Recording, other: Recording) -> Homogeneity | None:
+    """Their homogeneity; None where they are of other articles, channels or lines."""
+    a, b = one.frf, other.frf
+    if a is None or b is None or one.article != other.article or other is one:
+        return None
+    if (one.level is None) != (other.level is None):
+        return None
+    try:
+        return homogeneity(a, b)
+    except ShapeError:
+        return None
 
 
 def _interpolated(f: np.ndarray, grid: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import readonly
 from ..dynamics.frf import FRF
 from ..errors import LabelError, ShapeError
+from .time_record import TimeRecord
 
 Role = Literal["output", "input"]
 
@@ -110,6 +111,8 @@ class Recording:
     axes : {node: (3, 3)}        rows: unit vectors of the node's own measuring axes, where turned
     elements : tuple of tuples   nodes of each trace line or element
     functions : tuple            time histories, spectra
+    time : TimeRecord or None    forces and responses against time
+    added_damping : float        what an exponential window took from every pole's real part [1/s]
     level : float or None        excitation [N], or [m/s²] for base excitation
     article : str                which of several nominally equal objects
     state : str                  what was done to the object, where it was measured as it changed
@@ -125,6 +128,8 @@ class Recording:
     axes: Mapping[int, np.ndarray] = field(default_factory=dict)
     elements: tuple[tuple[int, ...], ...] = ()
     functions: tuple[Function, ...] = ()
+    time: TimeRecord | None = None
+    added_damping: float = 0.0
     level: float | None = None
     article: str = ""
     notes: tuple[str, ...] = ()
@@ -146,6 +151,8 @@ class Sensor:
     role: Role = "output"
     mass: float = 0.0  # [kg]
     position_sd: float = 0.0  # [m]
+    gain: float = 1.0  # what is recorded over what was there
+    use: bool = True  # an output that is left out is as if it had not been recorded
 
 
 @dataclass(frozen=True, eq=False)

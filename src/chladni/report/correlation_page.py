@@ -11,6 +11,7 @@ from ..workflows.case_model import markers
 from ..workflows.correlate import Correlation
 from .blocks import Block, Facts, PageParts, Picture, Section, Table
 from .figures import Shown, curves, frequencies, mac_picture, setup
+from .screening_blocks import screening_section
 from .words import number, percent
 
 
@@ -23,6 +24,7 @@ def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
     return PageParts(
         _lead(found),
         [
+            screening_section(found.screening),
             Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies", "mac"))]),
             Section("Responses", [*_scores(found), *_pictures(drawn, ("frf", "frf_grid"))]),
             Section("The test", _pictures(drawn, ("setup",))),

@@ -23,6 +23,7 @@ from ..updating.result import (
     Scores,
 )
 from ..workflows.diagnosis_result import Compared, DiagnosisResult, StateResult
+from .screening_blocks import read_screening, screening_json
 
 Row = TypeVar("Row")
 _Q = {  # key: field of Scores
@@ -53,6 +54,7 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "structured": None
         if s is None
         else {"is": s.structured, "left": s.left, "known": s.known, "sentence": s.sentence},
+        "screening": None if r.screening is None else screening_json(r.screening),
         "notes": list(r.notes),
         "distrust": list(r.distrust),
         "compared": r.compared,
@@ -146,6 +148,7 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         one_of=tuple(tuple(names) for names in d.get("one_of") or ()),
         notes=tuple(str(n) for n in d.get("notes") or ()),
         distrust=tuple(str(n) for n in d.get("distrust") or ()),
+        screening=read_screening(d["screening"]) if d.get("screening") else None,
         compared=cast(Compared, d.get("compared", "responses")),
         searched=bool(d.get("searched", alternatives is None or len(alternatives) > 0)),
         files=dict(d.get("files") or {}),

@@ -9,6 +9,7 @@ from ..ema.identification import Identified, evaluate
 from ..io.tables.write_tables import write_poles
 from ..workflows.identify import Identification, RecordingModes, firm
 from .blocks import Block, PageParts, Picture, Section, Table
+from .screening_blocks import screening_section
 from .words import number
 
 _SHOWN = 6  # channels drawn
@@ -16,7 +17,7 @@ _SHOWN = 6  # channels drawn
 
 def identification_page(folder: Path, found: Identification) -> PageParts:
     """Sections of the page; its pictures and the tables of poles are written into the folder."""
-    sections, files = [], []
+    sections, files = [screening_section(*(r.screening for r in found.recordings))], []
     for k, r in enumerate(found.recordings):
         stem = "" if len(found.recordings) == 1 else f"_{k + 1}"
         write_poles(folder / f"poles{stem}.csv", r.poles)
@@ -82,4 +83,5 @@ def _sentence(r: RecordingModes) -> str:
     f, (low, high) = r.poles.frequency, r.whole.band
     span = f" from {number(f[0])} to {number(f[-1])} Hz" if len(f) else ""
     name = r.recording.name
-    return f"{name}: {len(f)} modes{span} in the band {number(low)} to {number(high)} Hz"
+    said = f"{name}: {len(f)} modes{span} in the band {number(low)} to {number(high)} Hz"
+    return said + (f" ({r.screening.sentence})" if r.screening.findings else "")

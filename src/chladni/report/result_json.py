@@ -6,10 +6,12 @@ from typing import Any
 from ..planning import Plan, summary
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
+from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
 from .diagnosis_json import diagnosis_json
 from .plan_json import plan_json
+from .screening_blocks import screening_json
 
 
 @singledispatch
@@ -65,7 +67,36 @@ def _recording(r: RecordingModes) -> dict[str, Any]:
         "chi": m.chi,
         "outputs": m.outputs,
         "inputs": m.inputs,
+        "screening": screening_json(r.screening),
     }
+
+
+@to_json.register
+def _(result: Evaluation) -> dict[str, Any]:
+    return {"recordings": [_evaluated(r) for r in result.recordings]}
+
+
+def _evaluated(r: RecordingEvaluation) -> dict[str, Any]:
+    e, frf = r.estimate, r.recording.frf
+    assert frf is not None
+    found: dict[str, Any] = {
+        "name": r.recording.name,
+        "quantity": frf.quantity,
+        "outputs": frf.outputs,
+        "inputs": frf.inputs,
+        "band_hz": frf.frequency[[0, -1]],
+        "screening": screening_json(r.screening),
+        "free_decays": [dict(vars(d)) for d in r.decays],
+    }
+    if e is not None:
+        found |= {
+            "excitation": e.excitation,
+            "method": e.method,
+            "averages": e.averages,
+            "added_damping_1_s": e.added_damping,
+            "how": e.notes,
+        }
+    return found
 
 
 @to_json.register
@@ -79,6 +110,8 @@ def _(result: Correlation) -> dict[str, Any]:
         "alone_test_hz": test[p.alone_test],
         "alone_model_hz": f[p.alone_model],
     }
+    if result.screening is not None:
+        held["screening"] = screening_json(result.screening)
     if result.comac is not None:
         held["comac"] = dict(zip(result.sensors, result.comac, strict=True))
     if q is not None:

@@ -8,6 +8,7 @@ from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Score
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
 from .recording_scores import recording_scores
+from .screening_blocks import screening_section
 from .states_table import states_table
 from .words import interval, number, percent, quantity
 
@@ -130,9 +131,11 @@ def sections(
             if name in PLACES and PLACES[name][0] == place
         ]
 
+    found = screening_section(result.screening)
     rest = [Picture(p, n) for n, p in figures.items() if n not in PLACES and n != "where"]
     return [
         Section("Not to be trusted", [Items(result.distrust)] if result.distrust else []),
+        *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
         Section("At a glance", _glance(result)),
         Section("What was found", _effects(result.effects)),
@@ -142,6 +145,7 @@ def sections(
         Section("Frequencies", [*_frequencies(result), *shown("modes")]),
         Section("Why not something else", [*_alternatives(result), *shown("why")]),
         Section("The test", shown("test")),
+        *([found] if result.screening and not result.screening.findings else []),
         Section("What was done, and why", [Items(list(notes))] if notes else []),
         *more,
         Section("More pictures", rest),

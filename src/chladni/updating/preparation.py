@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..dynamics.frf import FRF
 from ..effects.discretisation import mesh_error, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
@@ -19,7 +18,7 @@ from ..effects.model_families import model_families
 from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
-from ..ema.identification import Identified, equalised, frf_variance, identify
+from ..ema.identification import Identified, equalised, identify, noise_source
 from ..ema.level_shift import level_notes
 from ..ema.recording_noise import equalised_noise
 from ..errors import FileError
@@ -86,17 +85,18 @@ def _by_responses(question: Question) -> Prepared:
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)
-    data, spreads = [], []
+    data, spreads, noises = [], [], []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
-        noise, spread = _noise(frf, found, s), measured_spread(H, others, s)
+        variance = equalised_noise(found, frf, s, counted(frf, question.exclude))
+        spread = measured_spread(H, others, s)
         spreads.append(spread)
+        noises.append(variance if spread is None else np.maximum(variance, spread**2))
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
-            noise=noise if spread is None else np.maximum(noise, spread),
-            direct=question.outputs.carried_by(question.inputs),
+            noise=np.sqrt(noises[-1]), direct=question.outputs.carried_by(question.inputs),
         )  # fmt: skip
         data.append(read.over(reduced.model))
     nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
@@ -119,6 +119,7 @@ def _by_responses(question: Question) -> Prepared:
         f"{found.band[1]:g} Hz, whitened residual {found.chi:.2f} (1 is the noise)",
         f"both sides were given {ZETA:.0%} damping to search and {ZETA_Q:.0%} to report Q "
         "(damping equalisation): no modes need pairing and damping cannot pose as stiffness",
+        f"the noise of the recording: {noise_source(frf)}",
     ]
     if question.base is not None:
         notes.append(
@@ -139,13 +140,10 @@ def _by_responses(question: Question) -> Prepared:
         *said, *spread_note(spreads[1], data[1].use, others),
         *level_notes([(question.level, found), *levels(others)]),
     ]  # fmt: skip
-    noise = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
-    if spreads[1] is not None:
-        noise = np.maximum(noise, spreads[1] ** 2)
     borne = min(seen, _own_modes(nominal, low, fit_max))  # what a rig rings with bears no name
     few = too_little(borne, int(data[0].use.any(axis=0).sum()))
     return Prepared(
-        problem, data[1], held, what, tuple(notes), nominal, noise, found, few, unseen=unseen,
+        problem, data[1], held, what, tuple(notes), nominal, noises[1], found, few, unseen=unseen,
         others=tuple(others),
     )  # fmt: skip
 
@@ -170,19 +168,6 @@ def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
     said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
     said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
     return ", ".join(said) or "nothing"
-
-
-def _noise(frf: FRF, found: Identified, s: np.ndarray) -> np.ndarray:
-    """Standard deviation of log10 H(s) from the noise of the recording (n_f, n_out, n_in).
-
-    The lines within the half-bandwidth of a mode, π ζ f / Δf of them, know its residue together.
-    """
-    sd = np.sqrt(frf_variance(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
-    f, own = s.imag / (2 * np.pi), frf.frequency
-    near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
-    lines = np.pi * np.median(found.damping) * f / np.median(np.diff(own))
-    per_line = np.minimum(sd[near], 1.0) * max(found.chi, 1.0)
-    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
 
 
 def _upper_part(question: Question, low: float, high: float) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from ..case import Case
 from ..dynamics.frf import FRF
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import Quality, comac, deviation, mac, quality
+from ..ema.finding import Screening
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mode_pairing import ModePairs, pair
@@ -18,6 +19,7 @@ from ..progress import Progress, silent
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .output_only import with_natural_frequencies
+from .screening_of_case import screened_by_model
 from .unit_check import refuse_other_units
 
 BANDS = 6
@@ -38,6 +40,7 @@ class Correlation:
     comac : (n_out,) or None
     quality : Q by channel and band, or None
     model : responses of the model on the lines of the recording, or None
+    screening : what the recording says of its own faults, alone and against the model
     """
 
     channels: tuple[str, ...]
@@ -51,6 +54,7 @@ class Correlation:
     quality: Quality | None = None
     model: FRF | None = None
     notes: tuple[str, ...] = ()
+    screening: Screening | None = None
 
 
 def correlate(case: Case, progress: Progress = silent) -> Correlation:
@@ -78,6 +82,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
         return _by_poles(case, near)
     progress("modes of the test", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
+    screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, _shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
@@ -90,7 +95,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
-        responses, (*case.said("correlate"), *notes),
+        responses, (*screening.notes, *case.said("correlate"), *notes), screening,
     )  # fmt: skip
 
 

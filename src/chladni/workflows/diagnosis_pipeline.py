@@ -13,6 +13,7 @@ import numpy as np
 
 from ..case import Case
 from ..dynamics.frf import FRF
+from ..ema.finding import Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -47,6 +48,12 @@ from ..updating.written_scores import noise_Q, written_Q
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
+from .screening_of_case import (
+    RecordingAtFault,
+    screened_alone,
+    screened_prepared,
+    unmendable,
+)
 
 BLIND_SHARE = 0.05  # of the shells
 
@@ -60,6 +67,7 @@ class Explained:
     prepared: Prepared
     found: Diagnosis
     distrust: tuple[str, ...]
+    screening: Screening | None = None
 
 
 def explained(
@@ -70,6 +78,11 @@ def explained(
     Parameters
     ----------
     known : what other states say of what this one shares with them
+
+    Raises
+    ------
+    RecordingAtFault
+        If the recording shows a fault that no fit could make up for.
     """
     progress("identifying the recording", 0.0)
     if diagnosing and not len(case.assembly.shells):
@@ -78,7 +91,16 @@ def explained(
             "calibrate and correlate take any deck"
         )
     asked = question(case)
-    prepared = prepare(asked)
+    try:
+        prepared = prepare(asked)
+    except FileError:  # a recording at fault may hold nothing to fit, and says so itself
+        alone = screened_alone(case)
+        if alone is None or not alone.faults:
+            raise
+        raise RecordingAtFault(alone) from None
+    screening = screened_prepared(case, prepared)
+    if diagnosing and screening is not None and unmendable(screening):
+        raise RecordingAtFault(screening)
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
@@ -89,7 +111,9 @@ def explained(
     found, distrust = _judged(asked, prepared, found)
     if diagnosing and prepared.too_little:
         distrust = (f"nothing is named: {prepared.too_little}", *distrust)
-    return Explained(case, asked, prepared, found, distrust)
+    if screening is not None and screening.faults and not diagnosing:
+        distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
+    return Explained(case, asked, prepared, found, distrust, screening)
 
 
 def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -99,8 +123,11 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     stages, lost = _updated(case, asked, prepared, found)
     progress("scores", 0.95)
     result = _result(asked, prepared, found, stages)
-    notes = (*result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
-    return replace(result, notes=notes, distrust=known.distrust, searched=diagnosing)
+    said = () if known.screening is None else known.screening.notes
+    notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
+    return replace(
+        result, notes=notes, distrust=known.distrust, searched=diagnosing, screening=known.screening
+    )
 
 
 def _judged(

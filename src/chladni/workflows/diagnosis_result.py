@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ..dynamics.frf import FRF
+from ..ema.finding import Screening
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
@@ -74,6 +75,7 @@ class DiagnosisResult:
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
     searched : False where only ordinary parameters were fitted
+    screening : what the recording says of its own faults; None where no FRF exists
     files : {what: name} of what was written beside it
     models : the structures; None where the result was read from a file
     left_where : what the explanation leaves, on the mesh; None where frequencies were compared
@@ -97,6 +99,7 @@ class DiagnosisResult:
     distrust: tuple[str, ...] = ()
     compared: Compared = "responses"
     searched: bool = True
+    screening: Screening | None = None
     files: dict[str, str | None] = field(default_factory=dict)
     models: UpdatedModels | None = None
     left_where: LeftWhere | None = None

@@ -1,15 +1,18 @@
 """Modes of recordings: poles with their spread, damping, residues."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..case import Case
-from ..ema.identification import Identified
+from ..case.mended_recordings import with_frf
+from ..ema.finding import Screening
+from ..ema.identification import Identified, noise_source
 from ..ema.identification import identify as identified
 from ..ema.level_shift import level_notes
+from ..ema.recording_screening import screened
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
@@ -26,10 +29,12 @@ class RecordingModes:
     ----------
     recording : Recording
     whole : Identified      with the poles beside the band that shape it
+    screening : Screening   what the recording says of its own faults
     """
 
     recording: Recording
     whole: Identified
+    screening: Screening
 
     @property
     def modes(self) -> Identified:
@@ -84,7 +89,10 @@ def identify(
     FileError
         If no recording holds an FRF.
     """
-    recordings = source.recordings if isinstance(source, Case) else tuple(source)
+    if isinstance(source, Case):
+        recordings = source.recordings
+    else:
+        recordings = tuple(with_frf(r)[0] for r in source)
     gaps: tuple[tuple[float, float], ...] = ()
     said: list[str] = []
     if isinstance(source, Case):
@@ -99,8 +107,14 @@ def identify(
     with threadpool_limits(1):
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
-            found.append(_modes(recording, band, gaps, averages))
-    notes = [*said, *(note for note in _notes(held, gaps) if note not in said), *_levels(found)]
+            found.append(_modes(recording, band, gaps, averages, () if k else held))
+    screenings = [note for r in found for note in r.screening.notes]
+    said = [*screenings, *said]
+    notes = [
+        *said,
+        *(note for note in _notes(held, gaps, averages) if note not in said),
+        *_levels(found),
+    ]
     return Identification(tuple(found), tuple(notes), _doubts(found))
 
 
@@ -122,13 +136,16 @@ def _modes(
     band: tuple[float, float] | None,
     gaps: Sequence[tuple[float, float]],
     averages: int,
+    others: Sequence[Recording],
 ) -> RecordingModes:
     frf = recording.frf
     assert frf is not None
     use = np.ones(len(frf.frequency), bool)
     for low, high in gaps:
         use &= (frf.frequency < low) | (frf.frequency > high)
-    return RecordingModes(recording, identified(frf, band, averages=averages, use=use))
+    found = identified(frf, band, averages=averages, use=use)
+    screening = screened(recording, found, others)
+    return RecordingModes(recording, without_window(found, recording.added_damping), screening)
 
 
 def firm(modal: Identified) -> np.ndarray:
@@ -137,15 +154,21 @@ def firm(modal: Identified) -> np.ndarray:
     return np.asarray(known & (modal.damping_sd < 0.5 * modal.damping))
 
 
-def _notes(held: Sequence[Recording], gaps: Sequence[tuple[float, float]]) -> tuple[str, ...]:
+def without_window(found: Identified, added: float) -> Identified:
+    """The poles without what an exponential window added to them, p + Δσ [1/s]."""
+    return replace(found, poles=found.poles + added) if added else found
+
+
+def _notes(
+    held: Sequence[Recording], gaps: Sequence[tuple[float, float]], averages: int
+) -> tuple[str, ...]:
     notes: list[str] = []
     for r in held:
         notes += r.notes
-        if r.frf is not None and r.frf.variance is None and r.frf.coherence is None:
-            notes.append(
-                f"{r.name} holds neither variance nor coherence, so its noise was taken from "
-                "the residual; spreads are weaker for it."
-            )
+        if r.frf is not None:
+            notes.append(f"Noise of {r.name}: {noise_source(r.frf, averages)}.")
+        if r.added_damping:
+            notes.append(f"{r.name}: {r.added_damping:.3g} 1/s of an exponential window taken off.")
     if gaps:
         said = ", ".join(f"{low:g} to {high:g} Hz" for low, high in gaps)
         notes.append(f"Left out, as the case says: {said}.")

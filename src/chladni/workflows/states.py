@@ -22,6 +22,7 @@ from .diagnosis_pipeline import Explained, explained, told
 from .diagnosis_result import DiagnosisResult, StateResult
 from .effects_by_state import by_state
 from .output_only import with_natural_frequencies
+from .screening_of_case import RecordingAtFault, at_fault
 
 
 def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
@@ -29,9 +30,12 @@ def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResul
     with threadpool_limits(1):
         case = with_natural_frequencies(case)
         names = states(case.recordings)
-        if len(names) < 2 or ("test", "use") in case.given:
-            return told(explained(case, diagnosing, progress), diagnosing, progress)
-        return _in_states(case, names, diagnosing, progress)
+        try:
+            if len(names) < 2 or ("test", "use") in case.given:
+                return told(explained(case, diagnosing, progress), diagnosing, progress)
+            return _in_states(case, names, diagnosing, progress)
+        except RecordingAtFault as fault:
+            return at_fault(case, fault.screening, diagnosing)
 
 
 def _in_states(

@@ -1,19 +1,21 @@
 """Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI, UTF-8)."""
 
-import csv
-import difflib
 import zipfile
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import cast, get_args
 
 import numpy as np
 
 from ...dynamics.frf import FRF, Quantity
 from ...ema.setup import PoleTable, Recording
+from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError
+from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
+from ..time.time_channels import is_time, only_known
+from .csv_table import CsvTable, beside_it, read_table
 
 _FRF = ("frequency_hz", "output", "input", "real", "imag")
 _FRF_OPTIONAL = ("coherence", "variance", "level", "article")
@@ -23,105 +25,10 @@ _NPZ = ("frequency_hz", "values", "outputs", "inputs")
 _NPZ_OPTIONAL = ("coherence", "variance", "quantity", "level", "article")
 
 
-@dataclass(frozen=True)
-class CsvTable:
-    """A CSV file: columns of text, and the line of the file each row stands in."""
-
-    path: Path
-    columns: dict[str, list[str]]
-    line: list[int]
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.columns
-
-    def numbers(self, name: str, empty: float = np.nan) -> np.ndarray:
-        """(n,) finite numbers; an empty cell is ``empty``."""
-        try:  # the quick way, for a hundred thousand rows
-            values = np.array(self.columns[name], dtype=float)
-        except ValueError:
-            values = np.array([self.number(name, k, empty) for k in range(len(self.line))])
-            return values
-        if not np.isfinite(values).all():
-            self._not_anumber(name, int(np.argmin(np.isfinite(values))))
-        return values
-
-    def number(self, name: str, k: int, empty: float) -> float:
-        """The finite number in row ``k``; an empty cell is ``empty``."""
-        text = self.columns[name][k]
-        if not text:
-            return empty
-        try:
-            value = float(text)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            self._not_anumber(name, k)
-        return value
-
-    def _not_anumber(self, name: str, k: int) -> None:
-        raise FileError(
-            f"{self.path.name}, line {self.line[k]}: {name} is {self.columns[name][k]!r}, "
-            "which is not a number"
-        )
-
-
-def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTable:
-    """A CSV file with these columns, in any order.
-
-    Raises
-    ------
-    FileError
-        If the file, a column or a cell is missing, or a column is unknown.
-    """
-    if not path.is_file():
-        near = difflib.get_close_matches(path.name, _beside(path), 3, 0.4) or _beside(path)[:6]
-        raise FileError(f"no file {path}; beside it there are {near}")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, skipinitialspace=True)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
-    except csv.Error as error:
-        raise FileError(f"{path.name} is no table: {error}") from error
-    if not rows:
-        raise FileError(f"{path.name} is empty; the first line names the columns {', '.join(due)}")
-    header = [name.strip().lower() for name in rows[0][1]]
-    _check_header(path, header, due, optional)
-    for line, row in rows[1:]:
-        if len(row) != len(header):
-            raise FileError(
-                f"{path.name}, line {line}: {len(row)} cells, the header has {len(header)}"
-            )
-    columns = {name: [row[k].strip() for _, row in rows[1:]] for k, name in enumerate(header)}
-    if len(rows) == 1:
-        raise FileError(f"{path.name} has a header but no rows")
-    return CsvTable(path, columns, [line for line, _ in rows[1:]])
-
-
-def _beside(path: Path) -> list[str]:
-    return (
-        sorted(p.name for p in path.parent.glob("*") if p.is_file()) if path.parent.is_dir() else []
-    )
-
-
-def _check_header(
-    path: Path, header: list[str], due: Sequence[str], optional: Sequence[str]
-) -> None:
-    if missing := [name for name in due if name not in header]:
-        raise FileError(
-            f"{path.name}, line 1: no column {', '.join(missing)}; there are {', '.join(header)}"
-        )
-    for name in header:
-        if name not in (*due, *optional):
-            known = ", ".join((*due, *optional))
-            raise FileError(f"{path.name}, line 1: unknown column {name!r}; known are {known}")
-        if header.count(name) > 1:
-            raise FileError(f"{path.name}, line 1: column {name!r} occurs twice")
-
-
 def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
-    """What a file holds, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv (FRF or poles).
+    """What a file holds, by its ending: .uff .unv .ufb .uf .uff58, .npz, .csv, .wav, .mat.
+
+    A CSV or NPZ holds FRFs, poles (CSV) or time data; WAV and MAT hold time data.
 
     Raises
     ------
@@ -130,6 +37,10 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     """
     path = Path(path)
     ending = path.suffix.lower()
+    if ending in (".npz", ".csv", ".wav", ".mat") and not path.is_file():
+        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+    if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
+        return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
         return (read_npz(path, quantity),)
     if ending == ".csv":
@@ -137,8 +48,32 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     if ending in (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv"):
         from ..uff.read_uff import read_uff
 
-        return (read_uff(path, quantity),)
-    raise FileError(f"{path.name}: recordings end in .uff, .unv, .npz or .csv, not {ending!r}")
+        found = read_uff(path, quantity)
+        return (_asked(found, quantity),)
+    raise FileError(
+        f"{path.name}: recordings end in .uff, .unv, .npz, .csv, .mat or .wav, not {ending!r}"
+    )
+
+
+_TIMED = {".wav": read_wav, ".mat": read_mat, ".csv": read_time_csv}
+
+
+def _timed(path: Path, read: tuple[TimeRecord, list[str]], quantity: str | None) -> Recording:
+    record, notes = read
+    return _asked(Recording(path.name, time=record, notes=tuple(notes)), quantity)
+
+
+def _asked(r: Recording, quantity: str | None) -> Recording:
+    """Time data read as the quantity that was asked for, whatever its units say."""
+    if r.time is None or quantity in (None, r.time.quantity):
+        return r
+    if "transmissibility" in (quantity, r.time.quantity):
+        raise FileError(
+            f"{r.name}: its units make it {r.time.quantity}, which cannot be read as {quantity}"
+        )
+    note = f"read as {quantity} as asked, whatever its units say"
+    time = replace(r.time, quantity=cast(Quantity, quantity))
+    return replace(r, time=time, notes=(*r.notes, note))
 
 
 def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
@@ -267,15 +202,20 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {_beside(path)[:6]}")
+        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-            _only_known(path, file.files)
+            if timed := not {"frequency_hz", "values"} & set(file.files) and is_time(file.files):
+                only_known(path.name, file.files)
+            else:
+                _only_known(path, file.files)
             arrays = {name: file[name] for name in file.files}
     except FileError:
         raise
     except _DAMAGED as error:
         raise FileError(f"{path.name} cannot be read as NPZ: {error}") from error
+    if timed:
+        return _timed(path, read_time_npz(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {list(arrays)}")
     quantity = quantity or (str(arrays["quantity"]) if "quantity" in arrays else None)

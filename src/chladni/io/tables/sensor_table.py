@@ -8,11 +8,11 @@ import numpy as np
 from ...dofs import COMPONENTS
 from ...ema.setup import Role, Sensor
 from ...errors import FileError
-from .read_tables import CsvTable, read_table
+from .csv_table import CsvTable, read_table
 
 _OPTIONAL = (
     *("grid", "x", "y", "z", "direction", "nx", "ny", "nz"),
-    *("role", "mass", "position_sd"),
+    *("role", "mass", "position_sd", "gain", "use"),
 )
 
 
@@ -57,6 +57,14 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
     mass, sd = number("mass", 0.0), number("position_sd", 0.0)
     if mass < 0 or sd < 0:
         raise FileError(f"{where}: mass {mass:g} kg and position_sd {sd:g} m cannot be negative")
+    gain = number("gain", 1.0)
+    if gain == 0:
+        raise FileError(
+            f"{where}: a gain of 0 leaves nothing; to leave a channel out write use = no"
+        )
+    use = cell.get("use", "").lower() or "yes"
+    if use not in ("yes", "no") or (use == "no" and role == "input"):
+        raise FileError(f"{where}: use {use!r} of an {role}; outputs are used: yes or no")
     given = normal if np.isfinite(normal).any() else cell.get("direction", "")
     place = xyz if np.isfinite(xyz).all() else None
     if moved and (place is not None or mass > 0):
@@ -73,6 +81,8 @@ def _sensor(table: CsvTable, k: int) -> Sensor:
         role=role,  # type: ignore[arg-type]
         mass=mass,
         position_sd=sd,
+        gain=gain,
+        use=use == "yes",
     )
 
 

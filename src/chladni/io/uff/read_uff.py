@@ -14,8 +14,9 @@ import numpy as np
 from ...dofs import label
 from ...ema.setup import Function, Recording, Shapes
 from ...errors import ChladniError, FileError
+from .estimate_stamp import read_stamp, with_variance
 from .uff_frf import frf_matrix
-from .uff_pile import Channel, Pair, Pile, Shape, dataset_name
+from .uff_pile import Channel, Pair, Pile, Shape, TimeSignal, dataset_name
 from .uff_sets import (
     ElementSet,
     FunctionSet,
@@ -28,6 +29,7 @@ from .uff_sets import (
     typed,
 )
 from .uff_source import readable
+from .uff_time import time_record
 from .uff_units import Meaning, check_calibrated, file_units, hertz, meaning
 from .write_uff import write_uff as write_uff
 
@@ -64,14 +66,20 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
             raise
         except _BROKEN as error:
             raise _damaged(path, one.number, one.code, error) from error
+    frf, (averages, added) = frf_matrix(pile, quantity), read_stamp(pile.title)
+    if frf is not None and averages:
+        frf = with_variance(frf, averages)
+        pile.notes.append(f"{path.name}: its noise is that of {averages:g} averages, as it says")
     return Recording(
         name=path.name,
-        frf=frf_matrix(pile, quantity),
+        frf=frf,
         shapes=_shapes(pile),
         nodes=pile.nodes,
         axes=_axes(pile),
         elements=tuple(pile.elements),
         functions=tuple(pile.functions),
+        time=time_record(pile) if frf is None else None,
+        added_damping=added,
         notes=tuple(pile.notes),
     )
 
@@ -166,8 +174,10 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
         except FileError as error:  # nothing compares it: the rest of the file is of use
             pile.notes.append(f"left out: {error}")
             return
-        unit = record.ordinate.unit
-        pile.functions.append(Function(named, output, reference, x, record.y, unit))
+        found = Function(named, output, reference, x, record.y, record.ordinate.unit)
+        pile.functions.append(found)
+        if kind == 1:
+            pile.time.append(TimeSignal(output, record.ordinate.kind, found))
 
 
 def _complete(record: FunctionSet, where: str) -> FunctionSet:
@@ -208,6 +218,7 @@ def _take_frf(pile: Pile, record: FunctionSet, dofs: Pair, quantity: str | None)
             "state quantity = receptance, mobility, accelerance or transmissibility"
         )
     f = hertz(record, where)
+    pile.title = pile.title or record.title
     pile.frf[dofs] = Channel(record.number, f, record.y * said.factor, said.quantity)
 
 

@@ -31,6 +31,15 @@ class Shape:
     values: dict[str, complex]
 
 
+@dataclass(frozen=True, eq=False)
+class TimeSignal:
+    """One time history as the file has it; ``kind``: data type of its ordinate (13: a force)."""
+
+    label: str
+    kind: int
+    function: Function
+
+
 @dataclass
 class Pile:
     """What has been read so far; filled dataset by dataset."""
@@ -40,12 +49,14 @@ class Pile:
     frf: dict[Pair, Channel] = field(default_factory=dict)
     coherence: dict[Pair, np.ndarray] = field(default_factory=dict)  # input "": multiple
     functions: list[Function] = field(default_factory=list)
+    time: list[TimeSignal] = field(default_factory=list)
     nodes: dict[int, np.ndarray] = field(default_factory=dict)
     systems: dict[int, np.ndarray] = field(default_factory=dict)
     turned: dict[int, int] = field(default_factory=dict)  # node -> system
     elements: list[tuple[int, ...]] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    title: str = ""  # first line of the first FRF
 
     def where(self, one: UffSet) -> str:
         """A dataset as a sentence names it."""

@@ -104,6 +104,7 @@ class FunctionSet(UffSet):
     due : how many values the head says there are
     x, y : (n,)
     abscissa, ordinate, denominator : Axis
+    title : first line of its head
     """
 
     function: int
@@ -115,6 +116,7 @@ class FunctionSet(UffSet):
     abscissa: Axis
     ordinate: Axis
     denominator: Axis
+    title: str = ""
 
 
 def typed(number: int, d: Mapping[str, Any]) -> UffSet | None:
@@ -180,6 +182,7 @@ def _function(d: Mapping[str, Any], at: dict[str, int]) -> FunctionSet:
         abscissa=abscissa,
         ordinate=ordinate,
         denominator=denominator,
+        title=str(d.get("id1", "")),
         **at,
     )
 

@@ -82,6 +82,15 @@ def numerator(label: str) -> tuple[str | None, float]:
     return ("receptance", _LENGTH[text]) if text in _LENGTH else (None, 1.0)
 
 
+def force_factor(label: str) -> float | None:
+    """Newton per unit of a label; None where it is no force.
+
+    >>> force_factor("lbf"), force_factor("mm")
+    (4.4482216152605, None)
+    """
+    return _FORCE.get(_bare(label))
+
+
 def ratio(label: str) -> tuple[str | None, float | None, float | None]:
     """(quantity, length factor, force factor) of a unit label such as '(m/s^2)/N'; None: not said.
 

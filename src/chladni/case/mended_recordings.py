@@ -1,0 +1,96 @@
+"""What a case says of its recordings: time data estimated, factor, delay, gains, channels left out.
+
+Nothing is mended that the case does not say, and every mending is noted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.frf_estimate import EstimateSettings, FrfEstimate, estimate
+from ..ema.setup import Recording, Role, Sensor
+from ..errors import ChladniError, FileError
+
+
+def with_frf(
+    r: Recording,
+    settings: EstimateSettings | None = None,
+) -> tuple[Recording, FrfEstimate | None]:
+    """A recording of time data with the FRFs estimated from it; any other as it is.
+
+    Raises
+    ------
+    FileError
+        If no FRF can be estimated; the sentence names ``chladni test``, which takes settings.
+    """
+    if r.time is None or r.frf is not None:
+        return r, None
+    try:
+        found = estimate(r.time, settings or EstimateSettings())
+    except ChladniError as error:
+        raise FileError(
+            f"{r.name}: {error} (chladni test {r.name} estimates FRFs with settings of your own)"
+        ) from error
+    notes = tuple(f"{r.name}: {said}" for said in found.notes)
+    said = f"{r.name}: FRFs estimated from time data by {found.method}, as chladni test does"
+    with_it = replace(
+        r, frf=found.frf, notes=(*r.notes, said, *notes), added_damping=found.added_damping
+    )
+    return with_it, found
+
+
+def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor]) -> Recording:
+    """The FRFs as the case says they are to be read.
+
+    Parameters
+    ----------
+    factor : on all of them
+    delay : of all responses [s], taken off by exp(iωτ)
+    sensors : rows of the table, with gains and with outputs that are left out
+
+    Raises
+    ------
+    FileError
+        If no output is left.
+    """
+    if r.frf is None:
+        return r
+    table = {(s.label, s.role): s for s in sensors}
+    frf, notes = r.frf, list(r.notes)
+    unused = [o for o in frf.outputs if not _row(table, o).use]
+    if unused:
+        kept = [o for o in frf.outputs if o not in unused]
+        if not kept:
+            raise FileError(f"{r.name}: the table of sensors leaves every output out")
+        frf = frf.sel(outputs=kept)
+        notes.append(f"{r.name}: {', '.join(unused)} left out, as the table of sensors says")
+    gains = np.array([_row(table, o).gain for o in frf.outputs])
+    drives = np.array([table[i, "input"].gain if (i, "input") in table else 1.0
+                       for i in frf.inputs])  # fmt: skip
+    if (gains != 1).any() or (drives != 1).any():
+        named = [*zip(frf.outputs, gains, strict=True), *zip(frf.inputs, drives, strict=True)]
+        said = ", ".join(f"{label} by {g:g}" for label, g in named if g != 1)
+        notes.append(f"{r.name}: gains of the table of sensors taken off: {said}")
+        frf = _times(frf, drives[None, None, :] / gains[None, :, None])
+    if factor != 1:
+        frf = _times(frf, np.array(factor))
+        notes.append(f"{r.name}: all FRFs times {factor:g}, as [test] factor says")
+    if delay:
+        frf = _times(frf, np.exp(2j * np.pi * frf.frequency * delay)[:, None, None])
+        notes.append(f"{r.name}: a delay of {delay:g} s taken off, as [test] delay says")
+    return replace(r, frf=frf, notes=tuple(notes))
+
+
+def _row(table: dict[tuple[str, Role], Sensor], output: str) -> Sensor:
+    return table.get((output, "output"), Sensor(output))
+
+
+def _times(frf: FRF, factor: np.ndarray) -> FRF:
+    variance = frf.variance
+    return replace(
+        frf,
+        values=frf.values * factor,
+        variance=None if variance is None else variance * np.abs(factor) ** 2,
+    )

@@ -1,0 +1,54 @@
+"""``chladni test``: FRFs from time data, and what is wrong with a recording."""
+
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+
+from ..case import load_case
+from ..ema.frf_estimate import EstimateSettings, Excitation, Method
+from ..report.result_json import to_json
+from ..workflows.evaluation import evaluate_recordings
+from ..workflows.loaded_model import is_case
+from ..workflows.recordings_of import load_recordings
+from .run import Out, limits, started
+
+
+def run(
+    source: Annotated[Path, typer.Argument(metavar="CASE_or_RECORDING")],
+    excitation: Annotated[
+        str, typer.Option(help="hammer, burst, random or sine; default: what it looks like.")
+    ] = "",
+    method: Annotated[str, typer.Option(help="H1, H2, Hv or LPM.")] = "H1",
+    resolution: Annotated[
+        float | None, typer.Option(help="Distance of lines, of continuous random [Hz].", min=1e-9)
+    ] = None,
+    exponential: Annotated[
+        float | None, typer.Option(help="What the exponential window of a hammer test falls to.")
+    ] = None,
+    band: Annotated[str, typer.Option(help="From and to, in Hz; default the whole.")] = "",
+    quantity: Annotated[
+        str, typer.Option(help="receptance, mobility, ... where the file does not say.")
+    ] = "",
+    out: Out = None,
+) -> None:
+    """Estimate FRFs with coherence and variance from time data; screen recordings for faults.
+
+    The universal file it writes goes straight into a case.
+    """
+    from ..report.evaluation_page import evaluation_page
+
+    settings = EstimateSettings(
+        cast(Excitation, excitation) if excitation else None,
+        cast(Method, method),
+        resolution,
+        exponential,
+        limits(band) if band else None,
+    )
+    with started("test", source, out) as job:
+        job.progress("reading", 0.0)
+        is_one = source.exists() and is_case(source)
+        read = load_case(source) if is_one else load_recordings(source, quantity or None)
+        found = evaluate_recordings(read, settings, job.progress)
+        job.json("test.json", to_json(found))
+        job.show(evaluation_page(job.folder, found))

@@ -1,0 +1,264 @@
+"""What the identified modes say of the measuring chain: delay, quantity, units, polarity.
+
+The modal constants A_r = 2i Im(p_r) R_r of a normal mode are real. A delay τ turns them by -ω_r τ,
+a derivative too many or too few by 90 degrees and a power of ω_r; a wrong unit scales all alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .finding import Check, Finding
+from .identification import Identified
+
+LEAST_MODES = 4
+TURNED = 0.1  # rad at the highest mode: a smaller delay bends nothing
+SURE, HINT = 6.0, 3.0  # standard deviations of a delay, to be named and to be looked at
+BETTER, HINTED = 3.0, 1.5  # times less scatter (of phases, of what is left), the same
+QUARTER = 0.35  # rms of the sine of the phases that a quarter turn may leave
+LOUD = 2.5  # factor between recording and model beyond which a unit is wrong
+NEAR = 0.3  # ln: how near a named factor has to be
+ALIKE = 0.6  # MAC from which a mode of the model is the one of the test
+FACTORS = {  # what multiplies the recording to mend it: how it comes about
+    9.80665: "responses in g taken for m/s²",
+    1 / 9.80665: "responses in m/s² taken for g",
+    1 / 4.4482216: "forces in lbf taken for N",
+    4.4482216: "forces in N taken for lbf",
+    1e-3: "responses in mm taken for m",
+    1e3: "responses in m taken for mm",
+    0.0254: "responses in inches taken for m",
+    1 / 0.0254: "responses in m taken for inches",
+    9.80665 / 4.4482216: "responses in g and forces in lbf taken for m/s² and N",
+}
+QUANTITIES = ("receptance", "mobility", "accelerance")
+
+
+def constants(identified: Identified) -> np.ndarray:
+    """A_r = 2i Im(p_r) R_r, [1/kg] of a receptance (r, n_out, n_in)."""
+    return np.asarray(identified.residues * (2j * identified.poles.imag)[:, None, None])
+
+
+def phases(identified: Identified) -> np.ndarray:
+    """Mean phase of each mode's constants, modulo π (r,) [rad]."""
+    A = constants(identified)
+    return 0.5 * np.angle((A**2).sum(axis=(1, 2)))
+
+
+@dataclass(frozen=True)
+class DelayFit:
+    """Delay [s] with its standard deviation, quarter turns (0, 1), rms of phases before, after."""
+
+    delay: float
+    sd: float
+    quarter: int
+    before: float
+    after: float
+
+
+def fitted_delay(omega: np.ndarray, theta: np.ndarray) -> DelayFit:
+    """τ and c of θ_r = c π/2 - ω_r τ (mod π) with the least scatter (rms of sin, [rad]).
+
+    Within one turn of the highest mode; a line of more turns would fit any few phases.
+    """
+    top = float(omega.max())
+    trial = np.linspace(-np.pi, np.pi, 2001) / top
+    best = (np.inf, 0.0, 0)
+    for quarter in (0, 1):
+        e = np.sin(theta + omega * trial[:, None] - quarter * np.pi / 2)
+        scatter = (e**2).mean(axis=1)
+        k = int(scatter.argmin())
+        if scatter[k] < 0.5 * best[0] or (quarter == 0):
+            best = (float(scatter[k]), float(trial[k]), quarter)
+    scatter, delay, quarter = best
+    free = max(len(omega) - 1, 1)
+    sd = np.sqrt(max(scatter, 1e-12) * len(omega) / free / (omega**2).sum())
+    before = float(np.sqrt((np.sin(theta - quarter * np.pi / 2) ** 2).mean()))
+    return DelayFit(delay, float(sd), quarter, before, float(np.sqrt(scatter)))
+
+
+def hinted_delay(identified: Identified) -> float:
+    """A delay that the phases of the modes hint at [s]; 0 where they do not.
+
+    Poles of a delayed recording are bent themselves, so this is where to look again, no result.
+    """
+    if identified.order <= LEAST_MODES:
+        return 0.0
+    omega = np.abs(identified.poles)
+    fit = fitted_delay(omega, phases(identified))
+    turn = abs(fit.delay) * float(omega.max())
+    hint = abs(fit.delay) > HINT * fit.sd and turn > TURNED and fit.quarter == 0
+    return fit.delay if hint and fit.before > HINTED * fit.after else 0.0
+
+
+def phase_checks(
+    identified: Identified, corrected: Identified | None = None, delay: float = 0.0
+) -> tuple[list[Finding], Check]:
+    """Delay and odd derivatives, from the phases of the modal constants alone.
+
+    Parameters
+    ----------
+    corrected : of the recording with ``delay`` [s] taken off
+    """
+    if identified.order < LEAST_MODES:
+        return [], Check("phase of the modes", f"needs {LEAST_MODES} modes", None)
+    omega, theta = np.abs(identified.poles), phases(identified)
+    before = float(np.sqrt((np.sin(theta) ** 2).mean()))
+    said = f"modal constants {np.degrees(before):.2g} degrees rms from real"
+    found: list[Finding] = []
+    fit = fitted_delay(omega, theta)
+    if corrected is not None and corrected.order > LEAST_MODES:
+        rest = fitted_delay(np.abs(corrected.poles), phases(corrected))
+        whole = delay + rest.delay
+        top = float(np.abs(corrected.poles).max())
+        better = BETTER * max(rest.after, 1e-3) < before and corrected.chi < identified.chi
+        if better and abs(whole) > SURE * rest.sd and abs(whole) * top > TURNED:
+            found.append(_late(whole, rest.sd, top))
+    elif fit.quarter and fit.after < QUARTER:
+        found.append(_quarter(identified.quantity))
+    return found, Check("phase of the modes", said, not found)
+
+
+def _late(delay: float, sd: float, top: float) -> Finding:
+    text = (
+        f"all responses {'lag' if delay > 0 else 'lead'} by {1e3 * abs(delay):.3g} ms (± "
+        f"{1e3 * sd:.2g}): the modal constants turn with frequency, by "
+        f"{np.degrees(abs(delay) * top):.0f} degrees at {top / 2 / np.pi:.4g} Hz."
+    )
+    mend = f"in case.toml, [test]: delay = {delay:.4g}"
+    return Finding("delay", text, "fault", (), mend, delay)
+
+
+def _quarter(quantity: str) -> Finding:
+    k = QUANTITIES.index(quantity) if quantity in QUANTITIES else -1
+    others = [QUANTITIES[n] for n in (k - 1, k + 1) if 0 <= n < 3 and k >= 0]
+    text = (
+        f"the modes of what is said to be {quantity} are a quarter turn out of phase: the "
+        f"responses are of another kind ({' or '.join(others) or 'not known which'})."
+    )
+    mend = f'in case.toml, [test]: quantity = "{others[-1]}"' if others else ""
+    return Finding("wrong quantity", text, "fault", (), mend, 1.0)
+
+
+def other_quantity(identified: Identified, others: dict[str, Identified]) -> list[Finding]:
+    """The quantity as which a recording without modes is full of them.
+
+    Parameters
+    ----------
+    others : {quantity: the modes of the same numbers read as this quantity}
+    """
+    able = {
+        name: o
+        for name, o in others.items()
+        if o.order >= LEAST_MODES + identified.order and HINTED * o.chi < identified.chi
+    }
+    if not able:
+        return []
+    best = min(able, key=lambda name: able[name].chi)
+    text = (
+        f"read as {identified.quantity} the recording holds {identified.order} modes and leaves "
+        f"{identified.chi:.3g} times its noise; read as {best} it holds {able[best].order} and "
+        f"leaves {able[best].chi:.3g}."
+    )
+    mend = f'in case.toml, [test]: quantity = "{best}"'
+    return [Finding("wrong quantity", text, "fault", (), mend)]
+
+
+def modal_gains(
+    identified: Identified, phi_out: np.ndarray, phi_in: np.ndarray, frequency: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """g_r = <A_model, A_r>/<A_model, A_model> of the modes that have a partner, and their ω_r.
+
+    Parameters
+    ----------
+    phi_out, phi_in : (n_out, m), (n_in, m)   shapes of the model [1/√kg]
+    frequency : (m,)                          [Hz], within which a factor of 1.3 is looked for
+    """
+    A = constants(identified).reshape(identified.order, -1)
+    model = np.einsum("om,im->moi", phi_out, phi_in).reshape(len(frequency), -1)
+    cross = A @ model.T
+    own, theirs = (np.abs(A) ** 2).sum(axis=1), (model**2).sum(axis=1)
+    mac = np.abs(cross) ** 2 / np.maximum(own[:, None] * theirs, 1e-300)
+    mac[np.abs(np.log(identified.frequency[:, None] / frequency)) > np.log(1.3)] = 0
+    at = mac.argmax(axis=1)
+    rows = np.flatnonzero(mac[np.arange(len(A)), at] > ALIKE)
+    gains = cross[rows, at[rows]] / np.maximum(theirs[at[rows]], 1e-300)
+    return gains, np.abs(identified.poles[rows])
+
+
+def level_checks(
+    identified: Identified,
+    gains: np.ndarray,
+    omega: np.ndarray,
+    known_gain: bool = True,
+    outputs: int = 3,
+) -> tuple[list[Finding], Check]:
+    """Quantity, unit and polarity, from the modal constants over those of the model.
+
+    Parameters
+    ----------
+    gains, omega : (r,)   of :func:`modal_gains`
+    known_gain : whether the level itself may be compared
+    """
+    if len(gains) < LEAST_MODES or outputs < 3:
+        return [], Check("level and units", f"{len(gains)} modes have a partner in the model", None)
+    size, w = np.log(np.abs(gains)), np.log(omega)
+    positive = float((gains.real > 0).mean())
+    order, rest = _derivative(size, w, known_gain)
+    found = []
+    if order:
+        found.append(_quantity(identified, order))
+    level = float(np.median(rest))
+    opposite = positive if abs(order) == 2 else 1 - positive  # two derivatives turn every sign
+    if opposite > 0.8 and abs(order) != 1:
+        text = (
+            f"{100 * opposite:.0f} % of the modes have the sign opposite to the model's: the force "
+            "gauge (or every sensor) is reversed."
+        )
+        mend = f"in sensors.csv turn the direction of input {identified.inputs[0]} round"
+        found.append(Finding("reversed force", text, "fault", (), mend, -1.0))
+    if known_gain and abs(level) > np.log(LOUD):
+        found.append(_unit(level))
+    said = f"{np.exp(np.median(size)):.3g} times the model, over {len(gains)} modes"
+    return found, Check("level and units", said, not found)
+
+
+def _derivative(size: np.ndarray, w: np.ndarray, known_gain: bool) -> tuple[int, np.ndarray]:
+    """Derivatives that the recording has too many (negative: too few), and what is left of ln|g|.
+
+    Where the level is known it says so by far: ω is hundreds of radians per second.
+    """
+    from scipy.stats import theilslopes
+
+    if len(size) < LEAST_MODES + 1:
+        return 0, size
+    slope, _, low, high = (float(v) for v in theilslopes(size, w, 0.999))
+    order = int(np.clip(round(slope), -2, 2))
+    if order == 0:
+        return 0, size
+    left = size - order * w
+    sure = low > 0.3 or high < -0.3
+    if known_gain:  # the level says it as well
+        sure = abs(np.median(left)) < min(abs(np.median(size)), NEAR if not sure else np.inf)
+    return (order, left) if sure else (0, size)
+
+
+def _quantity(identified: Identified, order: int) -> Finding:
+    k = QUANTITIES.index(identified.quantity) if identified.quantity in QUANTITIES else None
+    n = None if k is None else k + order
+    what = QUANTITIES[n] if n is not None and 0 <= n < 3 else "another quantity"
+    text = (
+        f"against the model the modes {'fall' if order < 0 else 'rise'} as ω^{abs(order)}: what is "
+        f"said to be {identified.quantity} is {what}."
+    )
+    mend = f'in case.toml, [test]: quantity = "{what}"'
+    return Finding("wrong quantity", text, "fault", (), mend, float(order))
+
+
+def _unit(level: float) -> Finding:
+    factor, why = min(FACTORS.items(), key=lambda item: abs(level + np.log(item[0])))
+    said = f"the recording is {np.exp(level):.3g} times the model"
+    if abs(level + np.log(factor)) < NEAR:
+        mend = f"in case.toml, [test]: factor = {factor:.7g}"
+        return Finding("wrong units", f"{said}: {why}.", "fault", (), mend, factor)
+    mend = 'look at the calibration, or in case.toml, [test]: gain = "unknown"'
+    return Finding("level", f"{said}, which no unit explains.", "warning", (), mend, np.exp(level))

@@ -1,0 +1,97 @@
+"""A recording screened alone and by the modes identified from it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from ..dynamics.frf import FRF, Quantity
+from .chain_checks import LEAST_MODES, QUANTITIES, hinted_delay, other_quantity, phase_checks
+from .channel_checks import channel_checks
+from .finding import Check, Finding, Screening
+from .identification import Identified, identify
+from .screening import levels_checked
+from .setup import Recording
+from .shapes import lines_per_bandwidth
+from .time_record import overloaded
+
+LINES = 3.0  # in a half-bandwidth: fewer leave the damping uncertain
+POOR = 3.0  # times the noise that an identification leaves: its quantity may be wrong
+STRONG = 3.0  # of χ² that a mode brings, over what it pays
+
+
+def screened(
+    recording: Recording,
+    found: Identified | None = None,
+    others: Sequence[Recording] = (),
+    places: dict[str, np.ndarray] | None = None,
+) -> Screening:
+    """What a recording says of itself.
+
+    Parameters
+    ----------
+    found : what was identified from it, where that is known
+    others : recordings of the same test, at the same level or others
+    places : {output: (3,)} [m]
+    """
+    frf = recording.frf
+    if frf is None:
+        return Screening(recording.name)
+    findings, checks = channel_checks(frf, places)
+    if recording.time is not None:
+        clipped = overloaded(recording.time)
+        for name, blocks in clipped.items():
+            text = f"{name} was overloaded: its signal is cut off in {blocks} blocks."
+            mend = "choose a larger range of the front end and measure again"
+            findings.append(Finding("overload", text, "fault", (name.split()[-1],), mend, blocks))
+        checks.append(Check("overload", f"{len(clipped)} channels are cut off", not clipped))
+    else:
+        checks.append(Check("overload", "is seen in time data alone", None))
+    more, check = levels_checked(recording, others)
+    findings += more
+    checks += check
+    if found is not None:
+        strong = strong_modes(found)
+        more, one = _phases(frf, strong)
+        findings += more
+        checks.append(one)
+        checks.append(_lines(strong, frf.frequency))
+    return Screening(recording.name, tuple(findings), tuple(checks))
+
+
+def _phases(frf: FRF, strong: Identified) -> tuple[list[Finding], Check]:
+    """Delay and quantity; where either is in doubt the recording is identified once more."""
+    if strong.order < LEAST_MODES and frf.quantity in QUANTITIES and strong.chi > POOR:
+        others = {
+            q: replace(frf, quantity=cast(Quantity, q)) for q in QUANTITIES if q != frf.quantity
+        }
+        read = {q: strong_modes(identify(other, strong.band)) for q, other in others.items()}
+        findings = other_quantity(strong, read)
+        if findings:
+            return findings, Check("phase of the modes", "hardly a mode stands out", False)
+    delay = hinted_delay(strong)
+    if not delay:
+        return phase_checks(strong)
+    advance = np.exp(2j * np.pi * frf.frequency * delay)[:, None, None]
+    again = identify(replace(frf, values=frf.values * advance), strong.band)
+    return phase_checks(strong, strong_modes(again), delay)
+
+
+def strong_modes(found: Identified) -> Identified:
+    """The modes within the band that stand out of the noise."""
+    sure = found.frequency_sd < 0.02 * found.frequency
+    return found.sel(found.inside & sure & (found.relative_delta_chi2 > STRONG))
+
+
+def _lines(found: Identified, frequency: np.ndarray) -> Check:
+    """How many lines know the damping of each mode; no fault of the recording."""
+    if not found.order:
+        return Check("lines per half-bandwidth", "no mode stands out", None)
+    n = lines_per_bandwidth(found, frequency)
+    k = int(n.argmin())
+    few = int((n < LINES).sum())
+    said = (
+        f"{n[k]:.2g} at {found.frequency[k]:.4g} Hz, {few} of {found.order} modes below {LINES:g}"
+    )
+    return Check("lines per half-bandwidth", said, few == 0)

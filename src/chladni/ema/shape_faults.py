@@ -1,0 +1,306 @@
+"""Channels at fault, by the measured mode shapes against a model that is itself not right.
+
+A measured shape mixes the model's shapes near it, and each channel has an error of its own:
+
+    ψ_r ~ s_r N(0, Σ_m κ_rm² φ_m φ_mᵀ + σ² I),  κ_rm² = 1 / (1 + (ln(f_m / c f_r) / ε)²).
+
+To first order a change of the model mixes modes in inverse proportion to their distance. ε, σ and
+the common factor c of the frequencies are those that make the recording most likely; the scale s_r
+is profiled, ln L = Σ_r -n/2 ln(ψ_rᵀ C_r⁻¹ ψ_r) - ½ ln|C_r|. A fault of a channel (its sign, its
+gain, an exchange of two, another direction, another place) changes ψ or the rows of Φ; it is named
+where ln L rises by more than the number of trials explains.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from .finding import Finding
+
+LEAST_CHANNELS, LEAST_MODES = 5, 4
+MIX = (0.02, 0.06, 0.2)  # ε
+ERROR = (0.03, 0.08, 0.2, 0.45)  # σ, of the rms of a shape
+SHIFT = (-0.12, -0.06, 0.0, 0.06, 0.12)  # ln c
+GAINS = np.log(np.geomspace(0.15, 6.5, 61))
+LEAST_GAIN = 0.18  # ln: 3 % is the tolerance of a sensor; no model knows a shape to much better
+THRESHOLD = 30.0  # of ln L, after the price of the trials: physics left out reaches half of it
+RARE = np.log(100.0)  # one recording in a hundred has a given fault
+WORST = 3  # channels for which other places are tried
+COPY = 0.05  # of the power of two channels, their difference: they may be one
+MOST = 3  # faults that are named one after another
+
+
+@dataclass(frozen=True, eq=False)
+class ModelShapes:
+    """What the model knows of the channels.
+
+    Attributes
+    ----------
+    values : (n, m)       shapes at the outputs
+    frequency : (m,)      [Hz]
+    turned : (n) -> (k, m), names   the same places along other directions
+    elsewhere : (n) -> (k, m), names   other places along the channel's direction
+    """
+
+    values: np.ndarray
+    frequency: np.ndarray
+    turned: Callable[[int], tuple[np.ndarray, list[str]]] | None = None
+    elsewhere: Callable[[int], tuple[np.ndarray, list[str]]] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Fault:
+    """A hypothesis: what it gains, and how it reads."""
+
+    gain: float
+    finding: Finding
+
+
+def shape_faults(
+    labels: tuple[str, ...], psi: np.ndarray, frequency: np.ndarray, model: ModelShapes
+) -> list[Finding]:
+    """Faults of single channels and of pairs, the surest first; the next is sought without it.
+
+    Parameters
+    ----------
+    psi : (n, r)         measured shapes, real, any scale
+    frequency : (r,)     [Hz]
+    """
+    n, r = psi.shape
+    if n < LEAST_CHANNELS or r < LEAST_MODES or model.values.shape[1] < LEAST_MODES:
+        return []
+    phi, at = model.values, np.arange(n)
+    psi = psi / np.linalg.norm(psi, axis=0)
+    found: list[Finding] = []
+    for _ in range(MOST):
+        best = _best(labels, psi, frequency, phi, model, at)
+        if best is None or best.gain < THRESHOLD:
+            break
+        found.append(best.finding)
+        fine = np.array([label not in best.finding.channels for label in labels])
+        if fine.sum() < LEAST_CHANNELS:
+            break
+        labels = tuple(label for label, f in zip(labels, fine, strict=True) if f)
+        psi, phi, at = psi[fine], phi[fine], at[fine]
+    return found
+
+
+def _best(
+    labels: tuple[str, ...],
+    psi: np.ndarray,
+    f: np.ndarray,
+    phi: np.ndarray,
+    model: ModelShapes,
+    at: np.ndarray,
+) -> _Fault | None:
+    """The fault that raises ln L most, ε, σ and c chosen anew for each.
+
+    ``at`` (n,) are the positions of the channels in the model.
+    """
+    grid = [_Mixture.of(phi, model.frequency, f, e, s, c)
+            for e in MIX for s in ERROR for c in SHIFT]  # fmt: skip
+    null = max(g.likelihood(psi) for g in grid)
+    found = [
+        _signs_and_gains(labels, psi, grid, null),
+        _exchanges(labels, psi, grid, null),
+    ]
+    found += _other_rows(labels, psi, phi, model, at, grid, null)
+    known = [fault for fault in found if fault is not None]
+    return max(known, key=lambda fault: fault.gain, default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mixture:
+    """C_r⁻¹ (r, n, n) and ln|C_r| (r,) for one ε, σ and c."""
+
+    inverse: np.ndarray
+    log_det: np.ndarray
+    mixing: np.ndarray  # κ² (r, m), of columns of unit norm
+    norm: np.ndarray  # (m,)
+    sigma2: float
+    settings: tuple[float, float, float]
+
+    @classmethod
+    def of(
+        cls, phi: np.ndarray, f_model: np.ndarray, f: np.ndarray, e: float, s: float, c: float
+    ) -> "_Mixture":
+        n = len(phi)
+        norm = np.maximum(np.linalg.norm(phi, axis=0), 1e-300)
+        far = (np.log(f_model / f[:, None]) - c) / e
+        mixing = 1 / (1 + far**2)
+        unit = phi / norm
+        C = np.einsum("im,rm,jm->rij", unit, mixing, unit) + s**2 / n * np.eye(n)
+        _, log_det = np.linalg.slogdet(C)
+        return cls(np.linalg.inv(C), log_det, mixing, norm, s**2 / n, (e, s, c))
+
+    def squares(self, psi: np.ndarray) -> np.ndarray:
+        """ψᵀ C⁻¹ ψ (r,)."""
+        return np.asarray(np.einsum("ir,rij,jr->r", psi, self.inverse, psi))
+
+    def total(self, squares: np.ndarray) -> np.ndarray:
+        """ln L of squares (..., r)."""
+        n = self.inverse.shape[1]
+        return np.asarray((-n / 2 * np.log(squares) - self.log_det / 2).sum(axis=-1))
+
+    def likelihood(self, psi: np.ndarray) -> float:
+        """ln L."""
+        return float(self.total(self.squares(psi)))
+
+
+def _signs_and_gains(
+    labels: tuple[str, ...], psi: np.ndarray, grid: list[_Mixture], null: float
+) -> _Fault | None:
+    """One channel times a real factor g: ψ_i / g is what was there."""
+    n, r = psi.shape
+    factors = np.concatenate([np.exp(GAINS), -np.exp(GAINS)])
+    u = 1 / factors - 1
+    L = np.full((n, len(factors)), -np.inf)
+    for g in grid:
+        pull = np.einsum("rij,jr->ir", g.inverse, psi)
+        own = np.einsum("rii->ir", g.inverse)
+        q = (
+            g.squares(psi)
+            + 2 * u[None, :, None] * (psi * pull)[:, None]
+            + (u**2)[None, :, None] * (psi**2 * own)[:, None]
+        )
+        L = np.maximum(L, g.total(q))
+    L = L - r * np.log(np.abs(factors))
+    pure = int(np.abs(factors + 1).argmin())
+    i = int(L[:, pure].argmax())
+    sign = L[i, pure] - null - np.log(n) - RARE
+    small = (np.abs(np.log(np.abs(factors))) < LEAST_GAIN) & (factors > 0)
+    L[:, small] = -np.inf
+    k, at = (int(v) for v in np.unravel_index(L.argmax(), L.shape))
+    price = np.log(n) + RARE + 0.5 * np.log(max(r, 2)) + 1.0
+    gain = L[k, at] - null - price
+    if sign >= gain or abs(np.log(-factors[at]) if factors[at] < 0 else 1.0) < LEAST_GAIN:
+        return _scaled(labels, i, -1.0, float(sign))
+    return _scaled(labels, k, float(factors[at]), float(gain))
+
+
+def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
+    label = labels[i]
+    if g == -1.0:
+        kind, text = "reversed sign", f"output {label} has the wrong sign in every mode"
+        mend = f"in sensors.csv turn the direction of {label} round"
+    else:
+        turned = " and of the wrong sign" if g < 0 else ""
+        kind, text = (
+            "wrong gain",
+            f"output {label} is {abs(g):.2g} times as large as it can be{turned}",
+        )
+        mend = f"in sensors.csv give {label} the gain {g:.3g}"
+    text += f" (e^{gain:.0f} times more likely)."
+    return _Fault(gain, Finding(kind, text, "fault", (label,), mend, g))
+
+
+def _exchanges(
+    labels: tuple[str, ...], psi: np.ndarray, grid: list[_Mixture], null: float
+) -> _Fault | None:
+    """Two channels under each other's label."""
+    n = len(psi)
+    pairs = np.array(list(combinations(range(n), 2)))
+    i, j = pairs.T
+    d = psi[j] - psi[i]  # (pairs, r): what the exchange adds to row i and takes from row j
+    L = np.full(len(pairs), -np.inf)
+    for g in grid:
+        pull = np.einsum("rij,jr->ir", g.inverse, psi)
+        own = np.einsum("rii->ir", g.inverse)
+        tied = g.inverse[:, i, j].T
+        q = g.squares(psi) + 2 * d * (pull[i] - pull[j]) + d**2 * (own[i] + own[j] - 2 * tied)
+        L = np.maximum(L, g.total(q))
+    k = int(L.argmax())
+    gain = float(L[k] - null - np.log(len(pairs)) - RARE)
+    a, b = (int(v) for v in pairs[k])
+    names = (labels[a], labels[b])
+    text = (
+        f"outputs {names[0]} and {names[1]} are exchanged: each fits the other's place "
+        f"(e^{gain:.0f} times more likely)."
+    )
+    mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
+    return _Fault(gain, Finding("swapped channels", text, "fault", names, mend))
+
+
+def _other_rows(
+    labels: tuple[str, ...],
+    psi: np.ndarray,
+    phi: np.ndarray,
+    model: ModelShapes,
+    at: np.ndarray,
+    grid: list[_Mixture],
+    null: float,
+) -> list[_Fault]:
+    """The channels that fit worst, along other directions, at other places, at another's place."""
+    first = max(grid, key=lambda g: g.likelihood(psi))
+    pull = np.einsum("rij,jr->ir", first.inverse, psi)
+    odd = (pull**2 / np.einsum("rii->ir", first.inverse) / first.squares(psi)).sum(axis=1)
+    near = sorted(grid, key=lambda g: -g.likelihood(psi))[:6] + grid[:: max(1, len(grid) // 12)]
+    out = []
+    for i in np.argsort(-odd)[:WORST]:
+        others = _like(psi, int(i))
+        tried = [("copy", (phi[others], [labels[k] for k in others]))]
+        tried += [("turned", model.turned(int(at[i])))] if model.turned else []
+        tried += [("elsewhere", model.elsewhere(int(at[i])))] if model.elsewhere else []
+        for kind, (values, names) in tried:
+            if len(names):
+                out.append(_replaced(labels, psi, phi, int(i), kind, values, names, near, null))
+    return out
+
+
+def _like(psi: np.ndarray, i: int) -> np.ndarray:
+    """Other channels that show nearly the same."""
+    gap = ((psi - psi[i]) ** 2).sum(axis=1) / ((psi**2).sum(axis=1) + (psi[i] ** 2).sum())
+    return np.flatnonzero((gap < COPY) & (np.arange(len(psi)) != i))
+
+
+def _replaced(
+    labels: tuple[str, ...],
+    psi: np.ndarray,
+    phi: np.ndarray,
+    i: int,
+    kind: str,
+    rows: np.ndarray,
+    names: list[str],
+    grid: list[_Mixture],
+    null: float,
+) -> _Fault:
+    """Row i of the model by each of others (k, m), by what the other channels foretell of it."""
+    n = len(psi)
+    keep = np.arange(n) != i
+    L = np.full(len(rows), -np.inf)
+    for g in grid:
+        unit, other = phi[keep] / g.norm, rows / g.norm
+        C = np.einsum("im,rm,jm->rij", unit, g.mixing, unit) + g.sigma2 * np.eye(n - 1)
+        cross = np.einsum("km,rm,jm->rkj", other, g.mixing, unit)
+        inverse = np.linalg.inv(C)
+        _, log_det = np.linalg.slogdet(C)
+        held = np.einsum("rij,jr->ri", inverse, psi[keep])
+        rest = np.einsum("ir,ri->r", psi[keep], held)
+        mean = np.einsum("rkj,rj->rk", cross, held)
+        v = np.einsum("km,rm->rk", other**2, g.mixing) + g.sigma2
+        v = v - np.einsum("rki,rij,rkj->rk", cross, inverse, cross, optimize=True)
+        v = np.maximum(v, 0.5 * g.sigma2)
+        q = rest[:, None] + (psi[i][:, None] - mean) ** 2 / v
+        L = np.maximum(L, (-n / 2 * np.log(q) - (log_det[:, None] + np.log(v)) / 2).sum(axis=0))
+    k = int(L.argmax())
+    gain = float(L[k] - null - np.log(n * len(rows)) - RARE)
+    label = labels[i]
+    if kind == "copy":
+        text = (
+            f"output {label} shows what {names[k]} shows (e^{gain:.0f} times more likely): one "
+            "place under two labels."
+        )
+        mend = f'in sensors.csv give {label} the cell use = "no"'
+        both = (label, names[k])
+        finding = Finding("duplicated channels", text, "fault", both, mend)
+    elif kind == "turned":
+        text = f"output {label} points along {names[k]} (e^{gain:.0f} times more likely)."
+        mend = f"in sensors.csv give {label} the direction {names[k]}"
+        finding = Finding("turned sensor", text, "fault", (label,), mend)
+    else:
+        text = f"output {label} sits elsewhere, near {names[k]} (e^{gain:.0f} times more likely)."
+        mend = f"look where {label} sits and put that place into sensors.csv"
+        finding = Finding("misplaced sensor", text, "fault", (label,), mend)
+    return _Fault(gain, finding)

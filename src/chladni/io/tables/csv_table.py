@@ -1,0 +1,109 @@
+"""A CSV file as columns of text and numbers, with the line each row stands in."""
+
+import csv
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import FileError
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A CSV file: columns of text, and the line of the file each row stands in."""
+
+    path: Path
+    columns: dict[str, list[str]]
+    line: list[int]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def numbers(self, name: str, empty: float = np.nan) -> np.ndarray:
+        """(n,) finite numbers; an empty cell is ``empty``."""
+        try:  # the quick way, for a hundred thousand rows
+            values = np.array(self.columns[name], dtype=float)
+        except ValueError:
+            values = np.array([self.number(name, k, empty) for k in range(len(self.line))])
+            return values
+        if not np.isfinite(values).all():
+            self._not_anumber(name, int(np.argmin(np.isfinite(values))))
+        return values
+
+    def number(self, name: str, k: int, empty: float) -> float:
+        """The finite number in row ``k``; an empty cell is ``empty``."""
+        text = self.columns[name][k]
+        if not text:
+            return empty
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            self._not_anumber(name, k)
+        return value
+
+    def _not_anumber(self, name: str, k: int) -> None:
+        raise FileError(
+            f"{self.path.name}, line {self.line[k]}: {name} is {self.columns[name][k]!r}, "
+            "which is not a number"
+        )
+
+
+def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTable:
+    """A CSV file with these columns, in any order.
+
+    Raises
+    ------
+    FileError
+        If the file, a column or a cell is missing, or a column is unknown.
+    """
+    if not path.is_file():
+        near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
+        raise FileError(f"no file {path}; beside it there are {near}")
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, skipinitialspace=True)
+            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
+    except csv.Error as error:
+        raise FileError(f"{path.name} is no table: {error}") from error
+    if not rows:
+        raise FileError(f"{path.name} is empty; the first line names the columns {', '.join(due)}")
+    header = [name.strip().lower() for name in rows[0][1]]
+    _check_header(path, header, due, optional)
+    for line, row in rows[1:]:
+        if len(row) != len(header):
+            raise FileError(
+                f"{path.name}, line {line}: {len(row)} cells, the header has {len(header)}"
+            )
+    columns = {name: [row[k].strip() for _, row in rows[1:]] for k, name in enumerate(header)}
+    if len(rows) == 1:
+        raise FileError(f"{path.name} has a header but no rows")
+    return CsvTable(path, columns, [line for line, _ in rows[1:]])
+
+
+def beside_it(path: Path) -> list[str]:
+    """Names of the files in the folder of this one."""
+    return (
+        sorted(p.name for p in path.parent.glob("*") if p.is_file()) if path.parent.is_dir() else []
+    )
+
+
+def _check_header(
+    path: Path, header: list[str], due: Sequence[str], optional: Sequence[str]
+) -> None:
+    if missing := [name for name in due if name not in header]:
+        raise FileError(
+            f"{path.name}, line 1: no column {', '.join(missing)}; there are {', '.join(header)}"
+        )
+    for name in header:
+        if name not in (*due, *optional):
+            known = ", ".join((*due, *optional))
+            raise FileError(f"{path.name}, line 1: unknown column {name!r}; known are {known}")
+        if header.count(name) > 1:
+            raise FileError(f"{path.name}, line 1: column {name!r} occurs twice")

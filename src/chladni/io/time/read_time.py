@@ -1,0 +1,207 @@
+"""Time data in: WAV, MATLAB's MAT, CSV; what says which channel is what (SI, pickles refused).
+
+A file that cannot say it itself has a table beside it, ``NAME.channels.csv``: ``channel`` (number
+from 1, or its name in the file), ``label`` (412:+Z), ``unit``, and if need be ``role`` (input,
+output) and ``scale`` (unit per number of the file; of WAV, per full scale).
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...ema.time_record import TimeRecord
+from ...errors import FileError
+from ..tables.csv_table import read_table
+from .time_channels import TimeChannel, assembled, from_arrays, rate_of
+
+Read = tuple[TimeRecord, list[str]]
+
+
+def read_wav(path: Path) -> Read:
+    """A WAV of any width; its numbers are shares of full scale, so a table of channels is needed.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or no table of channels stands beside it.
+    """
+    from scipy.io import wavfile
+
+    try:
+        rate, x = wavfile.read(path)
+    except _DAMAGED as error:
+        raise FileError(f"{path.name} cannot be read as WAV: {error}") from error
+    x = np.atleast_2d(x.T)
+    if not described(path).is_file():
+        raise FileError(
+            f"{path.name} holds {len(x)} channels without units; write {described(path).name} "
+            "beside it with the columns channel, label, unit and scale (units per full scale)"
+        )
+    values = x.astype(float)
+    if x.dtype.kind == "u":
+        values = values / 128.0 - 1.0  # eight bits are written without sign
+    elif x.dtype.kind == "i":
+        values /= -float(np.iinfo(x.dtype).min)
+    raw = [TimeChannel(str(k + 1), "", v[None]) for k, v in enumerate(values)]
+    return assembled(path.name, float(rate), _described(path, raw))
+
+
+def read_mat(path: Path) -> Read:
+    """A MAT of MATLAB 4 to 7: named arrays, or records with x_values and y_values (Testlab).
+
+    Raises
+    ------
+    FileError
+        If it is of version 7.3, is damaged, or does not say rate and channels.
+    """
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    with path.open("rb") as file:
+        head = file.read(128)
+    if b"MATLAB 7.3" in head or head[:4] == b"\x89HDF":
+        raise FileError(f"{path.name} is of MATLAB 7.3 (HDF5), which is not read; save it with -v7")
+    try:
+        held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+    except (*_DAMAGED, MatReadError) as error:
+        raise FileError(f"{path.name} cannot be read as MAT: {error}") from error
+    held = {k: v for k, v in held.items() if not k.startswith("__")}
+    records = [r for v in held.values() for r in np.ravel(np.array(v, dtype=object))
+               if hasattr(r, "x_values") and hasattr(r, "y_values")]  # fmt: skip
+    if records:
+        rate, channels = _testlab(path.name, records)
+        if described(path).is_file():
+            channels = _described(path, channels)
+        return assembled(path.name, rate, channels)
+    arrays = {}
+    for name, value in held.items():
+        array = np.asarray(value)
+        if array.dtype.kind == "O":
+            array = np.array([str(x) for x in array.ravel()])
+        arrays[name] = array
+    return _named(path, arrays)
+
+
+def read_time_npz(path: Path, arrays: dict[str, np.ndarray]) -> Read:
+    """An NPZ whose arrays are time data (``time_channels.from_arrays``)."""
+    return _named(path, arrays)
+
+
+def _named(path: Path, arrays: dict[str, np.ndarray]) -> Read:
+    """Named arrays, their labels from the table beside the file where there is one."""
+    record, notes = from_arrays(path.name, arrays)
+    if not described(path).is_file():
+        return record, notes
+    stacks = np.concatenate([record.force, record.response], axis=1)
+    motion = {"receptance": "m", "mobility": "m/s"}.get(record.quantity, "m/s^2")
+    units = ["N"] * len(record.inputs) + [motion] * len(record.outputs)
+    raw = [TimeChannel(str(k + 1), u, stacks[:, k]) for k, u in enumerate(units)]
+    return assembled(path.name, record.rate, _described(path, raw))
+
+
+def _testlab(name: str, records: list[Any]) -> tuple[float, list[TimeChannel]]:
+    """Rate and channels of records {x_values: {start_value, increment}, y_values: {values, ...}}.
+
+    Layout of MAT exports of Simcenter Testlab.
+    """
+    channels, rates = [], []
+    for k, record in enumerate(records):
+        x, y = record.x_values, record.y_values
+        try:
+            rates.append(1 / float(x.increment))
+            values = np.asarray(y.values, float)
+        except (AttributeError, TypeError, ValueError, ZeroDivisionError) as error:
+            raise FileError(f"{name}: record {k + 1} has no increment or no values") from error
+        unit = str(getattr(getattr(y, "quantity", None), "label", "") or "")
+        about = getattr(record, "function_record", None)
+        called = getattr(about, "name", "") if about is not None else ""
+        columns = values[:, None] if values.ndim == 1 else values
+        names = [str(n) for n in np.ravel(called)] if np.size(called) else []
+        names = names if len(names) == columns.shape[1] else [""] * columns.shape[1]
+        channels += [
+            TimeChannel(_dof(n), unit, c[None]) for n, c in zip(names, columns.T, strict=True)
+        ]
+    lengths = {c.values.shape[1] for c in channels}
+    if len(lengths) > 1 or np.ptp(rates) > 1e-6 * max(rates):
+        raise FileError(f"{name}: its records differ in length or rate")
+    return rates[0], channels
+
+
+def _dof(text: str) -> str:
+    """'shaker:12:+Z' -> '12:+Z'; any other name as it stands."""
+    found = re.search(r"(\d+:[+-]?[XYZ]|\d+:n)$", text.strip())
+    return found[1] if found else text.strip()
+
+
+def read_time_csv(path: Path) -> Read:
+    """Columns ``time_s``, if need be ``block``, and one a channel, headed ``412:+Z [m/s^2]``.
+
+    Raises
+    ------
+    FileError
+        With the line of what is no number, or the head that says no unit.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head = [cell.strip() for cell in file.readline().strip().split(",")]
+    try:
+        rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
+    except (ValueError, UnicodeDecodeError) as error:
+        raise FileError(f"{path.name}: a line after the first is not {len(head)} numbers "
+                        f"({str(error).split(';')[0]})") from error  # fmt: skip
+    if rows.size == 0 or rows.shape[1] != len(head):
+        raise FileError(f"{path.name}: {rows.shape[1] if rows.size else 0} columns of numbers, the "
+                        f"header has {len(head)}")  # fmt: skip
+    names = [h.lower() for h in head]
+    t = rows[:, names.index("time_s")]
+    block = rows[:, names.index("block")] if "block" in names else np.zeros(len(rows))
+    pieces = [np.flatnonzero(block == b) for b in dict.fromkeys(block.tolist())]
+    if len({len(p) for p in pieces}) > 1:
+        raise FileError(f"{path.name}: its blocks differ in length")
+    rate = rate_of(path.name, t[pieces[0]])
+    raw = []
+    for k, cell in enumerate(head):
+        if names[k] in ("time_s", "block"):
+            continue
+        said = re.fullmatch(r"(.*?)\s*\[(.*)\]", cell)
+        label, unit = (said[1], said[2]) if said else (cell, "")
+        raw.append(TimeChannel(label, unit, np.stack([rows[p, k] for p in pieces])))
+    if described(path).is_file():
+        raw = _described(path, raw)
+    return assembled(path.name, rate, raw)
+
+
+def described(path: Path) -> Path:
+    """The table of channels that belongs to a file."""
+    return path.with_name(f"{path.stem}.channels.csv")
+
+
+def _described(path: Path, raw: list[TimeChannel]) -> list[TimeChannel]:
+    """The channels as the table beside the file has them; what it does not name is left out."""
+    table = read_table(described(path), ("channel", "label", "unit"), ("role", "scale"))
+    called = {c.label: c for c in raw} | {str(k + 1): c for k, c in enumerate(raw)}
+    out = []
+    for k, line in enumerate(table.line):
+        where = f"{table.path.name}, line {line}"
+        word = table.columns["channel"][k]
+        if word not in called:
+            raise FileError(
+                f"{where}: no channel {word!r} in {path.name}; there are 1 to {len(raw)}"
+            )
+        role = table.columns["role"][k] if "role" in table else ""
+        if role not in ("", "input", "output"):
+            raise FileError(f"{where}: role {role!r}; there are input and output")
+        scale = table.number("scale", k, 1.0) if "scale" in table else 1.0
+        label = table.columns["label"][k]
+        if not label:
+            raise FileError(f"{where}: channel {word} has no label")
+        unit = table.columns["unit"][k] or called[word].unit
+        out.append(TimeChannel(label, unit, scale * called[word].values, role))
+    return out
+
+
+_DAMAGED = (
+    *(ValueError, TypeError, OSError, EOFError, KeyError, IndexError, NotImplementedError),
+    *(MemoryError, OverflowError, AttributeError, UnboundLocalError),
+)

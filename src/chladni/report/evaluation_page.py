@@ -1,0 +1,128 @@
+"""The evaluation of a test as a page: findings, FRFs, coherence, distortion, free decays."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..dynamics.frf import FRF, UNIT
+from ..ema.ring_down import RingDown
+from ..io.tables.write_tables import write_npz
+from ..io.uff.estimate_stamp import stamp
+from ..io.uff.write_uff import write_uff
+from ..workflows.evaluation import Evaluation, RecordingEvaluation
+from .blocks import Block, PageParts, Picture, Section, Table
+from .screening_blocks import screening_section
+from .words import number
+
+_SHOWN = 12  # channels drawn
+
+
+def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
+    """Sections of the page; pictures and, of time data, the FRFs are written into the folder."""
+    sections = [screening_section(*(r.screening for r in found.recordings))]
+    files: list[tuple[str, str]] = []
+    for k, r in enumerate(found.recordings):
+        stem = "" if len(found.recordings) == 1 else f"_{k + 1}"
+        files += _written(folder, stem, r)
+        blocks, drawn = _blocks(folder, stem, r)
+        sections.append(Section(r.recording.name, blocks))
+        files += drawn
+    lead = "; ".join(r.screening.sentence for r in found.recordings)
+    return PageParts(lead, sections, found.notes, files)
+
+
+def _written(folder: Path, stem: str, r: RecordingEvaluation) -> list[tuple[str, str]]:
+    """The FRFs of time data as a universal file in text and in binary, and as arrays."""
+    if r.estimate is None or r.recording.frf is None:
+        return []
+    frf = r.estimate.frf
+    line = stamp(r.estimate.averages, r.estimate.added_damping)
+    names = (f"frf{stem}.uff", f"frf{stem}_58b.uff", f"frf{stem}.npz")
+    write_uff(folder / names[0], frf, r.recording.nodes, title=line)
+    write_uff(folder / names[1], frf, r.recording.nodes, title=line, binary=True)
+    write_npz(folder / names[2], frf)
+    what = ("FRFs and coherence for a case (58)", "the same in binary (58b)", "with the variance")
+    return list(zip(names, what, strict=True))
+
+
+def _blocks(
+    folder: Path, stem: str, r: RecordingEvaluation
+) -> tuple[list[Block], list[tuple[str, str]]]:
+    from ..view import evaluation_plots, plots
+
+    frf = r.recording.frf
+    assert frf is not None
+    channels = [(i, j) for j in range(len(frf.inputs)) for i in range(len(frf.outputs))][:_SHOWN]
+    named = {f"{frf.outputs[i]} from {frf.inputs[j]}": (i, j) for i, j in channels}
+    blocks: list[Block] = [_table(frf)]
+    files = []
+    grid = folder / f"frf_grid{stem}.png"
+    curves = {n: {"test": (frf.frequency, frf.values[:, i, j])} for n, (i, j) in named.items()}
+    plots.frf_grid(grid, curves, UNIT.get(frf.quantity, ""), columns=min(2, len(curves)))
+    blocks.append(Picture(grid, "FRFs."))
+    files.append((grid.name, "FRFs"))
+    if frf.coherence is not None:
+        path = folder / f"coherence{stem}.png"
+        lines = {n: frf.coherence[:, i, j] for n, (i, j) in named.items()}
+        evaluation_plots.lines_over_frequency(
+            path, frf.frequency, lines, "coherence [-]", (0.0, 1.02)
+        )
+        blocks.append(Picture(path, "Coherence: where it is low, noise or leakage is left."))
+        files.append((path.name, "coherence"))
+    distortion = r.estimate.distortion if r.estimate is not None else None
+    if distortion is not None:
+        path = folder / f"distortion{stem}.png"
+        each = {o: 100 * distortion[:, i] for i, o in enumerate(frf.outputs[:_SHOWN])}
+        evaluation_plots.lines_over_frequency(path, frf.frequency, each, "harmonics 2 to 5 [%]")
+        blocks.append(Picture(path, "Harmonics of the responses over their fundamental."))
+        files.append((path.name, "harmonic distortion"))
+    if r.decays:
+        path = folder / f"decays{stem}.png"
+        each_decay = {
+            f"{number(d.frequency)} Hz, {d.output}": (d.amplitude, d.frequency_at, d.damping_at)
+            for d in r.decays
+        }
+        evaluation_plots.amplitude_dependence(path, each_decay)
+        blocks += [_decays(r.decays), Picture(path, "Frequency and damping against amplitude.")]
+        files.append((path.name, "free decays"))
+    return blocks, files
+
+
+def _table(frf: FRF) -> Table:
+    """Level, coherence and spread of every channel."""
+    rows = []
+    for j, drive in enumerate(frf.inputs):
+        for i, output in enumerate(frf.outputs):
+            H = frf.values[:, i, j]
+            size = np.abs(H)
+            coherence = None if frf.coherence is None else float(np.median(frf.coherence[:, i, j]))
+            sd = None
+            if frf.variance is not None:
+                noise = np.sqrt(frf.variance[:, i, j])
+                sd = 100 * float(np.median(noise / np.maximum(size, 1e-300)))
+            peak = frf.frequency[size.argmax()]
+            cells = (number(size.max()), number(peak), number(coherence, 3), number(sd, 2))
+            rows.append((output, drive, *cells))
+    unit = UNIT.get(frf.quantity, "-")
+    heads = ("output", "input", f"largest [{unit}]", "at [Hz]", "coherence", "± %")
+    f = frf.frequency
+    caption = (
+        f"{len(f)} lines from {number(float(f[0]))} to {number(float(f[-1]))} Hz; medians over "
+        "them of the coherence and of the standard deviation."
+    )
+    return Table(heads, rows, ("output", "input"), caption)
+
+
+def _decays(decays: tuple[RingDown, ...]) -> Table:
+    rows = [
+        (
+            d.output,
+            number(d.frequency, 5),
+            number(100 * d.damping, 3),
+            f"{number(100 * d.damping_at[0], 3)} to {number(100 * d.damping_at[-1], 3)}",
+            f"{number(d.frequency_at[0], 5)} to {number(d.frequency_at[-1], 5)}",
+        )
+        for d in decays
+    ]
+    heads = ("output", "Hz", "damping [%]", "damping, loud to faint [%]", "Hz, loud to faint")
+    return Table(heads, rows, ("output",), "Free decays, each followed down to its noise.")

@@ -1,0 +1,169 @@
+"""A recording screened against a model: level, quantity, and every channel by the mode shapes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..dynamics.modes import rigid_modes
+from ..ema.chain_checks import constants, level_checks, modal_gains
+from ..ema.channel_checks import left_out
+from ..ema.finding import Check, Finding, Screening
+from ..ema.identification import Identified
+from ..ema.recording_screening import strong_modes
+from ..ema.shape_faults import LEAST_CHANNELS, LEAST_MODES, ModelShapes, shape_faults
+from ..fem.assemble import Structure
+from ..fem.locate import rows_of
+from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import Modelled
+from ..geometry.grid_normals import grid_normals
+from ..geometry.sampling import farthest_point_sample
+
+ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
+PLACES = 400  # of the shells where a misplaced sensor may sit
+EQUAL_LINES, EQUAL_DAMPING = 200, 0.02  # of the model's responses at two channels that are equal
+UNLIKE = 0.3  # 1: nothing in common; the recorded difference below this share of the model's
+REACH = 1.3  # times the band: modes of the model that may mix with those of the test
+
+
+def against_model(
+    before: Screening,
+    found: Identified,
+    model: Modelled,
+    outputs: MeasuredDofs,
+    inputs: MeasuredDofs,
+    gain_known: bool = True,
+) -> Screening:
+    """The same, with what the model says of level, quantity and every channel.
+
+    The shapes alone are compared, and modal constants by their order of magnitude: frequencies may
+    be off, and physics may be missing.
+
+    Parameters
+    ----------
+    found : of the recording, its outputs in the order of ``outputs``
+    model : up to ``REACH`` times the band at least
+    """
+    strong = strong_modes(found)
+    built, modes = model.structure, model.modes
+    f_max = REACH * found.band[1]
+    elastic = ~rigid_modes(modes) & (modes.frequency <= f_max)
+    elastic &= modes.frequency > 1e-3 * f_max
+    near = modes.sel(np.flatnonzero(elastic))
+    labels = found.outputs
+    phi_o = outputs.rows(built) @ near.shapes
+    phi_i = inputs.rows(built) @ near.shapes
+    omega_r = 2 * np.pi * near.frequency
+    before = _agreeing(before, labels, phi_o, phi_i, omega_r, 2 * np.pi * found.band[1])
+    if inputs.base.any() or not strong.order or not len(near.frequency):
+        why = "the base is moved" if inputs.base.any() else "no mode stands out"
+        return before.with_more([], [Check("channels against the model", why, None)])
+    gains, omega = modal_gains(strong, phi_o, phi_i, near.frequency)
+    findings, check = level_checks(strong, gains, omega, gain_known, len(phi_o))
+    bad = {c for f in before.findings for c in f.channels if f.kind in _UNUSABLE}
+    keep = np.array([k for k, label in enumerate(labels) if label not in bad], int)
+    shapes = ModelShapes(
+        phi_o[keep],
+        near.frequency,
+        lambda i: _turned(outputs, int(keep[i]), built, near.shapes),
+        lambda i: _elsewhere(outputs, int(keep[i]), built, near.shapes),
+    )
+    psi = measured_shapes(strong)[keep]
+    kept = tuple(labels[k] for k in keep)
+    faults = [] if outputs.sd.any() else shape_faults(kept, psi, strong.frequency, shapes)
+    said = f"{len(kept)} channels, {strong.order} modes, {len(near.frequency)} of the model"
+    one = Check("channels against the model", said, not faults)
+    if outputs.sd.any() or len(kept) < LEAST_CHANNELS or strong.order < LEAST_MODES:
+        why = f"{said}: at least {LEAST_CHANNELS} channels of known places, {LEAST_MODES} modes"
+        one = Check("channels against the model", why, None)
+    checks = [check, one]
+    return before.with_more([*findings, *faults], checks)
+
+
+_UNUSABLE = ("dead channel", "duplicated channels")
+
+
+def _agreeing(
+    before: Screening,
+    labels: tuple[str, ...],
+    phi: np.ndarray,
+    drive: np.ndarray,
+    omega_r: np.ndarray,
+    top: float,
+) -> Screening:
+    """Equal channels are no matter where the model's are equal as well, and a fault where not.
+
+    Parameters
+    ----------
+    phi, drive : (n, m), (n_in, m)   shapes at the outputs and at the inputs
+    omega_r, top : (m,), end of the band [rad/s]
+    """
+    out = []
+    s = 1j * np.linspace(0.1, 1.0, EQUAL_LINES) * top
+    h = s[:, None] ** 2 / (s[:, None] ** 2 + 2 * EQUAL_DAMPING * omega_r * s[:, None] + omega_r**2)
+    H = np.einsum("nm,fm,im->fni", phi, h, drive)
+    for f in before.findings:
+        if f.kind != "equal channels":
+            out.append(f)
+            continue
+        a, b = (H[:, labels.index(c)] for c in f.channels)
+        apart = float(np.linalg.norm(a - b) / np.maximum(np.linalg.norm([a, b]), 1e-300))
+        if apart > UNLIKE and f.value < UNLIKE * apart:
+            text = (
+                f"outputs {' and '.join(f.channels)} are equal within their noise, in the model "
+                f"they differ by {100 * apart:.0f} %: one sensor under two labels."
+            )
+            mend = left_out(f.channels[1])
+            out.append(Finding("duplicated channels", text, "fault", f.channels, mend, f.value))
+    return replace(before, findings=tuple(out))
+
+
+def measured_shapes(found: Identified) -> np.ndarray:
+    """Real shapes (n_out, r) of unit norm, from the input that drives each mode most."""
+    A = constants(found)
+    best = np.linalg.norm(A, axis=1).argmax(axis=1)
+    psi = np.stack([a[:, j] for a, j in zip(A, best, strict=True)], axis=1)
+    psi = psi * np.exp(-0.5j * np.angle((psi**2).sum(axis=0)))
+    return np.asarray(psi.real / np.maximum(np.linalg.norm(psi.real, axis=0), 1e-300))
+
+
+_AXES = ("+X", "+Y", "+Z")
+
+
+def _turned(
+    dofs: MeasuredDofs, i: int, built: Structure, shapes: np.ndarray
+) -> tuple[np.ndarray, list[str]]:
+    """The place of a channel along either way of every axis that it does not point along."""
+    axes = [k for k in range(3) if abs(dofs.directions[i, k]) < 0.9]
+    ways = np.array([np.eye(3)[k] for k in axes])
+    rows = _rows(built, np.repeat(dofs.grids[i], len(axes)), dofs.points[i], ways) @ shapes
+    names = [_AXES[k] for k in axes] + [_AXES[k].replace("+", "-") for k in axes]
+    values = np.concatenate([rows, -rows])
+    size = np.linalg.norm(values, axis=1)
+    seen = size > 0.02 * np.linalg.norm(shapes, axis=0).mean() / np.sqrt(len(shapes))
+    return values[seen], [n for n, s in zip(names, seen, strict=True) if s]
+
+
+def _rows(built: Structure, grids: np.ndarray, point: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    return np.asarray(rows_of(built, grids, np.tile(point, (len(ways), 1)), ways).toarray())
+
+
+def _elsewhere(
+    dofs: MeasuredDofs, i: int, built: Structure, shapes: np.ndarray
+) -> tuple[np.ndarray, list[str]]:
+    """Grids of the shells spread evenly, along the channel's direction or across the shell."""
+    made = built.assembly
+    if not len(made.shells):
+        return np.zeros((0, shapes.shape[1])), []
+    rows = np.unique(made.shells.nodes)
+    points = made.points[rows]
+    pick = farthest_point_sample(points, min(PLACES, len(rows)))
+    far = np.linalg.norm(points[pick] - dofs.points[i], axis=1)
+    pick = pick[far > 0.04 * np.ptp(points, axis=0).max()]
+    grids, normals = made.ids[rows[pick]], grid_normals(made, rows[pick])
+    own = np.tile(dofs.directions[i], (len(pick), 1))
+    other = np.abs((own * normals).sum(axis=1)) < ACROSS
+    grids = np.concatenate([grids, *[grids[other]] * 2])
+    ways = np.concatenate([own, normals[other], -normals[other]])
+    at = np.concatenate([points[pick], *[points[pick][other]] * 2])
+    values = rows_of(built, grids, at, ways) @ shapes
+    return np.asarray(values), [f"grid {g}" for g in grids]

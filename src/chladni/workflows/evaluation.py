@@ -1,0 +1,134 @@
+"""The evaluation of a test: FRFs from time data, ring-downs, screening of every recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
+from ..case import Case
+from ..case.mended_recordings import with_frf
+from ..ema.finding import Check, Finding, Screening
+from ..ema.frf_estimate import EstimateSettings, FrfEstimate
+from ..ema.identification import Identified, identify
+from ..ema.recording_screening import screened
+from ..ema.ring_down import RingDown, ring_downs
+from ..ema.setup import Recording
+from ..errors import ChladniError, FileError
+from ..fem.modelled import modelled
+from ..progress import Progress, silent
+from .case_model import REACH
+from .identify import without_window
+from .screening_of_case import screened_by_model
+
+MOVES = 1.5  # damping at one amplitude over that at another: more is no linear structure
+DISTORTED = 0.05  # harmonics over the fundamental
+LINES = 20000  # of an FRF: more are not identified from, whoever wants them names a band
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingEvaluation:
+    """What was made of one recording.
+
+    Attributes
+    ----------
+    recording : Recording     with the FRFs
+    estimate : how they were estimated, where it held time data
+    decays : free decays of its strongest modes, where its inputs stop
+    screening : Screening
+    """
+
+    recording: Recording
+    estimate: FrfEstimate | None
+    decays: tuple[RingDown, ...]
+    screening: Screening
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The evaluation of every recording of a test."""
+
+    recordings: tuple[RecordingEvaluation, ...]
+    notes: tuple[str, ...] = ()
+
+
+def evaluate_recordings(
+    source: Case | Sequence[Recording],
+    settings: EstimateSettings | None = None,
+    progress: Progress = silent,
+) -> Evaluation:
+    """Estimate the FRFs of what holds time data, and screen every recording.
+
+    The first recording of a case is screened against its model as well.
+
+    Raises
+    ------
+    FileError
+        If nothing holds FRFs or time data, or no FRF can be estimated.
+    """
+    case = source if isinstance(source, Case) else None
+    read = source.recordings if isinstance(source, Case) else tuple(source)
+    made = [with_frf(r, settings) for r in read]
+    held = [(r, e) for r, e in made if r.frf is not None]
+    if not held:
+        raise FileError("the recordings hold neither time data nor frequency responses")
+    found = []
+    with threadpool_limits(1):
+        for k, (r, e) in enumerate(held):
+            progress(f"screening {r.name}", k / len(held))
+            others = [] if k else [other for other, _ in held[1:]]
+            decays = ring_downs(r.time) if r.time is not None else ()
+            screening = _screened(case, r, others, first=k == 0)
+            found.append(RecordingEvaluation(r, e, decays, _with_time(screening, e, decays)))
+    said = [note for f in found for note in f.screening.notes]
+    own = case.said("test") if case is not None else [n for r, _ in held for n in r.notes]
+    return Evaluation(tuple(found), tuple(dict.fromkeys([*said, *own])))
+
+
+def _screened(
+    case: Case | None, r: Recording, others: Sequence[Recording], first: bool
+) -> Screening:
+    identified = _identified(case, r)
+    if case is None or not first or identified is None:
+        return screened(r, identified, others)
+    model = modelled(case.tested(case.assembly), REACH * identified.band[1])
+    return screened_by_model(case, identified, model)
+
+
+def _identified(case: Case | None, r: Recording) -> Identified | None:
+    """Its modes, where they can be identified."""
+    frf = r.frf
+    assert frf is not None
+    if len(frf.frequency) > LINES:
+        return None
+    try:
+        use = None if case is None else case.lines(frf.frequency)
+        found = identify(frf, None if case is None else case.band, use=use)
+    except ChladniError:
+        return None
+    return without_window(found, r.added_damping)
+
+
+def _with_time(
+    screening: Screening, estimate: FrfEstimate | None, decays: Sequence[RingDown]
+) -> Screening:
+    """The same with what only time data tell: distortion, and damping that goes with amplitude."""
+    findings: list[Finding] = []
+    checks = []
+    if estimate is not None and estimate.distortion is not None:
+        worst = float(estimate.distortion.max())
+        k, i = divmod(int(estimate.distortion.argmax()), estimate.distortion.shape[1])
+        f, output = estimate.frf.frequency[k], estimate.frf.outputs[i]
+        if worst > DISTORTED:
+            text = (
+                f"the response {output} holds {100 * worst:.2g} % of harmonics at {f:.4g} Hz: the "
+                "structure, the shaker or the front end is not linear there."
+            )
+            mend = "measure at a lower level and compare"
+            findings.append(Finding("distortion", text, "warning", (output,), mend, worst))
+        said = f"at most {100 * worst:.2g} % at {f:.4g} Hz"
+        checks.append(Check("harmonic distortion", said, worst <= DISTORTED))
+    if decays:
+        most = max(decays, key=lambda d: d.moves)
+        said = f"damping differs {most.moves:.3g}-fold over the decay at {most.frequency:.4g} Hz"
+        checks.append(Check("free decays", said, most.moves < MOVES))
+    return screening.with_more(findings, checks)

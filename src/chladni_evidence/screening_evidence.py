@@ -1,0 +1,141 @@
+"""Recordings without a fault, of articles on other meshes: what the screening is tried on.
+
+Noise 0.5 to 3 % of every line, damping 0.2 to 3 %, another article of another mesh of each
+structure; the model is the deck as it is given. Seeds below 600 tune, those from 600 on report.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from chladni.bench.article import MeasurementChain, recorded
+from chladni.dynamics.frf import FRF
+from chladni.ema.finding import Screening
+from chladni.ema.identification import identify
+from chladni.ema.recording_screening import screened
+from chladni.ema.setup import Recording
+from chladni.fem.measured_dofs import MeasuredDofs
+from chladni.fem.modelled import Modelled, modelled
+from chladni.planning.measurement_lines import even_lines
+from chladni.updating.channel_screening import against_model
+
+from .article_modes import ArticleModes, article_modes
+from .bench_of_structure import Bench, form_bench, glue_candidates, panel_bench
+from .footing import Footing, Spots, footing
+from .part_scatter import scattered
+from .response_of_article import accelerance, seen
+
+STRUCTURES = ("plate", "panel", "ribbed plate", "curved shell", "lidded box", "bonded plates")
+DAMPING, NOISE = (0.002, 0.03), (0.005, 0.03)
+PER_HALF_BANDWIDTH = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """A recording without a fault, what made it, and the model it is screened against."""
+
+    bench: Bench
+    frf: FRF
+    clean: np.ndarray
+    chain: MeasurementChain
+    modes: ArticleModes
+    phi_in: np.ndarray
+    zeta: np.ndarray
+    foot: Footing
+    model: Modelled
+    outputs: Spots
+    elsewhere: np.ndarray  # (k, r) shapes at other places, along the direction of the sheet
+    places: np.ndarray  # (k, 3) [m], of these
+
+    def foot_of(self, i: int) -> Footing:
+        """Of one output."""
+        return Footing(self.foot.rows[[i]], self.foot.weights[[i]])
+
+    def measured(self, values: np.ndarray, rng: np.random.Generator) -> FRF:
+        """Noiseless accelerances as the front end gives them."""
+        f = self.frf
+        return recorded(values, f.frequency, self.chain, rng, f.outputs, f.inputs)
+
+    def accelerance(self, phi_out: np.ndarray) -> np.ndarray:
+        """Of the article at other shapes (k, r)."""
+        return accelerance(self.modes, phi_out, self.phi_in, self.zeta, self.frf.frequency)
+
+
+Fault = Callable[[Sound, np.random.Generator], tuple[FRF, tuple[str, ...]]]
+
+
+def sound(structure: str, seed: int) -> Sound:
+    """A recording of this seed."""
+    bench, model, article = _article(structure, seed)
+    rng = np.random.default_rng([seed, 11, *structure.encode()])
+    zeta0, noise = (np.exp(rng.uniform(*np.log(span))) for span in (DAMPING, NOISE))
+    zeta = zeta0 * np.exp(0.3 * rng.normal(size=2000))
+    low, high = 0.7 * bench.first, bench.held[1]
+    lines = even_lines(low, high, max(zeta0, 0.004), PER_HALF_BANDWIDTH)
+    spots = bench.outputs
+    if rng.integers(2):  # the drive point is measured, too
+        spots = _joined(bench.outputs, bench.drive)
+    out, drive = footing(article, spots), footing(article, bench.drive)
+    free = _places(bench, spots, rng)
+    other = footing(article, free)
+    rows = np.concatenate([out.rows.ravel(), other.rows.ravel()])
+    modes = article_modes(article, rows, drive.rows.ravel(), float(lines[-1]))
+    phi_o, phi_i = seen(modes, out, spots.directions), seen(modes, drive, bench.drive.directions)
+    zeta = zeta[np.minimum(np.arange(phi_o.shape[1]), len(zeta) - 1)]
+    H = accelerance(modes, phi_o, phi_i, zeta, lines)
+    chain = MeasurementChain(float(noise), 0.001)
+    frf = recorded(H, lines, chain, rng, spots.labels, bench.drive.labels)
+    if rng.integers(2):  # half of the recordings bring no variance
+        frf = replace(frf, variance=None)
+    others = seen(modes, other, free.directions)
+    return Sound(bench, frf, H, chain, modes, phi_i, zeta, out, model, spots, others, free.points)
+
+
+def _places(bench: Bench, spots: Spots, rng: np.random.Generator) -> Spots:
+    """Thirty places where a sensor can be glued and none is."""
+    every = glue_candidates(bench.deck)
+    unused = np.flatnonzero(~np.isin(every.grids, spots.grids))
+    return every.only(rng.choice(unused, min(30, len(unused)), replace=False))
+
+
+@cache
+def _article(structure: str, seed: int):  # type: ignore[no-untyped-def]
+    bench = (
+        panel_bench(structure, seed)
+        if structure in ("plate", "panel")
+        else form_bench(structure, seed)
+    )
+    mesh = "calculix" if structure in ("plate", "panel") else "fine"
+    article, _ = scattered(bench.meshes[mesh](), np.random.default_rng([seed, 5]))
+    return bench, modelled(bench.deck, 1.4 * bench.held[1]), article
+
+
+def _joined(a: Spots, b: Spots) -> Spots:
+    if b.labels[0] in a.labels:
+        return a
+    return Spots(
+        (*a.labels, *b.labels),
+        np.append(a.grids, b.grids),
+        np.concatenate([a.points, b.points]),
+        np.concatenate([a.directions, b.directions]),
+        (*a.parts, *b.parts),
+    )
+
+
+def measured_at(spots: Spots) -> MeasuredDofs:
+    """Places as a case resolves them."""
+    n = len(spots)
+    return MeasuredDofs(
+        spots.labels, spots.grids, spots.points, spots.directions, np.zeros(n), np.zeros(n)
+    )
+
+
+def screening_of(made: Sound, frf: FRF) -> Screening:
+    """What the screening says of a recording, with the model."""
+    found = identify(frf)
+    outputs, inputs = measured_at(made.outputs), measured_at(made.bench.drive)
+    places = dict(zip(outputs.labels, outputs.points, strict=True))
+    alone = screened(Recording("recording", frf), found, (), places)
+    return against_model(alone, found, made.model, outputs, inputs)

@@ -1,0 +1,215 @@
+"""Faults that a recording shows by itself, and by the modes identified from it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chladni.dynamics.frf import FRF
+from chladni.ema.chain_checks import fitted_delay, level_checks, modal_gains
+from chladni.ema.channel_checks import channel_checks
+from chladni.ema.identification import identify
+from chladni.ema.recording_screening import screened, strong_modes
+from chladni.ema.setup import Recording
+from chladni.ema.shape_faults import ModelShapes, shape_faults
+
+F = np.arange(10.0, 130.0, 0.2)
+MODES = np.array([17.0, 28.0, 41.0, 55.0, 67.0, 83.0, 99.0, 115.0])
+N = 9
+PHI = np.random.default_rng(0).normal(size=(N, len(MODES)))
+LABELS = tuple(f"{k}:+Z" for k in range(1, N + 1))
+
+
+def recording(seed: int = 0, noise: float = 0.01, phi: np.ndarray = PHI, f0=MODES) -> FRF:
+    """Accelerances from output 1, its own drive point."""
+    s, w = 2j * np.pi * F[:, None], 2 * np.pi * f0
+    h = s**2 / (s**2 + 2 * 0.008 * w * s + w**2)
+    H = np.einsum("or,fr,r->fo", phi, h, PHI[0])[:, :, None]
+    rng = np.random.default_rng([seed, 1])
+    sd = noise * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
+    drawn = rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)
+    return FRF(H + sd * drawn / np.sqrt(2), F, LABELS, ("1:+Z",), "accelerance", variance=sd**2)
+
+
+def kinds(frf: FRF) -> dict[str, tuple[str, ...]]:
+    return {f.kind: f.channels for f in channel_checks(frf)[0]}
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_sound_recording_is_left_in_peace(given: bool) -> None:
+    frf = recording() if given else replace(recording(), variance=None)
+    found = screened(Recording("a", frf), identify(frf))
+    assert found.findings == ()
+    assert "nothing found" in found.sentence
+
+
+def test_a_channel_of_noise_is_dead() -> None:
+    frf, rng = replace(recording(), variance=None), np.random.default_rng(4)
+    values = frf.values.copy()
+    values[:, 3, 0] = 0.1 * (rng.normal(size=len(F)) + 1j * rng.normal(size=len(F)))
+    assert kinds(replace(frf, values=values)) == {"dead channel": ("4:+Z",)}
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_one_signal_under_two_labels_shares_its_noise(given: bool) -> None:
+    """No two sensors have the same noise, so no model is needed."""
+    frf = recording()
+    values, variance = frf.values.copy(), frf.variance.copy()  # type: ignore[union-attr]
+    values[:, 6], variance[:, 6] = values[:, 2], variance[:, 2]
+    frf = replace(frf, values=values, variance=variance if given else None)
+    (found,) = channel_checks(frf)[0]
+    assert (found.kind, found.severity) == ("duplicated channels", "fault")
+    assert found.channels == ("3:+Z", "7:+Z")
+    assert 'use = "no"' in found.repair
+
+
+def test_two_equal_places_are_looked_at_but_no_fault() -> None:
+    """Mirror places of a symmetric article answer alike, each with a noise of its own."""
+    phi = PHI.copy()
+    phi[6] = phi[2]
+    (found,) = channel_checks(recording(phi=phi))[0]
+    assert (found.kind, found.severity) == ("equal channels", "warning")
+
+
+def test_the_force_puts_power_in() -> None:
+    frf = recording()
+    values = frf.values.copy()
+    values[:, 0] *= -1
+    assert kinds(replace(frf, values=values)) == {"reversed sign": ("1:+Z",)}
+    for quantity in ("receptance", "mobility"):
+        assert kinds(frf.to(quantity)) == {}  # type: ignore[arg-type]
+
+
+def test_reciprocity_needs_and_finds_two_drive_points() -> None:
+    one = recording()
+    s, w = 2j * np.pi * F[:, None], 2 * np.pi * MODES
+    h = s**2 / (s**2 + 2 * 0.008 * w * s + w**2)
+    both = np.einsum("or,fr,ir->foi", PHI, h, PHI[:2])
+    frf = FRF(both, F, LABELS, ("1:+Z", "2:+Z"), "accelerance", variance=1e-4 * np.abs(both) ** 2)
+    assert kinds(frf) == {}
+    wrong = both.copy()
+    wrong[:, 1] *= 1.3  # output 2 reads 30 % too much
+    assert kinds(replace(frf, values=wrong)) == {"not reciprocal": ("1:+Z", "2:+Z")}
+    said = {c.name: c.passed for c in channel_checks(one)[1]}
+    assert said["reciprocity"] is None
+    assert said["coherence"] is None
+
+
+@pytest.mark.parametrize("delay", [4e-4, -2e-3])
+def test_a_delay_of_the_whole_chain_is_measured(delay: float) -> None:
+    frf = recording()
+    late = replace(frf, values=frf.values * np.exp(-2j * np.pi * F * delay)[:, None, None])
+    found = screened(Recording("a", late), identify(late))
+    (fault,) = [f for f in found.findings if f.kind == "delay"]
+    assert fault.value == pytest.approx(delay, rel=0.1)
+    assert f"delay = {fault.value:.4g}" in fault.repair
+
+
+def test_the_fit_of_a_delay_is_modulo_pi() -> None:
+    omega = 2 * np.pi * MODES
+    fit = fitted_delay(omega, -omega * 1e-3 + np.pi * np.arange(len(omega)))
+    assert fit.delay == pytest.approx(1e-3, rel=0.01)
+    assert fit.after < 0.02 < fit.before
+    assert fitted_delay(omega, np.full(len(omega), np.pi / 2)).quarter == 1
+
+
+def gains(frf: FRF) -> tuple:
+    found = strong_modes(identify(frf))
+    return found, *modal_gains(found, PHI, PHI[:1], 1.07 * MODES)
+
+
+def test_levels_of_a_sound_recording_agree_with_a_model_whose_frequencies_are_off() -> None:
+    findings, check = level_checks(*gains(recording()), outputs=N)
+    assert findings == []
+    assert check.passed
+
+
+@pytest.mark.parametrize("factor", [9.80665, 1 / 4.4482216])
+def test_wrong_units_are_named_with_the_factor_that_mends_them(factor: float) -> None:
+    frf = recording()
+    wrong = replace(frf, values=frf.values / factor, variance=frf.variance / factor**2)  # type: ignore[operator]
+    (found,), _ = level_checks(*gains(wrong), outputs=N)
+    assert found.kind == "wrong units"
+    assert found.value == pytest.approx(factor, rel=1e-6)
+    assert level_checks(*gains(wrong), known_gain=False, outputs=N)[0] == []
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("quantity", ["receptance", "mobility"])
+def test_a_wrong_quantity_is_named(quantity: str, known: bool) -> None:
+    wrong = replace(recording().to(quantity), quantity="accelerance")  # type: ignore[arg-type]
+    found = [f for f in screened(Recording("a", wrong), identify(wrong)).findings]
+    more, _ = level_checks(*gains(wrong), known_gain=known, outputs=N)
+    named = [f for f in (*found, *more) if f.kind == "wrong quantity"]
+    assert named
+    assert f'quantity = "{quantity}"' in " ".join(f.repair for f in named)
+
+
+def test_a_reversed_force_turns_every_mode() -> None:
+    frf = recording()
+    (found,), _ = level_checks(*gains(replace(frf, values=-frf.values)), outputs=N)
+    assert found.kind == "reversed force"
+
+
+# a model whose frequencies are 5 % off, whose modes are mixed a little and shapes wrong by 5 %
+MANY = 18
+SHAPES = np.random.default_rng(11).normal(size=(MANY, len(MODES)))
+NAMES = tuple(f"{k}:+Z" for k in range(1, MANY + 1))
+_ERROR = np.random.default_rng(8)
+WRONG = (
+    SHAPES
+    @ (np.eye(8) + 0.05 * _ERROR.normal(size=(8, 8)))
+    * (1 + 0.05 * _ERROR.normal(size=SHAPES.shape))
+)
+MODEL = ModelShapes(WRONG, 1.05 * MODES)
+
+
+def faults(psi: np.ndarray, model: ModelShapes = MODEL) -> list[tuple[str, tuple[str, ...]]]:
+    return [(f.kind, f.channels) for f in shape_faults(NAMES, psi, MODES, model)]
+
+
+def test_shapes_of_an_imperfect_model_raise_no_alarm() -> None:
+    assert faults(SHAPES) == []
+    assert faults(SHAPES * np.linspace(-3, 5, 8)) == []  # the scale of a mode is nothing
+
+
+def test_a_sign_a_gain_and_an_exchange_are_told_apart() -> None:
+    exchanged = np.arange(MANY)
+    exchanged[[2, 7]] = 7, 2
+    for change, due in (
+        (times({3: -1.0}), [("reversed sign", ("4:+Z",))]),
+        (times({4: 2.0}), [("wrong gain", ("5:+Z",))]),
+        (np.eye(MANY)[exchanged], [("swapped channels", ("3:+Z", "8:+Z"))]),
+    ):
+        assert faults(change @ SHAPES) == due
+
+
+def times(gains: dict[int, float]) -> np.ndarray:
+    return np.diag([gains.get(k, 1.0) for k in range(MANY)])
+
+
+def test_a_sensor_elsewhere_and_one_turned_are_found_among_the_places_offered() -> None:
+    places = np.random.default_rng(9).normal(size=(30, 8))
+    ways = np.random.default_rng(10).normal(size=(4, 8))
+    model = replace(
+        MODEL,
+        turned=lambda i: (ways, ["+X", "-X", "+Y", "-Y"]),
+        elsewhere=lambda i: (places, [f"grid {k}" for k in range(30)]),
+    )
+    assert faults(SHAPES, model) == []
+    for row, kind in ((places[11], "misplaced sensor"), (ways[2], "turned sensor")):
+        psi = SHAPES.copy()
+        psi[5] = row
+        (found,) = shape_faults(NAMES, psi, MODES, model)
+        assert (found.kind, found.channels) == (kind, ("6:+Z",))
+        assert ("grid 11" if kind == "misplaced sensor" else "+Y") in found.text
+
+
+def test_two_faults_are_found_one_after_another() -> None:
+    change = times({1: -1.0, 6: 3.0})
+    assert set(faults(change @ SHAPES)) == {("reversed sign", ("2:+Z",)), ("wrong gain", ("7:+Z",))}
+
+
+def test_few_channels_or_modes_say_nothing() -> None:
+    assert shape_faults(NAMES[:4], -SHAPES[:4], MODES, ModelShapes(SHAPES[:4], MODES)) == []
+    assert shape_faults(NAMES, SHAPES[:, :3], MODES[:3], MODEL) == []
