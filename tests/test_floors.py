@@ -56,8 +56,6 @@ LIBRARIES = {
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 WAITING_FOR = {  # module no command, environment or public name reaches: what will
-    "chladni/ema/screening": "screening of a recording before anything is fitted",
-    "chladni/ema/shapes": "shapes of identified modes, their covariance and complexity",
     "chladni/ema/realisation": "an identified model as a state space",
     "chladni/geometry/thickness_prior": "thickness mapping",
 }

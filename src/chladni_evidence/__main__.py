@@ -8,11 +8,14 @@ from chladni.errors import ChladniError, LabelError
 
 from .evidence_run import run
 from .evidence_sets import SETS, orders, purpose, seed_range
+from .screening_faults import FAULTS, tally
 
 
 def main(words: list[str] | None = None) -> int:
     """Entry point; 0 (done) or 2 (the input is at fault: one sentence)."""
     asked = _parser().parse_args(words)
+    if asked.command == "screen":
+        return _screened(asked)
     try:
         seeds = seed_range(asked.seeds)
         _say(purpose(seeds))
@@ -29,9 +32,28 @@ def main(words: list[str] | None = None) -> int:
     return 0
 
 
+def _screened(asked: argparse.Namespace) -> int:
+    """The table of the screening: outcomes by fault."""
+    try:
+        seeds = seed_range(asked.seeds)
+        _say(purpose(seeds))
+        kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
+        counts = tally(seeds, kinds, _say)
+    except ChladniError as error:
+        sys.stderr.write(f"chladni_evidence: {error}\n")
+        return 2
+    for name, count in counts.items():
+        _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
+    return 0
+
+
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
-    command = top.add_subparsers(required=True).add_parser("run", help="make, diagnose, score")
+    commands = top.add_subparsers(required=True, dest="command")
+    screen = commands.add_parser("screen", help="how often faults are named, sound recordings not")
+    screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
+    screen.add_argument("--faults", default="", help="only these, with commas")
+    command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")
     command.add_argument("--workers", type=int, default=1)

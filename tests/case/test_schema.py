@@ -36,6 +36,8 @@ recordings = ["a.npz", "b.npz"]
 use = "a.npz"
 quantity = "accelerance"
 gain = "known"
+factor = 1.0
+delay = 0.0
 sensors = "sensors.csv"
 mass = 1.413
 mass_sd = 0.002
@@ -61,12 +63,12 @@ low = 0.8
 high = 1.3
 """
 SENSORS = """\
-label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd
-3:+Z,3,,,,+Z,,,,output,0.003,
-12:+Z,12,,,,,0,0.1,1,output,,
-16:+Z,,0.31,0.07,0.0,+Z,,,,output,0.004,0.001
-22:+Z,22,,,,+Z,,,,output,,
-8:+Z,8,,,,+Z,,,,input,,
+label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd,gain,use
+3:+Z,3,,,,+Z,,,,output,0.003,,1.1,
+12:+Z,12,,,,,0,0.1,1,output,,,,yes
+16:+Z,,0.31,0.07,0.0,+Z,,,,output,0.004,0.001,,
+22:+Z,22,,,,+Z,,,,output,,,,
+8:+Z,8,,,,+Z,,,,input,,,,
 """
 OTHER = {  # another accepted value of every word
     ("model", "deck"): '"thicker.bdf"',
@@ -76,6 +78,8 @@ OTHER = {  # another accepted value of every word
     ("test", "use"): '"b.npz"',
     ("test", "quantity"): '"mobility"',
     ("test", "gain"): '"unknown"',
+    ("test", "factor"): "1.1",
+    ("test", "delay"): "0.0001",
     ("test", "sensors"): '"others.csv"',
     ("test", "mass"): "1.42",
     ("test", "mass_sd"): "0.003",
@@ -109,6 +113,8 @@ CELLS = {  # column: (a row as it stands, the same row with another accepted cel
     "role": ("8,,,,+Z,,,,input", "8,,,,+Z,,,,output"),
     "mass": ("output,0.003", "output,0.005"),
     "position_sd": ("0.004,0.001", "0.004,0.002"),
+    "gain": ("0.003,,1.1", "0.003,,1.2"),
+    "use": (",,,,yes", ",,,,no"),
 }
 
 

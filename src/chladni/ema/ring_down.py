@@ -101,7 +101,8 @@ def _followed(x: np.ndarray, rate: float, f0: float, half: float, name: str) -> 
     z = np.fft.ifft(whole)[:n]
     settle = int(rate / half)  # the filter's own rise, and the other end
     a, phase = np.abs(z), np.unwrap(np.angle(z))
-    noise = float(np.median(a[-max(2, n // 20) : n - settle // 4])) if n > settle else 0.0
+    end = n - settle // 4
+    noise = float(np.median(a[max(0, end - max(8, n // 20)) : end])) if n > settle else 0.0
     last = n - settle
     below = np.flatnonzero(a[settle:last] < max(FLOOR * noise, 1e-3 * a.max()))
     last = settle + int(below[0]) if len(below) else last

@@ -22,7 +22,7 @@ from .screening_of_case import screened_by_model
 
 MOVES = 1.5  # damping at one amplitude over that at another: more is no linear structure
 DISTORTED = 0.05  # harmonics over the fundamental
-LINES = 20000  # of an FRF: more are not identified from, whoever wants them names a band
+LINES = 2500  # of an FRF: more take minutes to identify; whoever wants that names a band
 
 
 @dataclass(frozen=True, eq=False)
