@@ -85,13 +85,13 @@ _FILES = """\
   move together, and what is held to ground is held to them.
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
   never fitted), `state` (the first is compared, or the one `use` names).
-- Time data, whose FRFs are estimated as `chladni test` does it (hits, bursts, continuous random and
-  stepped sines are told apart): universal file (58, function type 1); `.csv` with columns `time_s`,
+- Time data, whose FRFs are estimated as `chladni test` does it (hits, bursts, continuous random,
+  stepped sine are told apart): universal file (58, function type 1); `.csv` with columns `time_s`,
   optional `block`, and one a channel headed `412:+Z [m/s^2]`; `.npz` and `.mat` (to version 7) with
-  `rate` (or `fs`, `dt`, `t`), `force` and `acceleration` (`velocity`, `displacement`), optional
-  `inputs` and `outputs`, or `data`, `labels`, `units`, optional `roles`; `.mat` of Testlab records;
-  `.wav`. A table `NAME.channels.csv` beside the file names its channels: `channel`, `label`, `unit`,
-  optional `role`, `scale`; a `.wav` needs it.
+  `rate` (`fs`, `dt`, `t`), `force` and `acceleration` (`velocity`, `displacement`), optional
+  `inputs` and `outputs`, or `data`, `labels`, `units`, optional `roles`; `.mat` of Testlab; `.wav`.
+- A table `NAME.channels.csv` beside time data names its channels: `channel`, `label`, `unit`,
+  optional `role`, `scale`. A `.wav` needs it.
 - Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes
   in which nodes measure, 55 shapes, 151 and 164 header and units.
 
