@@ -85,5 +85,5 @@ def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisRes
 
 def _named(fault: Finding) -> NamedEffect:
     size = () if np.isnan(fault.value) else (Estimate(fault.kind, float(fault.value)),)
-    where = Location(fault.text, channels=fault.channels)
+    where = Location(fault.text.rstrip("."), channels=fault.channels)
     return NamedEffect("sensor-fault", fault.kind, None, where, size)
