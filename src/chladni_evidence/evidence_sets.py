@@ -10,17 +10,16 @@ from chladni_specimens.forms import FORMS
 from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailgate_bench
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
-from .outside_kinds import OUTSIDE
 
 SETS = ("tailgate", "panels", "forms", "outside")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
 ON_SHEETS = ("thickness-distribution", "orthotropic-material")
 OURS = ("crack", "friction-joint")  # CalculiX has no card for them here
-HOMES = {  # structures an effect outside the catalogue is put into
+HOMES = {  # structures of the set outside, by what is put into them
     "rotor": ("lidded box", "ribbed plate", "curved shell", "panel"),
     "foam": ("panel", "curved shell", "bonded plates", "ribbed plate"),
-    "resonator": ("tube frame", "lidded box", "plate", "ribbed plate"),
+    "local-resonator": ("tube frame", "lidded box", "plate", "ribbed plate"),
     "crack": ("plate", "bonded plates", "curved shell", "ribbed plate"),
     "friction-joint": ("lidded box", "bonded plates", "tube frame"),
     "duplicated-pair": ("panel", "bolted bracket", "bonded plates", "lidded box"),
@@ -57,7 +56,8 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
     panels: the same on plate and panel, our fine mesh and CalculiX in turn.
     forms: on each form a null and one other kind, the kinds in turn.
-    outside: every kind outside the catalogue, the structures in turn.
+    outside: every kind outside the catalogue, and those that came into it late, the structures in
+    turn.
     """
     made = {"tailgate": _tailgate, "panels": _panels, "forms": _forms, "outside": _outside}
     if name not in made:
@@ -85,8 +85,8 @@ def _forms(seed: int) -> Iterator[Order]:
 
 
 def _outside(seed: int) -> Iterator[Order]:
-    for k, kind in enumerate(OUTSIDE):
-        home = HOMES[kind][(seed + k) % len(HOMES[kind])]
+    for k, (kind, homes) in enumerate(HOMES.items()):
+        home = homes[(seed + k) % len(homes)]
         yield Order(home, kind, seed, "fine" if kind in OURS else MESHES[(seed + k) % 2])
 
 

@@ -14,6 +14,7 @@ from chladni.model.properties import Isotropic, Orthotropic, ShellSection
 from .footing import nearest_rows
 from .hidden import Hidden, Site, near_outputs, with_lumps
 from .part_scatter import scaled
+from .response_of_article import Coupling
 
 STEEP = 0.95  # cosine between normal and grain: beyond, a shell keeps an axis of its own
 Kind = Callable[[Site, np.random.Generator, float], Hidden]
@@ -136,6 +137,22 @@ def sensor_fault(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(site.article, truth, spoil=spoil)
 
 
+def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
+    row = site.row(rng)
+    n = site.normal(row)
+    m = float(rng.uniform(0.005, 0.01)) * site.mass * size
+    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
+    k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
+
+    def stiffness(s: np.ndarray) -> np.ndarray:
+        return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
+
+    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
+    coupling = Coupling(np.array([row]), n[None, None], stiffness)
+    return Hidden(site.article, truth, (coupling,), unweighed=-m)
+
+
 CATALOGUED: dict[str, Kind] = {
     "nothing": nothing,
     "calibration": calibration,
@@ -146,4 +163,5 @@ CATALOGUED: dict[str, Kind] = {
     "thickness-distribution": thinning,
     "orthotropic-material": orthotropic,
     "sensor-fault": sensor_fault,
+    "local-resonator": local_resonator,
 }

@@ -68,22 +68,6 @@ def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(site.article, truth, (Coupling(rows, weights, stiffness),))
 
 
-def resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
-    row = site.row(rng)
-    n = site.normal(row)
-    m = float(rng.uniform(0.005, 0.01)) * site.mass * size
-    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
-    k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
-
-    def stiffness(s: np.ndarray) -> np.ndarray:
-        return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
-
-    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
-    coupling = Coupling(np.array([row]), n[None, None], stiffness)
-    return Hidden(site.article, truth, (coupling,), unweighed=-m)
-
-
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
     a = site.article
@@ -180,7 +164,6 @@ def duplicated(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 OUTSIDE: dict[str, Kind] = {
     "rotor": rotor,
     "foam": foam,
-    "resonator": resonator,
     "crack": crack,
     "friction-joint": friction,
     "duplicated-pair": duplicated,

@@ -49,7 +49,7 @@ PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act
 PLANNED = (  # names of the public contract that no model stands behind yet
     *("stiffness-patch", "membrane-prestress", "viscoelastic-joint", "hem-contact"),
     *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),
-    *("joint-friction", "mass-patch", "local-resonator", "shaker-restraint", "compliant-support"),
+    *("joint-friction", "mass-patch", "shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 

@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from ..errors import ExtensionError, LabelError
 from . import (
     extra_support,
+    local_resonator,
     orthotropic_material,
     point_mass,
     sensor_fault,
@@ -30,6 +31,7 @@ BUILT_IN = (
     suspension.FAMILY,
     thickness_distribution.FAMILY,
     sensor_fault.FAMILY,
+    local_resonator.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -183,7 +183,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     out: list[Candidate] = []
     taken: list[int] = []
     for about, base in enumerate(context.bases):
-        amount, score = context.scan.thickness_scores(about, bumps)
+        amount, score = context.scan.field_scores(about, "t", bumps)
         score = np.where(amount > LEAST, score, np.inf)
         for k in distinct(score, centre, taken, 2):
             if np.isfinite(score[k]):

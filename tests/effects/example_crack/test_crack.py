@@ -80,7 +80,7 @@ def test_reduced_model_agrees_with_the_changed_structure(crack):
 def test_it_can_be_concealed_and_others_keep_their_cases(crack):
     """It stands after all that were there, so their random numbers stay as they are."""
     assert concealable()[-1] == "crack"
-    assert concealable()[:-1] == (*concealable()[:7], "nothing", "calibration")
+    assert concealable()[7:9] == ("nothing", "calibration")
 
 
 def test_concealed_in_a_plate_it_is_named_and_written(crack, tmp_path):
