@@ -14,7 +14,9 @@ from .hidden_kinds import CATALOGUED
 SETS = ("tailgate", "panels", "forms", "outside")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
-ON_SHEETS = ("thickness-distribution", "orthotropic-material")
+ON_SHEETS = (
+    "thickness-distribution", "orthotropic-material", "stiffness-patch", "mass-patch", "crack",
+)  # fmt: skip
 OURS = ("crack", "friction-joint")  # CalculiX has no card for them here
 HOMES = {  # structures of the set outside, by what is put into them
     "rotor": ("lidded box", "ribbed plate", "curved shell", "panel"),
@@ -68,26 +70,31 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
 def _tailgate(seed: int) -> Iterator[Order]:
     meshes = list(TAILGATE)
     for k, kind in enumerate(CATALOGUED):
-        yield Order("tailgate", kind, seed, meshes[(seed + k) % len(meshes)])
+        yield Order("tailgate", kind, seed, _mesh(kind, meshes[(seed + k) % len(meshes)], meshes))
 
 
 def _panels(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(CATALOGUED):
-            yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
+            yield Order(structure, kind, seed, _mesh(kind, MESHES[(seed + k + s) % 2]))
 
 
 def _forms(seed: int) -> Iterator[Order]:
     for s, (name, form) in enumerate(FORMS.items()):
         kinds = [k for k in CATALOGUED if form.rolled or k not in ON_SHEETS][1:]
-        for k, kind in enumerate(("nothing", kinds[(seed + 3 * s) % len(kinds)])):
-            yield Order(name, kind, seed, MESHES[(seed + s + k) % 2])
+        for k, kind in enumerate(("nothing", kinds[(seed + 5 * s) % len(kinds)])):
+            yield Order(name, kind, seed, _mesh(kind, MESHES[(seed + s + k) % 2]))
 
 
 def _outside(seed: int) -> Iterator[Order]:
     for k, (kind, homes) in enumerate(HOMES.items()):
         home = homes[(seed + k) % len(homes)]
-        yield Order(home, kind, seed, "fine" if kind in OURS else MESHES[(seed + k) % 2])
+        yield Order(home, kind, seed, _mesh(kind, MESHES[(seed + k) % 2]))
+
+
+def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:
+    """The mesh, or the first where CalculiX has no card for the kind."""
+    return meshes[0] if kind in OURS and mesh == "calculix" else mesh
 
 
 def seed_range(text: str) -> range:

@@ -47,9 +47,9 @@ def test_unknown_names_are_told_the_known_ones():
         registry.unregister("point-mass")
 
 
-def test_an_installed_package_adds_its_family(example_crack):
-    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "crack")
-    assert example_crack.effect.__module__ == "crack"
+def test_an_installed_package_adds_its_family(example_edge_mass):
+    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
+    assert example_edge_mass.effect.__module__ == "edge_mass"
 
 
 FAULTS = {

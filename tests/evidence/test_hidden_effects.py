@@ -11,11 +11,12 @@ from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import (
     CATALOGUED,
     calibration,
+    crack,
     local_resonator,
     orthotropic,
     thinning,
 )
-from chladni_evidence.outside_kinds import crack, duplicated, foam, friction, rotor
+from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.part_scatter import WELDS, scattered
 from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
 from chladni_specimens.forms import FORMS

@@ -47,9 +47,9 @@ ALIASES = {  # effects that are an ordinary number by another name
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
 PLANNED = (  # names of the public contract that no model stands behind yet
-    *("stiffness-patch", "membrane-prestress", "viscoelastic-joint", "hem-contact"),
+    *("membrane-prestress", "viscoelastic-joint", "hem-contact"),
     *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),
-    *("joint-friction", "mass-patch", "shaker-restraint", "compliant-support"),
+    *("joint-friction", "shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 

@@ -54,6 +54,14 @@ class ResponseScan(Protocol):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
 
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        The amount is in units of what the set has; the responses are taken as linear in it.
+        """
+
 
 class SearchContext(Protocol):
     """The structure, the test, two states of the base effects, and scores of what is tried.

@@ -18,6 +18,7 @@ from .reduced_model import evaluate
 from .scan import (
     Baseline,
     baseline,
+    bending_slopes,
     direction_scores,
     field_slopes,
     oscillator_scores,
@@ -154,6 +155,14 @@ class Scan:
         base = self.context.baselines[about]
         slopes = field_slopes(base, self.context.problem.reduced.model, self.data, field)
         return direction_scores(base, slopes @ change)
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
+        base = self.context.baselines[about]
+        slopes = bending_slopes(base, self.context.problem.reduced.model, self.data, sets)
+        return direction_scores(base, slopes)
 
 
 def _prior(effect: Effect, x: np.ndarray) -> float:

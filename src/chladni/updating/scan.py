@@ -8,7 +8,7 @@ deviations (Woodbury).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -194,6 +194,30 @@ def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.n
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
     return J[:, -n:]
+
+
+AT_ONCE = 64  # slopes of so many changes are in memory at a time
+
+
+def bending_slopes(
+    base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
+) -> np.ndarray:
+    """∂r/∂a of a B added to K, B the bending stiffness of each set of shells (n, n_sets)."""
+    groups, r = model.groups, len(base.state.lam)
+    U = groups.structure.T @ (model.basis @ base.state.phi)
+    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
+    out = [np.zeros((len(base.residual), 0))]
+    for k in range(0, len(sets), AT_ONCE):
+        chunk = sets[k : k + AT_ONCE]
+        dK = np.empty((len(chunk), r, r))
+        for j, shells in enumerate(chunk):
+            V = U[dofs[shells]]
+            dK[j] = V.reshape(-1, r).T @ (groups.cubic[shells] @ V).reshape(-1, r)
+        state = replace(base.state, dK=dK, dM=np.zeros_like(dK), doffset=None)
+        J = data.scaled(state, True)[1]
+        rest = len(base.residual) - len(J)  # what the scales say does not change
+        out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
+    return np.concatenate(out, axis=1)
 
 
 def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

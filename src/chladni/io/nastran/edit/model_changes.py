@@ -15,11 +15,7 @@ from .added_elements import added_cards, free_system
 from .changes import Change
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
-from .split_properties import (
-    bending_changes,
-    split_changes,
-    with_new_properties,
-)
+from .split_properties import section_changes, split_changes, with_new_properties
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
@@ -40,7 +36,7 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after)
-    out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
+    out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := added_cards(deck, before, after, units):
         out.append(Add(cards, "put in by the diagnosis"))
     return out
