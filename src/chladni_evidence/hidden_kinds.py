@@ -158,9 +158,9 @@ def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden
 
 
 def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """E of a disc of a sheet times e^±(0.5 to 0.8), its mass as it was."""
+    """E of a disc of a sheet times e^-(0.5 to 0.8), its mass as it was."""
     mine, truth = _disc(site, rng)
-    factor = float(np.exp(rng.choice([-1, 1]) * rng.uniform(0.5, 0.8) * min(size, 2.5)))
+    factor = float(np.exp(-rng.uniform(0.5, 0.8) * min(size, 2.5)))
     article = _with_disc(site.article, mine, "E", factor)
     return Hidden(article, {**truth, "value": factor})
 
@@ -182,7 +182,7 @@ def _disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, A
         raise ModelError(f"part {part} has no sheet a patch could be on")
     centre = a.points[rng.choice(site.rows(part))]
     d = np.linalg.norm(a.points[a.shells.nodes].mean(axis=1) - centre, axis=1)
-    R = max(float(rng.uniform(0.07, 0.12)) * site.size, float(np.sort(d[of_part])[:FEWEST][-1]))
+    R = max(float(rng.uniform(0.12, 0.2)) * site.size, float(np.sort(d[of_part])[:FEWEST][-1]))
     return of_part & (d <= R), {"point_m": centre.tolist(), "radius_m": R, "part": part}
 
 

@@ -96,7 +96,7 @@ def cases(reduced):
         "local-resonator": (
             LocalResonator.near(where, k), [0.2, 0.1, -0.1, 0.9], [-20, 0, 0, 5],
         ),
-        "stiffness-patch": (StiffnessPatch.on(groups, 0, 9), [-0.6, *local[1:]], [0, *local[1:]]),
+        "stiffness-patch": (StiffnessPatch.on(groups, 0, 9), [-0.6, *local[1:]], [-40, *local[1:]]),
         "mass-patch": (MassPatch.on(groups, 0, 9), [0.4, *local[1:]], [-30, *local[1:]]),
         "crack": (crack(groups, line, 9), [0.5], [-40]),
         "mesh-error": (over, [1.0], [0]),

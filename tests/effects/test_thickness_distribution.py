@@ -92,3 +92,11 @@ def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     thinnest = (effect.apply(assembly, x).shells.thickness / assembly.shells.thickness).min()
     assert abs(place[0]) < 1e-9
     assert depth == pytest.approx(1 - thinnest, rel=1e-9)
+
+
+def test_a_small_patch_between_grids_stays_where_it_is(panel):
+    """Of a radius below the mesh's the centre is on the sheet though no grid is near."""
+    group = int(np.argmin(((panel.centre - [0.3, 0.15, 0.0]) ** 2).sum(axis=1)))
+    effect = ThicknessDistribution.on(panel, group, 1)
+    x = np.array([0.0, np.log(0.003 / effect.size), 0.0, 0.0])
+    assert effect.location(x).point_m == pytest.approx(effect.at(x), abs=1e-12)

@@ -52,7 +52,7 @@ class LocalResonator(MovableAttachment):
         m = strength("M", "kg", SHARE * where.setup.weight, 1.0, (-0.7, 0.7))
         lowest = -np.log(LOWEST / 3)
         f = Parameter(
-            "f", "Hz", 0.0, 0.8, where.setup.f_max / 3, step=0.15, nominal=4.0,
+            "f", "Hz", 0.0, 0.6, where.setup.f_max / 3, step=0.15, nominal=4.0,
             starts=tuple(np.linspace(lowest, np.log(3.0), 7)),
         )  # fmt: skip
         at = patch(where, k, np.stack([n, *tangents(n)]))

@@ -78,6 +78,7 @@ class SheetPatch(Effect):
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
     ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    spacing: float = 0.0  # of these grids [m]
 
     @classmethod
     def strength(cls, groups: ShellGroups) -> Parameter:
@@ -115,7 +116,8 @@ class SheetPatch(Effect):
             unknown, f"on {name}", (name,), trials_factor=trials_factor,
             shells=inside[groups.group], inside=inside.astype(float), centre=groups.centre,
             surface=surface(groups, group, size), size=size, variance=groups.area / 12,
-            points=assembly.points[grids], ids=assembly.ids[grids], **cls.more(groups),
+            points=assembly.points[grids], ids=assembly.ids[grids],
+            spacing=float(np.sqrt(groups.area[inside].sum() / len(grids))), **cls.more(groups),
         )  # fmt: skip
 
     @classmethod
@@ -158,7 +160,7 @@ class SheetPatch(Effect):
         c = self.at(x)
         d2 = ((self.points - c) ** 2).sum(axis=1)
         k = int(np.argmin(d2))
-        outside = d2[k] > (0.25 * self.radius_at(x)) ** 2
+        outside = d2[k] > max(0.25 * self.radius_at(x), self.spacing) ** 2
         return int(self.ids[k]), self.points[k] if outside else c
 
 
@@ -167,7 +169,12 @@ TRIED = 30  # groups that are evaluated one by one where only natural frequencie
 
 
 def patches(context: SearchContext, kind: type[SheetPatch], each: int = 2) -> list[Candidate]:
-    """Patches of a kind: its slope at every group and radius, the best places per baseline."""
+    """Patches of a kind: its slope at every group and radius, the best places per baseline.
+
+    Parameters
+    ----------
+    each : places per baseline
+    """
     groups = context.where.groups
     sheets = len(set(groups.connected.tolist()))
     if context.scan is None:
