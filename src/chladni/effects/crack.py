@@ -31,7 +31,6 @@ LENGTHS = (0.6, 1.0, 1.7, 3.0)  # times that: tried at the best places
 ANGLES = 4
 PLACES, CLOSER = 48, 12  # middles of lines: all over the sheets, and round each of the best
 FOLLOWED = 2  # lines that are worth a fit
-LOST = 0.05  # share of the bending stiffness; less is no crack
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +190,7 @@ def _scored(
     if not lines:
         return []
     amount, score = context.scan.bending_scores(about, [line.shells for line in lines])
-    score = np.where(amount < -LOST, score, np.inf)
+    score = np.where(amount < 0, score, np.inf)
     centre = np.array([line.centre for line in lines])
     best = distinct(score, centre, [], FOLLOWED)
     return [(lines[k], float(amount[k]), float(score[k])) for k in best if np.isfinite(score[k])]
