@@ -1,11 +1,15 @@
 """A crack is a hinge: what beam theory says of it, and what the scan of its lines says."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.crack import LEAST, LineFinder, crack, left
+from chladni.effects.crack import LEAST, LineFinder, candidates, crack, left
 from chladni.effects.ordinary import ordinary
+from chladni.effects.shell_groups import shell_groups
+from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
@@ -51,6 +55,13 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
     inside = np.abs(s - 0.5) <= 0.5 / n
     due = (bent[inside] ** 2).sum() / (bent**2).sum()
     assert_allclose(got, due, rtol=(k / n) ** 2)  # elements of length 1/n err with its square
+
+
+def test_a_sheet_too_coarse_for_a_line_has_none():
+    """Two by two shells hold no three in a row, and nothing is proposed."""
+    coarse = plate(0.2, 0.2, 2, 2, 1e-3)
+    context = SimpleNamespace(where=SimpleNamespace(groups=shell_groups(structure(coarse))))
+    assert candidates(context) == []
 
 
 def test_something_is_always_left():

@@ -168,6 +168,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
     groups = context.where.groups
     lines = LineFinder.of(groups.structure.assembly)
     first = lines.drawn(farthest_point_sample(lines.middle, PLACES), (1.0,))
+    if not first:
+        return []
     if context.scan is None:
         effects = [crack(groups, line, len(first)) for line in first[::ANGLES]]
         return best_places(context, effects, np.array([e.point for e in effects]))
@@ -187,8 +189,6 @@ def _scored(
 ) -> list[tuple[Line, float, float]]:
     """The best lines that lost any stiffness, how much, and their scores."""
     assert context.scan is not None
-    if not lines:
-        return []
     amount, score = context.scan.bending_scores(about, [line.shells for line in lines])
     score = np.where(amount < 0, score, np.inf)
     centre = np.array([line.centre for line in lines])
