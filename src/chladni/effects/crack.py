@@ -187,13 +187,13 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def _scored(
     context: SearchContext, about: int, lines: Sequence[Line]
 ) -> list[tuple[Line, float, float]]:
-    """The best lines that lost any stiffness, how much, and their scores."""
+    """The best lines, how much they gain, and their scores; one that gained explains nothing."""
     assert context.scan is not None
     amount, score = context.scan.bending_scores(about, [line.shells for line in lines])
-    score = np.where(amount < 0, score, np.inf)
+    score = np.where(amount < 0, score, score.max() + 1)
     centre = np.array([line.centre for line in lines])
     best = distinct(score, centre, [], FOLLOWED)
-    return [(lines[k], float(amount[k]), float(score[k])) for k in best if np.isfinite(score[k])]
+    return [(lines[k], float(amount[k]), float(score[k])) for k in best]
 
 
 def _round(lines: LineFinder, line: Line) -> np.ndarray:
@@ -207,7 +207,7 @@ def _round(lines: LineFinder, line: Line) -> np.ndarray:
 
 def _start(amount: float) -> float:
     """From the slope, which is that of the flexibility: 1/f - 1 = -amount."""
-    f = np.clip(1 / (1 - amount), 0.15, 0.95)
+    f = np.clip(1 / (1 - min(amount, 0.0)), 0.15, 0.95)
     return float(np.log((1 - LEAST) / (f - LEAST) - 1))
 
 
