@@ -70,11 +70,15 @@ class LineFinder:
         return cls(middle, normal, shells.part, np.sqrt(area), size)
 
     def through(self, shell: int, angle: float, times: float) -> Line | None:
-        """The line through a shell's middle at an angle, ``times`` the usual length."""
+        """The line through a shell's middle at an angle, ``times`` the usual length.
+
+        On a coarse mesh it is as long as ``SHELLS`` shells at least.
+        """
         p, n = int(self.part[shell]), self.normal[shell]
         u, v = tangents(n)
         along = np.cos(angle) * u + np.sin(angle) * v
-        d, half = self.middle - self.middle[shell], 0.5 * LENGTH * times * self.size[p]
+        d, least = self.middle - self.middle[shell], WIDE * SHELLS * self.width[shell]
+        half = max(0.5 * LENGTH * times * self.size[p], least)
         inside = (np.abs(d @ along) <= half) & (np.abs(d @ n) <= half / 2)
         inside &= np.abs(d @ np.cross(n, along)) <= WIDE * self.width
         shells = np.flatnonzero(inside & (self.part == p))
