@@ -79,8 +79,8 @@ class PointTerm:
     """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters).
 
     Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it. Of an
-    effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that moves
-    carries them as it does the rows ``carrier`` of the structure.
+    effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that
+    moves carries them as it does the rows ``carrier`` of the structure.
     """
 
     matrix: Literal["K", "M"]
@@ -199,6 +199,10 @@ class Effect:
     def location(self, x: np.ndarray) -> Location:
         """Where it is once it has been fitted."""
         return self.where()
+
+    def becomes(self, x: np.ndarray) -> str:
+        """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
+        return ""
 
     def starts(self) -> list[np.ndarray]:
         """Points from which a fit begins: every combination of its parameters' starts."""

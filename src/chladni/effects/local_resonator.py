@@ -28,6 +28,7 @@ from .search_context import Candidate, SearchContext, best_places, distinct
 from .surroundings import ShellGrids, Surroundings
 
 SHARE = 0.015  # of the structure's mass: prior median of the lump's
+TYPICAL = 3.0  # times the prior median of its frequency: the highest line
 LOWEST = 20.0  # the lowest of the frequencies tried lies this many times below the highest line
 TRIED = 14  # frequencies, evenly spaced in their logarithm: wide lines smooth what lies between
 PLACES = 60  # where each is tried
@@ -50,10 +51,10 @@ class LocalResonator(MovableAttachment):
         """A lump that swings along the normal near the k-th grid."""
         n = where.grids.normal[k]
         m = strength("M", "kg", SHARE * where.setup.weight, 1.0, (-0.7, 0.7))
-        lowest = -np.log(LOWEST / 3)
+        lowest = -np.log(LOWEST / TYPICAL)
         f = Parameter(
-            "f", "Hz", 0.0, 0.6, where.setup.f_max / 3, step=0.15, nominal=4.0,
-            starts=tuple(np.linspace(lowest, np.log(3.0), 7)),
+            "f", "Hz", 0.0, 0.6, where.setup.f_max / TYPICAL, step=0.15, nominal=4.0,
+            starts=tuple(np.linspace(lowest, np.log(TYPICAL), 7)),
         )  # fmt: skip
         at = patch(where, k, np.stack([n, *tangents(n)]))
         nowhere = sp.csr_array((1, at.rows[0].shape[1]))
@@ -86,6 +87,11 @@ class LocalResonator(MovableAttachment):
         """Mass [kg] and spring m (2πf)² [N/m]."""
         m = self.parameters[0].value(x[0])
         return m, m * (2 * np.pi * self.parameters[3].value(x[3])) ** 2
+
+    def becomes(self, x: np.ndarray) -> str:
+        """Tuned above the highest line it is a lump that is carried along."""
+        f = self.parameters[3]
+        return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The lump itself."""
