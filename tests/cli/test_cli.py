@@ -345,7 +345,7 @@ def test_plan_sees_every_mode(deck, tmp_path):
     assert (out / "sensors.csv").read_text().count("output") == 8
 
 
-WITH_FILE = [c for c in COMMANDS if c not in ("demo", "study")]  # these two take no file
+WITH_FILE = [c for c in COMMANDS if c not in ("demo", "blind")]  # these two take no file
 BAD = {
     "missing": None,
     "empty": b"",

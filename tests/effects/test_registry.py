@@ -74,7 +74,7 @@ def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, f
     assert "the package heavy-bolts offers the effect" in str(caught.value)
     assert "uninstall" in str(caught.value)
     assert "\n" not in str(caught.value)
-    done = CliRunner().invoke(application(), ["study", "--effects", "point-mass"])
+    done = CliRunner().invoke(application(), ["blind", "--effects", "point-mass"])
     assert done.exit_code == 2
     assert "heavy-bolts" in done.output
     assert "Traceback" not in done.output

@@ -23,7 +23,7 @@ WORKFLOW = {  # command: the function it calls
     "frf": "chladni.workflows.frf.frf",
     "plan": "chladni.workflows.plan.plan",
     "render": "chladni.workflows.loaded_model.load_model",
-    "study": "chladni_evidence.study.study",
+    "blind": "chladni_evidence.blind.answered_rows",
     "specimen": "chladni_specimens.tailgate.tailgate.tailgate_specimen",
     "report": "chladni.report.page.write_page",
 }

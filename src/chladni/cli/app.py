@@ -20,7 +20,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "render",
     "plan",
     "specimen",
-    "study",
+    "blind",
     "report",
 )
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130

@@ -1,4 +1,4 @@
-"""``chladni study``: cases with an effect concealed, all of them, and the confusion matrix."""
+"""``chladni blind``: cases with an effect concealed, all of them, and the confusion matrix."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,19 +17,19 @@ def run(
     out: Out = None,
 ) -> None:
     """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
+    from chladni_evidence.blind import answered_rows, blinds, line
     from chladni_evidence.evidence_sets import seed_range
     from chladni_evidence.score import Row, confusion, summary
-    from chladni_evidence.study import blinds, line, study
 
-    place, rows = out or Path("runs") / "study", []
+    place, rows = out or Path("runs") / "blind", []
     cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:
         rows.append(row)
         typer.echo(line(row))
-        write_json(place / "study.json", rows)
+        write_json(place / "blind.json", rows)
 
-    study(cases, workers, told)
+    answered_rows(cases, workers, told)
     text = f"{confusion(rows)}\n\n{summary(rows)}"
     write_text(place / "confusion.txt", text + "\n")
     typer.echo(text)
