@@ -23,3 +23,4 @@ from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
+from .studies.parameter_study import study as study

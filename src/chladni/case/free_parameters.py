@@ -27,7 +27,7 @@ _OF_LUMPS = {"springs": "K", "bushes": "K", "masses": "M"}
 _WORDS = {"springs": "a spring", "bushes": "a bush", "masses": "a mass"}
 
 
-def free_parameter(section: TomlSection, made: Assembly, deck: Deck) -> FreeParameter:
+def free_parameter(section: TomlSection, made: Assembly, deck: Deck | None) -> FreeParameter:
     """One [[parameter]], resolved.
 
     Raises

@@ -19,6 +19,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "frf",
     "render",
     "plan",
+    "study",
     "specimen",
     "blind",
     "report",
@@ -56,8 +57,9 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
         except OSError as error:
             name = f"{error.filename}: " if error.filename else ""
             code = _said(f"{name}{error.strerror or error}", AT_FAULT)
-        except KeyboardInterrupt:
-            code = _said("interrupted; nothing was written", INTERRUPTED)
+        except KeyboardInterrupt as error:
+            said = str(error) or "interrupted; nothing was written"
+            code = _said(said, INTERRUPTED)
         raise typer.Exit(code or DONE)
 
     return inner
@@ -70,7 +72,7 @@ def _said(error: object, code: int) -> int:
 
 def _tell(wanted: bool) -> None:
     if wanted:
-        from ..report.page import own_version
+        from ..output import own_version
 
         typer.echo(f"chladni {own_version()}")
         raise typer.Exit(DONE)

@@ -86,7 +86,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     if M is not None and len(pairs):
         by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
     progress("responses", 0.6)
-    responses, q, notes = _scored(case, model, test)
+    responses, q, notes = scored(case, model, test)
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
@@ -125,7 +125,7 @@ def _shapes(found: Identified) -> np.ndarray:
     return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)
 
 
-def _scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
+def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
     """Responses of the model, Q over the lines that count, and how it was taken."""
     use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
     low, high = test.frequency[use][[0, -1]]
