@@ -11,6 +11,7 @@ from ..errors import AccuracyError, ChladniError
 
 COMMANDS = (  # each a module here with a function ``run``
     "diagnose",
+    "init",
     "demo",
     "calibrate",
     "correlate",

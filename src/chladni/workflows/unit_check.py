@@ -41,19 +41,20 @@ def _fits(made: Assembly, said: Units, other: Units, mass: float, weighed: float
     """Whether the deck's numbers make sense in another system: its mass, and usual materials."""
     if not 1 / FAR <= mass * other.mass / said.mass / weighed <= FAR:
         return False
-    materials = [m for part in made.parts if (m := _material(part.section)) is not None]
-    E = np.array([_modulus(m) for m in materials]) * other.stress / said.stress
+    materials = [m for part in made.parts if (m := material_of(part.section)) is not None]
+    E = np.array([modulus_of(m) for m in materials]) * other.stress / said.stress
     rho = np.array([m.rho for m in materials]) * other.density / said.density
     return _usual(E, STIFF) and _usual(rho, HEAVY)
 
 
-def _material(section: Section) -> Material | None:
+def material_of(section: Section) -> Material | None:
+    """The material of a section; of a shell that of its membrane."""
     if isinstance(section, ShellSection):
         return section.membrane or section.bending
     return getattr(section, "material", None)
 
 
-def _modulus(material: Material) -> float:
+def modulus_of(material: Material) -> float:
     """E, or E1 of the plane stiffness (1 - nu² aside) [Pa]."""
     return material.E if isinstance(material, Isotropic) else float(material.plane_stress()[0, 0])
 
