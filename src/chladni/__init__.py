@@ -18,6 +18,7 @@ from .workflows.loaded_model import load_model as load_model
 from .workflows.recordings_of import load_recordings as load_recordings
 from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
+from .workflows.case_check import check as check
 from .workflows.plan import plan as plan
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate

@@ -377,7 +377,10 @@ def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     assert not list(tmp_path.glob("runs/*")), "half a run was left"
 
 
-@pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in ("report", "specimen")])
+DECKLESS = ("report", "specimen", "init")  # they take no case
+
+
+@pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in DECKLESS])
 def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)

@@ -23,6 +23,8 @@ WORKFLOW = {  # command: the function it calls
     "frf": "chladni.workflows.frf.frf",
     "plan": "chladni.workflows.plan.plan",
     "render": "chladni.workflows.loaded_model.load_model",
+    "init": "chladni.workflows.case_draft.draft",
+    "check": "chladni.workflows.case_check.check",
     "study": "chladni.studies.parameter_study.study",
     "blind": "chladni_evidence.blind.answered_rows",
     "specimen": "chladni_specimens.tailgate.tailgate.tailgate_specimen",

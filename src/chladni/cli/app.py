@@ -12,6 +12,7 @@ from ..errors import AccuracyError, ChladniError
 COMMANDS = (  # each a module here with a function ``run``
     "diagnose",
     "init",
+    "check",
     "demo",
     "calibrate",
     "correlate",

@@ -5,10 +5,12 @@ from typing import Any
 
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
+from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
+from .check_page import check_json
 from .diagnosis_json import diagnosis_json
 from .plan_json import plan_json
 from .study_page import study_json
@@ -33,6 +35,11 @@ def _(result: Plan) -> dict[str, Any]:
 @to_json.register
 def _(result: ParameterStudy) -> dict[str, Any]:
     return study_json(result)
+
+
+@to_json.register
+def _(result: CaseCheck) -> dict[str, Any]:
+    return check_json(result)
 
 
 @to_json.register

@@ -7,8 +7,8 @@ import numpy as np
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
+from ..model.properties import Isotropic, Material, Section, ShellSection
 from ..units import UNITS, Units
-from .unit_check import material_of, modulus_of
 
 MATERIALS = {  # E [Pa], rho [kg/m³]: what decks are made of
     "steel": (2.1e11, 7850.0),
@@ -35,58 +35,76 @@ class UnitGuess:
     why: str
 
 
-def guessed_units(raw: Assembly, source: str) -> UnitGuess:
+def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> UnitGuess:
     """The system in which the deck's numbers are those of known materials.
 
     Parameters
     ----------
-    raw : the deck read without a unit system, in its own numbers
+    made : the deck as it was read
+    read_in : in which system; a deck read without one counts as SI
 
     Raises
     ------
     FileError
         If it has no material with a modulus and a density, or none is usual in any system.
     """
-    pairs = _materials(raw)
+    pairs = _materials(made, read_in)
     if not pairs:
         raise FileError(
             f"{source}: no material has a modulus and a density to tell the unit system by; give "
             f"--units, one of {', '.join(UNITS)}"
         )
-    ranked = sorted((_misfit(raw, pairs, u), k, u) for k, u in enumerate(UNITS.values()))
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0))) / read_in.length
+    mass = float(mass_properties(made)[0]) / read_in.mass
+    ranked = sorted((_misfit(pairs, size, mass, u), k, u) for k, u in enumerate(UNITS.values()))
     (best, _, units), (second, *_) = ranked[:2]
+    E, rho = pairs[0]
     if best > NEAR:
-        E, rho = pairs[0]
         raise FileError(
             f"{source}: E = {E:g} and rho = {rho:g} are usual in no unit system "
             f"({', '.join(UNITS)}); look at the materials, or give --units"
         )
-    E, rho = pairs[0][0] * units.stress, pairs[0][1] * units.density
-    size = float(np.linalg.norm(np.ptp(raw.points, axis=0))) * units.length
-    mass = mass_properties(raw)[0] * units.mass
+    E, rho = E * units.stress, rho * units.density
     why = (
-        f"in {units.name} the deck is {size:.3g} m across, weighs {mass:.4g} kg and its first "
-        f"material is {_named(E, rho)} (E = {E / 1e9:.4g} GPa, rho = {rho:.4g} kg/m³)"
+        f"in {units.name} the deck is {size * units.length:.3g} m across, weighs "
+        f"{mass * units.mass:.4g} kg and its first material is {_named(E, rho)} "
+        f"(E = {E / 1e9:.4g} GPa, rho = {rho:.4g} kg/m³)"
     )
     return UnitGuess(units, second > best + CLEAR, why)
 
 
-def _materials(raw: Assembly) -> list[tuple[float, float]]:
-    """(E, rho) of every part that has both, the heaviest kind not told apart."""
-    found = [m for part in raw.parts if (m := material_of(part.section)) is not None]
-    return [(E, m.rho) for m in found if (E := modulus_of(m)) > 0 and m.rho > 0]
+def material_of(section: Section) -> Material | None:
+    """The material of a section; of a shell that of its membrane."""
+    if isinstance(section, ShellSection):
+        return section.membrane or section.bending
+    return getattr(section, "material", None)
 
 
-def _misfit(raw: Assembly, pairs: list[tuple[float, float]], u: Units) -> float:
+def modulus_of(material: Material) -> float:
+    """E, or E1 of the plane stiffness (1 - nu² aside) [Pa]."""
+    return material.E if isinstance(material, Isotropic) else float(material.plane_stress()[0, 0])
+
+
+def _materials(made: Assembly, read_in: Units) -> list[tuple[float, float]]:
+    """(E, rho) of every part that has both, as they stand in the deck."""
+    found = [m for part in made.parts if (m := material_of(part.section)) is not None]
+    return [
+        (E / read_in.stress, m.rho / read_in.density)
+        for m in found
+        if (E := modulus_of(m)) > 0 and m.rho > 0
+    ]
+
+
+def _misfit(pairs: list[tuple[float, float]], size: float, mass: float, u: Units) -> float:
     """Decades from known materials, median of the parts; one more for an odd size or mass each."""
     each = [_distance(E * u.stress, rho * u.density)[0] for E, rho in pairs]
-    size = float(np.linalg.norm(np.ptp(raw.points, axis=0))) * u.length
-    mass = mass_properties(raw)[0] * u.mass
-    odd = (not SIZE[0] <= size <= SIZE[1]) + (mass > 0 and not MASS[0] <= mass <= MASS[1])
-    return float(np.median(each)) + odd
+    small_or_large = not SIZE[0] <= size * u.length <= SIZE[1]
+    light_or_heavy = mass > 0 and not MASS[0] <= mass * u.mass <= MASS[1]
+    return float(np.median(each)) + small_or_large + light_or_heavy
 
 
 def _distance(E: float, rho: float) -> tuple[float, str]:
+    """(decades, name) of the nearest material."""
     return min(
         (float(np.hypot(np.log10(E / E0), np.log10(rho / rho0))), name)
         for name, (E0, rho0) in MATERIALS.items()
