@@ -56,12 +56,14 @@ PLOTS = {  # name: the drawing, and words that must stand on it
         ("f1", "E", "slopes", "1.00"),
     ),
     "parallel_coordinates": (
-        lambda p: study_plots.parallel_coordinates(p, {"t [m]": F, "Q": 1 / F, "one": 0 * F}, "Q"),
+        lambda p: study_plots.parallel_coordinates(
+            p, {"t [m]": F, "Q": 1 / F, "one": 0 * F}, "Q", ["t [m]"]
+        ),
         ("t [m]", "Q", "one", "200"),
     ),
     "response_plots": (
         lambda p: study_plots.response_plots(
-            p, {"Q": F, "f1": 2 * F}, {"t [m]": F, "E [Pa]": F}, {"Q": 90.0}
+            p, {"Q": F, "f1": 2 * F}, {"t [m]": F, "E [Pa]": F}, {"Q": 90.0}, ["t [m]"]
         ),
         ("Q", "f1", "t [m]", "E [Pa]"),
     ),

@@ -32,7 +32,7 @@ def study_json(found: ParameterStudy) -> dict[str, Any]:
         "nominal": found.nominal,
         "range": {c: _range(found.column(c)) for c in found.columns},
         "sensitivities": {s.result: _measures(s, found.names) for s in found.sensitivities},
-        "notes": found.notes,
+        "notes": [*found.notes, *_notes(found)],
     }
 
 
@@ -166,15 +166,18 @@ def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]])
     results = {c: y for c, y in results.items() if np.isfinite(y).any()}
     if not results:
         return []
+    decades = [_with_unit(v.name, v.unit) for v in found.varied if v.log]
     whole, colour = {**parameters, **results}, next(iter(results))
     nominal = {labels.get(k, k): v for k, v in plain(found.nominal).items()
                if isinstance(v, float)}  # fmt: skip
     blocks: list[Block] = []
     if np.isfinite(np.stack(list(whole.values()))).all(axis=0).sum() > 1:
-        path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour)
+        path = study_plots.parallel_coordinates(folder / "parallel.png", whole, colour, decades)
         files.append((path.name, "parallel coordinates"))
         blocks.append(Picture(path, f"Every line is a sample; colour: {colour}."))
-    path = study_plots.response_plots(folder / "responses.png", results, parameters, nominal)
+    path = study_plots.response_plots(
+        folder / "responses.png", results, parameters, nominal, decades
+    )
     files.append((path.name, "results over parameters"))
     blocks.append(Picture(path, "Dots: samples; dashed: the deck's own values."))
     return blocks

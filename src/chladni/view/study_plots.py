@@ -1,6 +1,6 @@
 """Pictures of a parameter study: slopes, parallel coordinates, results over parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,21 +38,30 @@ def slope_map(
     return save(figure, path)
 
 
-def parallel_coordinates(path: Path | str, axes: Mapping[str, np.ndarray], colour: str) -> Path:
+def parallel_coordinates(
+    path: Path | str,
+    axes: Mapping[str, np.ndarray],
+    colour: str,
+    logarithmic: Collection[str] = (),
+) -> Path:
     """Every sample a line across the axes, coloured by one of them.
 
     Parameters
     ----------
     axes : {label: (n,)}   each axis runs from its least value (below) to its largest
     colour : label of the axis that gives the colour
+    logarithmic : labels of axes whose values, above zero, run over decades
     """
     whole = np.stack([np.asarray(v, float) for v in axes.values()], axis=1)
     good = whole[np.isfinite(whole).all(axis=1)][:_MOST]
     figure = Figure(figsize=(1.5 * len(axes) + 1.5, 4.2), layout="constrained")
     ax, at = figure.subplots(), range(len(axes))
     low, high = good.min(axis=0), good.max(axis=0)
-    wide = np.where(high > low, high - low, 1.0)
-    place = np.where(high > low, (good - low) / wide, 0.5)
+    place = np.full(good.shape, 0.5)
+    for k, name in enumerate(axes):
+        if high[k] > low[k]:
+            run = np.log if name in logarithmic else np.asarray
+            place[:, k] = (run(good[:, k]) - run(low[k])) / (run(high[k]) - run(low[k]))
     shade = place[:, list(axes).index(colour)]
     cmap = colormaps[_COLOURS]
     alpha = float(np.clip(40 / max(len(good), 1), 0.12, 0.9))
@@ -77,6 +86,7 @@ def response_plots(
     results: Mapping[str, np.ndarray],
     parameters: Mapping[str, np.ndarray],
     nominal: Mapping[str, float],
+    logarithmic: Collection[str] = (),
 ) -> Path:
     """Every result (row) over every parameter (column), one dot per sample; lines: the deck's own.
 
@@ -84,6 +94,7 @@ def response_plots(
     ----------
     results, parameters : {label: (n,)}
     nominal : {label: value} of either
+    logarithmic : labels of parameters that run over decades
     """
     shape = (len(results), len(parameters))
     figure = Figure(figsize=(2.5 * shape[1] + 0.8, 1.9 * shape[0] + 0.6), layout="constrained")
@@ -95,6 +106,11 @@ def response_plots(
             for draw, name in ((ax.axvline, x_name), (ax.axhline, y_name)):
                 if np.isfinite(value := nominal.get(name, np.nan)):
                     draw(value, color=BEFORE, lw=0.8, ls=(0, (4, 2)))
+            if x_name in logarithmic:
+                ax.set_xscale("log")
+            else:
+                ax.locator_params(axis="x", nbins=4)
+                ax.ticklabel_format(axis="x", scilimits=(-3, 4))
             ax.tick_params(labelsize=7)
             ax.grid(lw=0.3, alpha=0.5)
             if i == shape[0] - 1:
