@@ -80,7 +80,7 @@ def test_modes(tmp_path):
     (share,) = (part["strain_energy"] for part in result["parts"].values())
     np.testing.assert_allclose(share[6:], 1, rtol=1e-6)
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == {"modes.json", "modes.vtu", "modes.png", "report.html"}
+    assert names == {"modes.json", "modes.unv", "modes.vtu", "modes.png", "report.html"}
 
 
 def test_frf_peaks_at_its_modes(deck, tmp_path):

@@ -172,3 +172,34 @@ def test_mostly_failed_is_not_to_be_trusted(deck, tmp_path, monkeypatch):
     assert done.exit_code == 3, (done.output, done.exception)
     assert "4 of 5 samples failed, the first of them, 1: by decree" in done.stderr
     assert (tmp_path / "x" / "report.html").is_file()
+
+
+@pytest.mark.parametrize("name", ['Ω \n,"E"', "E/rho <b>", "x" * 300, "$_$"])
+def test_any_name_goes_through_every_file(folder, tmp_path, name):
+    place = tmp_path / "Gehäuse Ω"
+    place.mkdir()
+    for file in ("plate.bdf", "frf.npz"):
+        (place / file).write_bytes((folder / file).read_bytes())
+    quoted = json.dumps(name, ensure_ascii=False)
+    (place / "case.toml").write_text(CASE.replace('"sheet"', quoted), encoding="utf-8")
+    done = call(place, "--samples", 5, "--sampler", "oat", "--modes", 2, "--out", tmp_path / "x")
+    assert done.exit_code == 0, (done.output, done.exception)
+    table = pandas.read_csv(tmp_path / "x/samples.csv")
+    assert name in table.columns
+    assert name in pandas.read_csv(tmp_path / "x/design.csv").columns
+    with xarray.open_dataset(tmp_path / "x/study.nc") as data:
+        assert any(np.allclose(v, table[name]) for v in data.data_vars.values() if v.shape == (5,))
+    assert "<b>" not in (tmp_path / "x/report.html").read_text(encoding="utf-8").split("<h1")[1]
+
+
+@pytest.mark.parametrize("name", ["Q", "f1_hz", "sample", "mode"])
+def test_a_parameter_is_not_called_as_a_result(folder, tmp_path, name):
+    place = tmp_path / "case"
+    place.mkdir()
+    for file in ("plate.bdf", "frf.npz"):
+        (place / file).write_bytes((folder / file).read_bytes())
+    (place / "case.toml").write_text(CASE.replace('"sheet"', f'"{name}"'))
+    done = call(place, "--samples", 5, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "cannot be called" in done.stderr
+    assert not (tmp_path / "x").exists()

@@ -14,6 +14,7 @@ from .words import number, unit_text
 _SHOWN = 4  # results drawn over the parameters
 _AXES = 5  # parameters drawn
 _LAW = 0.8  # share of the variance a power law explains where its slopes are drawn
+_LONGEST = 36  # letters of a name on an axis
 _LISTED = 12  # failed samples on the page; all are in the table
 READ = (
     'pandas.read_csv("samples.csv")',
@@ -116,9 +117,9 @@ def _sensitivities(
             path,
             values,
             [label(s.result) for s in told],
-            found.names,
+            [_drawable(name) for name in found.names],
             "d ln result / d ln parameter",
-        )  # fmt: skip
+        )
         files.append((path.name, "logarithmic slopes"))
         blocks.append(Picture(path, "1: one per cent more of the parameter is one per cent more."))
     for measure, title in (("total", "Total Sobol' index"), ("mu_star", "mean |effect|")):
@@ -184,7 +185,14 @@ def _pictures(folder: Path, found: ParameterStudy, files: list[tuple[str, str]])
 
 
 def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit_text(unit)}]" if unit_text(unit) else name
+    """Label of an axis."""
+    return f"{_drawable(name)} [{unit_text(unit)}]" if unit_text(unit) else _drawable(name)
+
+
+def _drawable(name: str) -> str:
+    """A user's name as a label: not as long as the picture, and no formula."""
+    shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 12]}…{name[-11:]}"
+    return shown.replace("$", r"\$")
 
 
 def _drawn(found: ParameterStudy) -> list[str]:

@@ -2,7 +2,7 @@
 
 import platform
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,10 +29,12 @@ from .followed_modes import MARGIN, followed
 from .sample import StudyModel, computed
 from .sensitivity import Sensitivity, sensitivity, worth_telling
 from .study_settings import StudySettings
-from .study_store import StudyStore, opened_store, row_of
+from .study_store import OWN, StudyStore, opened_store, row_of
 from .variation import Variation, of_case, of_text, refuse_impossible
 from .workers import affordable, results
 
+RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
+            "frf_real", "frf_imag", "channel_name")  # names in the NetCDF file  # fmt: skip
 _RIGID = 6  # motions of a free structure in one piece
 
 
@@ -72,7 +74,7 @@ class ParameterStudy:
     @property
     def columns(self) -> list[str]:
         """Names of the results."""
-        skipped = {"sample", "status", "why", "seconds", *self.names}
+        skipped = {*OWN, *self.names}
         return [c for c in self.nominal if c not in skipped]
 
     @property
@@ -87,7 +89,7 @@ class ParameterStudy:
 
     def table(self) -> dict[str, list[Any]]:
         """Columns by name, for ``pandas.DataFrame``."""
-        first = ["sample", "status", "why", "seconds", *self.names, *self.columns]
+        first = [*OWN, *self.names, *self.columns]
         return {name: [row.get(name) for row in self.rows] for name in first}
 
     @cached_property
@@ -140,6 +142,7 @@ def study(
     nominal = computed(asked, -1, own)
     if nominal.why:
         raise FileError(f"{model.source}: the deck's own values cannot be solved: {nominal.why}")
+    _refuse_taken([v.name for v in varied], nominal.columns)
     drawn = design(settings.sampler, settings.samples, len(varied), settings.seed,
                    _places(varied, own))  # fmt: skip
     X = np.stack([v.value(drawn.points[:, k]) for k, v in enumerate(varied)], axis=1)
@@ -162,6 +165,8 @@ def study(
             raise Interrupted(_kept(len(rows), len(X), store)) from None
         except ChladniError as error:
             raise type(error)(f"{error}; {_kept(len(rows), len(X), store)}") from error
+        if case is not None and case.recordings and not case.frfs:
+            notes.append("The recording holds no FRFs, so there is no Q.")
         notes += [*drawn.notes, *(store.notes if store else [])]
     return ParameterStudy(
         varied, settings, drawn, X, tuple(rows[k] for k in sorted(rows)),
@@ -185,6 +190,13 @@ def _varied(
         raise FileError(f"{model.source}: nothing is varied; {_choices(model.assembly)}")
     refuse_impossible(found, model.assembly)
     return tuple(found), notes
+
+
+def _refuse_taken(names: Sequence[str], columns: Collection[str]) -> None:
+    """Refuse parameters called as a result is."""
+    for name in names:
+        if name in {*columns, *OWN, *RESERVED}:
+            raise FileError(f"a parameter cannot be called {name!r}, as a column of the table is")
 
 
 def _choices(assembly: Assembly) -> str:
@@ -338,7 +350,7 @@ def per_time(rate: float) -> str:
 def remaining(seconds: float) -> str:
     """A duration as a person says it.
 
-    >>> remaining(40), remaining(150), remaining(9000)
+    >>> remaining(40), remaining(200), remaining(9000)
     ('40 s', '3 min', '2.5 h')
     """
     if seconds < 100:

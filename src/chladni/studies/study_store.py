@@ -10,6 +10,8 @@ machines and no shared memory (SQLite's write-ahead log does), so that it works 
 systems of clusters, spares them a file per sample, and is read while it grows.
 """
 
+import csv
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -32,6 +34,7 @@ except ImportError:  # not on Windows, whose open files are their own lock
 BEGUN, DESIGN, ROWS, FRFS, LOCK = (
     "study_begun.json", "design.csv", "samples.jsonl", "frf", ".study.lock",
 )  # fmt: skip
+OWN = ("sample", "status", "why", "seconds")  # columns beside parameters and results
 _WORDS = {
     "model": "the deck, the case or the recording",
     "parameters": "what is varied, and how far",
@@ -79,15 +82,9 @@ class StudyStore:
 
 def row_of(result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
     """A sample as one flat row: number, status, sentence, parameters, results."""
-    row: dict[str, Any] = {
-        "sample": result.number,
-        "status": "failed" if result.why else "done",
-        "why": result.why,
-        "seconds": round(result.seconds, 4),
-        **values,
-        **result.columns,
-    }
-    return dict(plain(row))
+    status = "failed" if result.why else "done"
+    own = (result.number, status, result.why, round(result.seconds, 4))
+    return dict(plain({**dict(zip(OWN, own, strict=True)), **values, **result.columns}))
 
 
 @contextmanager
@@ -128,10 +125,11 @@ def opened_store(
 
 def design_text(names: list[str], X: np.ndarray) -> str:
     """The design as CSV, numbers as they are to the last digit."""
-    heads = ["sample", *('"' + n.replace('"', '""') + '"' if set(n) & set(',"') else n
-                         for n in names)]  # fmt: skip
-    lines = (",".join([str(k), *map(repr, x)]) for k, x in enumerate(X.tolist()))
-    return "\n".join([",".join(heads), *lines, ""])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["sample", *names])
+    writer.writerows([k, *map(repr, x)] for k, x in enumerate(X.tolist()))
+    return text.getvalue()
 
 
 def _locked(folder: Path, lock: IO[bytes]) -> list[str]:

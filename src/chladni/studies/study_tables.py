@@ -59,10 +59,15 @@ def _variable(
     file: Any, name: str, dims: tuple[str, ...], values: np.ndarray, unit: str = ""
 ) -> None:
     kind = "d" if values.dtype.kind == "f" else values.dtype.kind
-    made = file.createVariable(name, "i" if kind == "i" else kind, dims)
+    made = file.createVariable(_plain(name), kind, dims)
     made[:] = values
     if unit:
-        made.units = unit
+        made.units = _plain(unit)
+
+
+def _plain(text: str) -> str:
+    """Text as NetCDF 3 takes it: ASCII."""
+    return text.encode("ascii", "backslashreplace").decode()
 
 
 def _modes(file: Any, found: ParameterStudy) -> None:
@@ -90,7 +95,8 @@ def _channels(file: Any, found: ParameterStudy) -> None:
 
 def _texts(file: Any, name: str, texts: list[str]) -> None:
     """Texts as rows of characters, which xarray joins."""
-    width = max(len(t.encode()) for t in texts)
+    texts = [_plain(t) for t in texts]
+    width = max(len(t) for t in texts)
     file.createDimension(f"{name}_letters", width)
     rows = np.array([list(t.encode().ljust(width)) for t in texts], dtype=np.uint8)
     made = file.createVariable(f"{name}_name", "c", (name, f"{name}_letters"))
@@ -134,6 +140,6 @@ def _whole(file: Any, found: ParameterStudy, files: dict[int, Path]) -> None:
 def _attributes(file: Any, found: ParameterStudy) -> None:
     """What the study was made of and with."""
     made = found.provenance
-    file.source, file.sampler, file.seed = made["source"], made["sampler"], made["seed"]
+    file.source, file.sampler, file.seed = _plain(made["source"]), made["sampler"], made["seed"]
     file.versions = " ".join(f"{k} {v}" for k, v in made["versions"].items())
-    file.files = " ".join(f"{Path(k).name}:{v}" for k, v in made["files"].items())
+    file.files = _plain(" ".join(f"{Path(k).name}:{v}" for k, v in made["files"].items()))
