@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import chladni
 from chladni.cli.app import application
+from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.result_json import to_json
 from chladni.workflows.unit_check import refuse_other_units
@@ -128,3 +129,36 @@ def test_places_off_the_mesh_and_double_ones(copied):
     assert "2:+Z by 9 mm" in off.text
     assert "4:+Z and 7:+Z are one place" in double.text
     assert np.isclose(max(d.off_mesh_m for d in found.dofs), 0.009)
+
+
+@pytest.fixture(scope="module")
+def along_x(folder, tmp_path_factory):
+    """Nine sensors that measured along Z; their table says X."""
+    place = tmp_path_factory.mktemp("axes")
+    shutil.copy(folder / "plate.bdf", place)
+    article = chladni.load_model(folder / "article.bdf", "SI")
+    ends = [f"{g}:+Z" for g in (2, 4, 7, 18, 24, 30, 36, 43, 47)]
+    made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 250, 1200)).frfs[0]
+    write_npz(place / "frf.npz", made.to("accelerance"))
+    rows = [f"{label},{label.partition(':')[0]},+X,output" for label in ends]
+    (place / "sensors.csv").write_text("\n".join(["label,grid,direction,role", *rows, ""]))
+    text = (folder / "case.toml").read_text().replace("[20.0, 170.0]", "[20.0, 240.0]")
+    (place / "case.toml").write_text(text.replace("[band]", 'sensors = "sensors.csv"\n[band]'))
+    return place
+
+
+@pytest.mark.parametrize("command", ["check", "correlate", "calibrate", "diagnose"])
+def test_sensors_declared_along_another_axis_are_told(along_x, tmp_path, command):
+    done = call(command, along_x, "--out", tmp_path / "out")
+    assert done.exit_code == (3 if command == "check" else 2), (done.output, done.exception)
+    assert "declared along X" in done.stderr
+    assert "shapes along Z" in done.stderr
+    assert (tmp_path / "out").exists() == (command == "check")
+
+
+def test_sensors_declared_as_they_are_pass(along_x, tmp_path):
+    place = tmp_path / "case"
+    shutil.copytree(along_x, place)
+    (place / "sensors.csv").write_text((along_x / "sensors.csv").read_text().replace("+X", "+Z"))
+    assert not chladni.check(chladni.load_case(place)).faults
+    assert len(chladni.correlate(chladni.load_case(place)).pairs) > 3

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case import Case
-from ..errors import FileError
+from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
 from ..progress import Progress, silent
 from .case_draft import said_of
+from .correlate import correlate
 from .loaded_model import as_model
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
@@ -81,6 +82,9 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     findings = [
         *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
     ]  # fmt: skip
+    if not any(f.fault for f in findings):
+        progress("the recording beside the model", 0.8)
+        findings += _correlated(case)
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 
@@ -183,6 +187,18 @@ def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
 def _same(a: CheckedDof, b: CheckedDof) -> bool:
     near = float(np.linalg.norm(np.subtract(a.point_m, b.point_m))) < TOGETHER
     return near and abs(float(np.dot(a.direction, b.direction))) > 1 - 1e-6
+
+
+def _correlated(case: Case) -> list[CaseFinding]:
+    """What only shows when the recording is held against the model."""
+    if not case.frfs:
+        return []
+    try:
+        correlate(case)
+    except ChladniError as error:
+        said = str(error).removeprefix(f"{case.path}: ")
+        return [CaseFinding(said, "nothing can be fitted before", True)]
+    return []
 
 
 def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:

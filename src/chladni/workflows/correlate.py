@@ -15,6 +15,7 @@ from ..ema.mode_pairing import ModePairs, pair
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
+from .axes_check import measured_shapes, refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .output_only import with_natural_frequencies
@@ -79,7 +80,8 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     progress("modes of the test", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
-    phi, psi = case.outputs.rows(model.structure) @ near.shapes, _shapes(found)
+    refuse_turned_axes(case, found, model)
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, measured_shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)
     by_dof = None
@@ -114,15 +116,6 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
     f = poles.of(poles.states[0]).frequency
     return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),
                        notes=tuple(case.said("correlate")))  # fmt: skip
-
-
-def _shapes(found: Identified) -> np.ndarray:
-    """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
-    if not found.order:
-        return np.zeros((len(found.outputs), 0))
-    size = np.linalg.norm(found.residues, axis=1)
-    best = size.argmax(axis=1)
-    return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)
 
 
 def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:

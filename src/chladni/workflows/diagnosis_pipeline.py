@@ -44,6 +44,7 @@ from ..updating.renewal import renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
+from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
@@ -79,6 +80,8 @@ def explained(
         )
     asked = question(case)
     prepared = prepare(asked)
+    if prepared.identified is not None:
+        refuse_turned_axes(case, prepared.identified, prepared.nominal)
     if known:
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
