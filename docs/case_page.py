@@ -35,7 +35,8 @@ _HEAD = """\
 
 A folder with one `case.toml` says what a model is compared with. Every command takes it. Words that
 are not listed here are refused with the line they stand in. Words that a command makes no use of
-are named in its notes. Numbers are SI whatever the deck is in. This page is written from
+are named in its notes. Numbers are SI whatever the deck is in. `chladni init DECK RECORDING` drafts
+a case, `chladni check CASE` says how it is understood. This page is written from
 `chladni/case/schema.py`.
 
 ```toml

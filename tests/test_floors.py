@@ -37,7 +37,8 @@ BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}
 MAY_IMPORT["planning"] = BELOW | {"view"}
 MAY_IMPORT["workflows"] = BELOW | {"planning", "view"}
-MAY_IMPORT["report"] = MAY_IMPORT["workflows"] | {"workflows"}
+MAY_IMPORT["studies"] = MAY_IMPORT["workflows"] | {"workflows"}
+MAY_IMPORT["report"] = MAY_IMPORT["studies"] | {"studies"}
 MAY_IMPORT["chladni_specimens"] = GROUND | {"model", "geometry"}
 MAY_IMPORT["cli"] = MAY_IMPORT["report"] | {"report", "chladni_specimens", "chladni_evidence"}
 MAY_IMPORT["chladni_evidence"] = MAY_IMPORT["report"] | {"report", "chladni_specimens"}
@@ -51,6 +52,7 @@ LIBRARIES = {
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},
+    "studies": {"distributed", "SALib", "threadpoolctl"},
     "cli": {"typer", "rich"},
     "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},

@@ -5,7 +5,18 @@ import sys
 
 import pytest
 
-HEAVY = {"pyvista", "vtkmodules", "trimesh", "meshio", "gymnasium", "matplotlib", "pyuff", "jinja2"}
+HEAVY = {
+    "pyvista",
+    "vtkmodules",
+    "trimesh",
+    "meshio",
+    "gymnasium",
+    "matplotlib",
+    "pyuff",
+    "jinja2",
+    "distributed",
+    "SALib",
+}
 
 
 def loaded_by(code):

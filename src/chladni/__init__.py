@@ -18,9 +18,11 @@ from .workflows.loaded_model import load_model as load_model
 from .workflows.recordings_of import load_recordings as load_recordings
 from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
+from .workflows.case_check import check as check
 from .workflows.plan import plan as plan
 from .workflows.evaluation import evaluate_recordings as evaluate_recordings
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
+from .studies.parameter_study import study as study

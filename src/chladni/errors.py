@@ -30,5 +30,9 @@ class AccuracyError(ChladniError, ArithmeticError):
     """A computed result failed the check its own theory provides."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """The user stopped a run that had something to keep; the sentence says what and where."""
+
+
 class ExtensionError(ChladniError, ImportError):
     """A package that adds to this one and cannot be used as it stands."""

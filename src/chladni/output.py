@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,14 @@ def _move(part: Path, out: Path) -> None:
         target = out / source.relative_to(part)
         target.parent.mkdir(parents=True, exist_ok=True)
         source.replace(target)
+
+
+def own_version() -> str:
+    """Version of this package, where it is installed."""
+    try:
+        return version("chladni")
+    except PackageNotFoundError:
+        return "(not installed)"
 
 
 def _umask() -> int:

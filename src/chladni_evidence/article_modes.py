@@ -1,13 +1,13 @@
 """Modes of an article at the few points that matter, by our elements or by CalculiX."""
 
-import hashlib
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import eigh
 
+from chladni.arrays import fingerprint
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import attachments, orthonormal, shifted
 from chladni.fem.assemble import Structure, structure
@@ -111,26 +111,3 @@ def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, f_max: float) 
     moving = (built.T @ shapes).reshape(len(built.assembly.points), 6, -1)[rows, :3]
     f = np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi)
     return ArticleModes(f, rows, moving, shapes.T @ (built.loss @ shapes))
-
-
-def fingerprint(value: Any) -> str:
-    """Hash of a value's content: dataclasses and tuples field by field, arrays by their bytes."""
-    digest = hashlib.sha256()
-    _fed(digest, value)
-    return digest.hexdigest()[:24]
-
-
-def _fed(digest: Any, value: Any) -> None:
-    if isinstance(value, np.ndarray):
-        digest.update(
-            f"{value.dtype}{value.shape}".encode() + np.ascontiguousarray(value).tobytes()
-        )
-    elif is_dataclass(value) and not isinstance(value, type):
-        digest.update(type(value).__name__.encode())
-        for field in fields(value):
-            _fed(digest, getattr(value, field.name))
-    elif isinstance(value, tuple | list):
-        for item in value:
-            _fed(digest, item)
-    else:
-        digest.update(repr(value).encode())

@@ -10,17 +10,18 @@ from chladni_specimens.forms import FORMS
 from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailgate_bench
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
-from .outside_kinds import OUTSIDE
 
 SETS = ("tailgate", "panels", "forms", "outside")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
-ON_SHEETS = ("thickness-distribution", "orthotropic-material")
+ON_SHEETS = (
+    "thickness-distribution", "orthotropic-material", "stiffness-patch", "mass-patch", "crack",
+)  # fmt: skip
 OURS = ("crack", "friction-joint")  # CalculiX has no card for them here
-HOMES = {  # structures an effect outside the catalogue is put into
+HOMES = {  # structures of the set outside, by what is put into them
     "rotor": ("lidded box", "ribbed plate", "curved shell", "panel"),
     "foam": ("panel", "curved shell", "bonded plates", "ribbed plate"),
-    "resonator": ("tube frame", "lidded box", "plate", "ribbed plate"),
+    "local-resonator": ("tube frame", "lidded box", "plate", "ribbed plate"),
     "crack": ("plate", "bonded plates", "curved shell", "ribbed plate"),
     "friction-joint": ("lidded box", "bonded plates", "tube frame"),
     "duplicated-pair": ("panel", "bolted bracket", "bonded plates", "lidded box"),
@@ -57,7 +58,8 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
     panels: the same on plate and panel, our fine mesh and CalculiX in turn.
     forms: on each form a null and one other kind, the kinds in turn.
-    outside: every kind outside the catalogue, the structures in turn.
+    outside: every kind outside the catalogue, and those that came into it late, the structures in
+    turn.
     """
     made = {"tailgate": _tailgate, "panels": _panels, "forms": _forms, "outside": _outside}
     if name not in made:
@@ -68,26 +70,31 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
 def _tailgate(seed: int) -> Iterator[Order]:
     meshes = list(TAILGATE)
     for k, kind in enumerate(CATALOGUED):
-        yield Order("tailgate", kind, seed, meshes[(seed + k) % len(meshes)])
+        yield Order("tailgate", kind, seed, _mesh(kind, meshes[(seed + k) % len(meshes)], meshes))
 
 
 def _panels(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(CATALOGUED):
-            yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
+            yield Order(structure, kind, seed, _mesh(kind, MESHES[(seed + k + s) % 2]))
 
 
 def _forms(seed: int) -> Iterator[Order]:
     for s, (name, form) in enumerate(FORMS.items()):
         kinds = [k for k in CATALOGUED if form.rolled or k not in ON_SHEETS][1:]
-        for k, kind in enumerate(("nothing", kinds[(seed + 3 * s) % len(kinds)])):
-            yield Order(name, kind, seed, MESHES[(seed + s + k) % 2])
+        for k, kind in enumerate(("nothing", kinds[(seed + 5 * s) % len(kinds)])):
+            yield Order(name, kind, seed, _mesh(kind, MESHES[(seed + s + k) % 2]))
 
 
 def _outside(seed: int) -> Iterator[Order]:
-    for k, kind in enumerate(OUTSIDE):
-        home = HOMES[kind][(seed + k) % len(HOMES[kind])]
-        yield Order(home, kind, seed, "fine" if kind in OURS else MESHES[(seed + k) % 2])
+    for k, (kind, homes) in enumerate(HOMES.items()):
+        home = homes[(seed + k) % len(homes)]
+        yield Order(home, kind, seed, _mesh(kind, MESHES[(seed + k) % 2]))
+
+
+def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:
+    """The mesh, or the first where CalculiX has no card for the kind."""
+    return meshes[0] if kind in OURS and mesh == "calculix" else mesh
 
 
 def seed_range(text: str) -> range:

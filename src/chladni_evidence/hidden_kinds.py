@@ -2,20 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from chladni.effects.ordinary import scaled as sheet_scaled
+from chladni.effects.ordinary import value
 from chladni.errors import ModelError
-from chladni.geometry.facets import cell_normals
+from chladni.geometry.facets import cell_areas, cell_normals, unit
 from chladni.model.assembly import Assembly
 from chladni.model.ground_springs import with_ground_bushes
-from chladni.model.properties import Isotropic, Orthotropic, ShellSection
+from chladni.model.properties import Isotropic, Orthotropic, Part, ShellSection
 
 from .footing import nearest_rows
 from .hidden import Hidden, Site, near_outputs, with_lumps
 from .part_scatter import scaled
+from .response_of_article import Coupling
 
 STEEP = 0.95  # cosine between normal and grain: beyond, a shell keeps an axis of its own
+FEWEST, CRACKED = 6, 4  # shells of a patch and of a crack, at least
 Kind = Callable[[Site, np.random.Generator, float], Hidden]
 
 
@@ -136,6 +141,103 @@ def sensor_fault(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(site.article, truth, spoil=spoil)
 
 
+def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
+    row = site.row(rng)
+    n = site.normal(row)
+    m = float(rng.uniform(0.005, 0.01)) * site.mass * size
+    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
+    k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
+
+    def stiffness(s: np.ndarray) -> np.ndarray:
+        return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
+
+    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
+    coupling = Coupling(np.array([row]), n[None, None], stiffness)
+    return Hidden(site.article, truth, (coupling,), unweighed=-m)
+
+
+def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """E of a disc of a sheet times e^-(0.5 to 0.8), its mass as it was."""
+    mine, truth = _disc(site, rng)
+    factor = float(np.exp(-rng.uniform(0.5, 0.8) * min(size, 2.5)))
+    article = _with_disc(site.article, mine, "E", factor)
+    return Hidden(article, {**truth, "value": factor})
+
+
+def mass_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """2 to 4 % of the mass spread over a disc of a sheet, evenly."""
+    mine, truth = _disc(site, rng)
+    a, m = site.article, float(rng.uniform(0.02, 0.04)) * site.mass * size
+    area, rho = cell_areas(a.points, a.shells.nodes), value(a.parts[a.part(truth["part"])], "rho")
+    bare = rho * float((area * a.thickness())[mine].sum())
+    return Hidden(_with_disc(a, mine, "rho", 1 + m / bare), {**truth, "value": m})
+
+
+def _disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
+    """Shells (m,) bool of one part round a point of it, ``FEWEST`` at least, and where."""
+    a, part = site.article, site.part(rng)
+    of_part = a.shells.part == a.part(part)
+    if not of_part.any():
+        raise ModelError(f"part {part} has no sheet a patch could be on")
+    centre = a.points[rng.choice(site.rows(part))]
+    d = np.linalg.norm(a.points[a.shells.nodes].mean(axis=1) - centre, axis=1)
+    R = max(float(rng.uniform(0.12, 0.2)) * site.size, float(np.sort(d[of_part])[:FEWEST][-1]))
+    return of_part & (d <= R), {"point_m": centre.tolist(), "radius_m": R, "part": part}
+
+
+def _with_disc(a: Assembly, mine: np.ndarray, quantity: str, factor: float) -> Assembly:
+    """The article with E or rho of some shells of one part times a factor."""
+    old = a.parts[int(a.shells.part[mine][0])]
+    new = replace(
+        sheet_scaled(old, quantity, factor), id=1 + max(p.id for p in a.parts), name="patch"
+    )
+    part = np.where(mine, len(a.parts), a.shells.part)
+    return replace(a, parts=(*a.parts, new), shells=replace(a.shells, part=part))
+
+
+def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
+    a = site.article
+    length = float(rng.uniform(0.12, 0.2)) * site.size * float(np.clip(size, 1.0, 3.0))
+    for _ in range(50):
+        row, angle = site.row(rng), rng.uniform(-np.pi / 6, np.pi / 6)
+        p, mine = _along(site, row, angle, length)
+        if mine.sum() >= CRACKED:
+            break
+    kept = 1 / (1 + 3 * size**2)
+    section = a.parts[p].section
+    assert isinstance(section, ShellSection)
+    new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
+    shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
+    truth = {
+        "value": kept,
+        "point_m": a.points[row].tolist(),
+        "length_m": length,
+        "shells": int(mine.sum()),
+    }
+    return Hidden(replace(a, parts=(*a.parts, new), shells=shells), truth)
+
+
+def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.ndarray]:
+    """The part at a point, and its shells (m,) bool on a line through it across its length."""
+    a, n = site.article, site.normal(row)
+    p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
+    e = _longest(a.points[site.rows(a.parts[p].name)])
+    across = unit(np.cross(n, e))
+    along = np.cos(angle) * across + np.sin(angle) * np.cross(n, across)
+    X = a.points[a.shells.nodes].mean(axis=1) - a.points[row]
+    h = float(np.sqrt(np.median(cell_areas(a.points, a.shells.nodes))))
+    mine = (a.shells.part == p) & (np.abs(X @ np.cross(n, along)) <= 0.55 * h)
+    return p, mine & (np.abs(X @ along) <= length / 2) & (np.abs(X @ n) < length / 4)
+
+
+def _longest(points: np.ndarray) -> np.ndarray:
+    """Direction in which points (n, 3) lie farthest apart."""
+    d = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(d.T @ d)[1][:, -1])
+
+
 CATALOGUED: dict[str, Kind] = {
     "nothing": nothing,
     "calibration": calibration,
@@ -146,4 +248,8 @@ CATALOGUED: dict[str, Kind] = {
     "thickness-distribution": thinning,
     "orthotropic-material": orthotropic,
     "sensor-fault": sensor_fault,
+    "local-resonator": local_resonator,
+    "stiffness-patch": stiffness_patch,
+    "mass-patch": mass_patch,
+    "crack": crack,
 }

@@ -15,7 +15,7 @@ NAMED = ("missing physics", "measurement fault")
 ADMITTED = ("not in catalogue", "nonlinear")
 ALSO = {  # names that are right as well
     "duplicated-pair": ("sensor-fault",),
-    "resonator": ("local-resonator", "rattle"),
+    "local-resonator": ("rattle",),
     "friction-joint": ("joint-friction", "viscoelastic-joint"),
     "foam": ("viscoelastic-joint", "compliant-support"),
 }

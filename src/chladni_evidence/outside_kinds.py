@@ -5,16 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.errors import ModelError
-from chladni.geometry.facets import cell_areas, point_normals, tangents, unit
+from chladni.geometry.facets import point_normals, tangents
 from chladni.model.assembly import Assembly
-from chladni.model.properties import BeamSection, Part, ShellSection, SolidSection
+from chladni.model.properties import BeamSection, Part, SolidSection
 
 from .hidden import Hidden, Site, around
 from .hidden_kinds import Kind
 from .part_scatter import stiffer
 from .response_of_article import Coupling
 
-CRACKED = 4  # shells of a crack, at least
 PATCH = 0.06  # radius of rotors' feet and foam, of the structure's size
 
 
@@ -66,64 +65,6 @@ def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
         "tau_s": tau,
     }
     return Hidden(site.article, truth, (Coupling(rows, weights, stiffness),))
-
-
-def resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
-    row = site.row(rng)
-    n = site.normal(row)
-    m = float(rng.uniform(0.005, 0.01)) * site.mass * size
-    f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
-    k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f
-
-    def stiffness(s: np.ndarray) -> np.ndarray:
-        return np.asarray((m * s**2 * (k + c * s) / (m * s**2 + c * s + k))[:, None, None])
-
-    truth = {"value": m, "frequency_hz": f, "point_m": site.article.points[row].tolist()}
-    coupling = Coupling(np.array([row]), n[None, None], stiffness)
-    return Hidden(site.article, truth, (coupling,), unweighed=-m)
-
-
-def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
-    a = site.article
-    length = float(rng.uniform(0.12, 0.2)) * site.size * min(size, 3.0)
-    for _ in range(50):
-        row, angle = site.row(rng), rng.uniform(-np.pi / 6, np.pi / 6)
-        p, mine = _along(site, row, angle, length)
-        if mine.sum() >= CRACKED:
-            break
-    kept = 0.25 / size**2
-    section = a.parts[p].section
-    assert isinstance(section, ShellSection)
-    new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
-    shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
-    truth = {
-        "value": kept,
-        "point_m": a.points[row].tolist(),
-        "length_m": length,
-        "shells": int(mine.sum()),
-    }
-    return Hidden(replace(a, parts=(*a.parts, new), shells=shells), truth)
-
-
-def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.ndarray]:
-    """The part at a point, and its shells (m,) bool on a line through it across its length."""
-    a, n = site.article, site.normal(row)
-    p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
-    e = _longest(a.points[site.rows(a.parts[p].name)])
-    across = unit(np.cross(n, e))
-    along = np.cos(angle) * across + np.sin(angle) * np.cross(n, across)
-    X = a.points[a.shells.nodes].mean(axis=1) - a.points[row]
-    h = float(np.sqrt(np.median(cell_areas(a.points, a.shells.nodes))))
-    mine = (a.shells.part == p) & (np.abs(X @ np.cross(n, along)) <= 0.55 * h)
-    return p, mine & (np.abs(X @ along) <= length / 2) & (np.abs(X @ n) < length / 4)
-
-
-def _longest(points: np.ndarray) -> np.ndarray:
-    """Direction in which points (n, 3) lie farthest apart."""
-    d = points - points.mean(axis=0)
-    return np.asarray(np.linalg.eigh(d.T @ d)[1][:, -1])
 
 
 def friction(site: Site, rng: np.random.Generator, size: float) -> Hidden:
@@ -180,8 +121,6 @@ def duplicated(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 OUTSIDE: dict[str, Kind] = {
     "rotor": rotor,
     "foam": foam,
-    "resonator": resonator,
-    "crack": crack,
     "friction-joint": friction,
     "duplicated-pair": duplicated,
 }

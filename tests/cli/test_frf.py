@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import chladni
 from chladni.cli.app import application
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.read_tables import read_recordings
+from chladni.io.uff.read_uff import read_uff
+from chladni_specimens.plates import plate
 
 TWO = """SOL 108
 CEND
@@ -123,3 +128,62 @@ def test_what_modes_do_not_need_does_not_stop_them(tmp_path):
     refused = call("frf", deck, "--out", tmp_path / "frf")
     assert refused.exit_code == 2
     assert "no RLOAD1 or RLOAD2 51" in refused.output
+
+
+@pytest.fixture
+def deck(tmp_path):
+    write_assembly(plate(0.3, 0.22, 5, 5, 1e-3), tmp_path / "plate.bdf")
+    return tmp_path / "plate.bdf"
+
+
+def test_every_format_holds_the_same_responses(deck, tmp_path):
+    """NPZ, CSV and universal file are read as one FRF; the JSON says its levels and peaks."""
+    ends = ("--input", "1:+Z", "--output", "9:+Z", "--output", "25:+Z")
+    out = tmp_path / "out"
+    done = call("frf", deck, *ends, "--band", "5:90", "--lines", 80, "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    read = [
+        read_recordings(out / name, quantity)[0]
+        for name, quantity in (("frf.npz", None), ("frf.csv", "accelerance"), ("frf.uff", None))
+    ]
+    first = read[0].frf
+    for other in read[1:]:
+        np.testing.assert_allclose(other.frf.values, first.values, rtol=1e-11)
+        np.testing.assert_allclose(other.frf.frequency, first.frequency, rtol=1e-7)
+        assert (other.frf.outputs, other.frf.inputs) == (first.outputs, first.inputs)
+        assert other.frf.quantity == first.quantity
+    assert set(read[2].nodes) == {1, 9, 25}
+    told = json.loads((out / "frf.json").read_text())
+    assert told["unit"] == "m/s²/N"
+    size = np.abs(first.values[:, 1, 0])
+    assert told["channels"][1]["peak"] == pytest.approx(size.max())
+    assert told["channels"][1]["rms"] == pytest.approx(np.sqrt((size**2).mean()))
+
+
+def test_no_unit_is_claimed_that_is_not_known(deck, tmp_path):
+    """A universal file says its units, so that there is none of a bare deck."""
+    out = tmp_path / "out"
+    done = call("frf", deck, "--input", "1:+Z", "--output", "9:+Z", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert not (out / "frf.uff").exists()
+    assert json.loads((out / "frf.json").read_text())["unit"] is None
+    assert "needs the unit system" in (out / "report.html").read_text(encoding="utf-8")
+    done = call("modes", deck, "--count", 8, "--out", tmp_path / "modes")
+    assert done.exit_code == 0, done.output
+    assert not (tmp_path / "modes/modes.unv").exists()
+
+
+def test_shapes_as_a_universal_file(deck, tmp_path):
+    """Dataset 55 read back: frequencies and, to six digits, the shapes of the model."""
+    done = call("modes", deck, "--count", 9, "--units", "SI", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    read = read_uff(tmp_path / "out/modes.unv")
+    model = chladni.load_model(deck, "SI")
+    modal = model.modes(9)
+    motion = model.motion(modal.shapes)
+    np.testing.assert_allclose(read.shapes.frequency[6:], modal.frequency[6:], rtol=1e-5)
+    labels = {dof: k for k, dof in enumerate(read.shapes.dofs)}
+    rows = [[labels[f"{i}:+{c}"] for c in "XYZ"] for i in model.assembly.ids]
+    found = read.shapes.values[np.array(rows)]
+    np.testing.assert_allclose(found, motion, atol=1e-5 * np.abs(motion).max())
+    np.testing.assert_allclose([read.nodes[i] for i in model.assembly.ids], model.assembly.points)

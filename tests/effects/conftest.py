@@ -33,14 +33,14 @@ def installed(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def example_crack(tmp_path_factory):
+def example_edge_mass(tmp_path_factory):
     """The example package, installed: its one file and one entry point."""
     folder = tmp_path_factory.mktemp("site")
-    write_package(folder, "example-crack", {"crack": "crack:FAMILY"})
+    write_package(folder, "example-edge-mass", {"edge-mass": "edge_mass:FAMILY"})
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
-        patch.syspath_prepend(str(Path(__file__).parent / "example_crack"))
+        patch.syspath_prepend(str(Path(__file__).parent / "example_edge_mass"))
         registry._installed.cache_clear()
-        yield registry.family("crack")
+        yield registry.family("edge-mass")
     registry._installed.cache_clear()
-    sys.modules.pop("crack", None)
+    sys.modules.pop("edge_mass", None)

@@ -11,18 +11,22 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects import discretisation as mesh
 from chladni.effects import sensor_fault as sensors
+from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed
+from chladni.effects.local_resonator import LocalResonator
+from chladni.effects.mass_patch import MassPatch
 from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import channel_gain, ordinary, random_field
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
 from chladni.effects.shell_groups import shell_groups
+from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.surroundings import Setup, Surroundings
 from chladni.effects.suspension import suspension
-from chladni.effects.thickness_distribution import thickness_distribution
+from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import solved
 from chladni.geometry.refine import refined
@@ -38,7 +42,7 @@ CHANNELS = 4
 NAMES = ("family", 
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
-    "freed",
+    "freed", "local-resonator", "stiffness-patch", "mass-patch", "crack",
 )  # fmt: skip
 
 
@@ -64,6 +68,7 @@ def cases(reduced):
     setup = Setup(tuple(((g, 1.0),) for g in corners), (7, 63), float(groups.weight.sum()), TOP)
     where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
     k = reduced.grids.position(25)
+    line = LineFinder.of(reduced.structure.assembly).drawn(np.array([20]), (1.7,))[0]
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
     ortho = material_axes(where)[0]
     over = mesh.mesh_error(solved(reduced.structure, 2 * TOP), TOP)
@@ -85,9 +90,15 @@ def cases(reduced):
         "sensor-mass": (sensor_mass(where)[0], [-0.5], [-20]),
         "suspension": (suspension(where)[1], [-0.7], [-20]),
         "thickness-distribution": (
-            thickness_distribution(groups, 0, 9), local, [-40, *local[1:]],
+            ThicknessDistribution.on(groups, 0, 9), local, [-40, *local[1:]],
         ),
         "sensor-fault": (sensors.sensor_fault("7+Z", 1, CHANNELS, 1, 0.4), [0.4], [0]),
+        "local-resonator": (
+            LocalResonator.near(where, k), [0.2, 0.1, -0.1, 0.9], [-20, 0, 0, 5],
+        ),
+        "stiffness-patch": (StiffnessPatch.on(groups, 0, 9), [-0.6, *local[1:]], [-40, *local[1:]]),
+        "mass-patch": (MassPatch.on(groups, 0, 9), [0.4, *local[1:]], [-30, *local[1:]]),
+        "crack": (crack(groups, line, 9), [0.5], [-40]),
         "mesh-error": (over, [1.0], [0]),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
@@ -211,16 +222,20 @@ def test_modal_discrepancy_moves_every_mode_by_itself(cases):
     assert_allclose(np.sort(case.effect.lam * (1 + case.x)), state.lam[6 : 6 + n], rtol=1e-8)
 
 
-def test_weight_is_what_the_written_structure_weighs(cases, reduced):
-    for name in ("rho", "t", "point-mass", "extra-support", "orthotropic-material"):
-        case = cases[name]
-        system = structure(case.effect.apply(reduced.structure.assembly, case.x)).system
-        d = structure(reduced.structure.assembly).along(
-            reduced.structure.assembly.ids, np.tile([0, 0, 1.0], (63, 1))
-        )
-        rigid = d.T @ np.ones(63)
-        weight = evaluate(case.model, [case.effect], case.x, False).weight
-        assert_allclose(weight, rigid @ (system.M @ rigid), rtol=1e-9, err_msg=name)
+HEAVIER = (
+    "rho", "t", "point-mass", "extra-support", "orthotropic-material", "local-resonator",
+    "stiffness-patch", "mass-patch",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HEAVIER)
+def test_weight_is_what_the_written_structure_weighs(name, cases, reduced):
+    case = cases[name]
+    written = case.effect.apply(reduced.structure.assembly, case.x)
+    built, n = structure(written), len(written.ids)
+    rigid = built.along(written.ids, np.tile([0, 0, 1.0], (n, 1))).T @ np.ones(n)
+    weight = evaluate(case.model, [case.effect], case.x, False).weight
+    assert_allclose(weight, rigid @ (built.system.M @ rigid), rtol=1e-9)
 
 
 def test_pickles(case):

@@ -47,9 +47,9 @@ def test_unknown_names_are_told_the_known_ones():
         registry.unregister("point-mass")
 
 
-def test_an_installed_package_adds_its_family(example_crack):
-    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "crack")
-    assert example_crack.effect.__module__ == "crack"
+def test_an_installed_package_adds_its_family(example_edge_mass):
+    assert registry.names() == (*(f.name for f in registry.BUILT_IN), "edge-mass")
+    assert example_edge_mass.effect.__module__ == "edge_mass"
 
 
 FAULTS = {
@@ -74,7 +74,7 @@ def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, f
     assert "the package heavy-bolts offers the effect" in str(caught.value)
     assert "uninstall" in str(caught.value)
     assert "\n" not in str(caught.value)
-    done = CliRunner().invoke(application(), ["study", "--effects", "point-mass"])
+    done = CliRunner().invoke(application(), ["blind", "--effects", "point-mass"])
     assert done.exit_code == 2
     assert "heavy-bolts" in done.output
     assert "Traceback" not in done.output

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.effects.sheet_patch import surface
 from chladni.effects.shell_groups import shell_groups
-from chladni.effects.thickness_distribution import surface, thickness_distribution
+from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Shells
 from chladni_specimens.plates import folded_panel, plate
@@ -20,7 +21,7 @@ def panel():
 def test_a_fold_does_not_end_a_thinning(panel):
     """Begun beside the fold: shells of both parts grow thinner, by what their distance says."""
     group = int(np.argmin(((panel.centre - [0.3, 0.28, 0.0]) ** 2).sum(axis=1)))
-    effect = thickness_distribution(panel, group, 1)
+    effect = ThicknessDistribution.on(panel, group, 1)
     x = np.array([0.0, np.log(0.06 / effect.size), 0.0, 0.0])
     assembly = panel.structure.assembly
     changed = effect.apply(assembly, x).shells.thickness / assembly.shells.thickness
@@ -36,7 +37,7 @@ def test_sheets_that_share_no_grid_are_two():
     two = stacked(one, 1.5e-3)
     groups = shell_groups(structure(two))
     assert len(set(groups.connected.tolist())) == 2
-    effect = thickness_distribution(groups, 0, 2)
+    effect = ThicknessDistribution.on(groups, 0, 2)
     shells = two.shells
     changed = effect.apply(two, np.array([1.0, -1.0, 0.0, 0.0])).shells.thickness
     ratio = (changed / shells.thickness).min(axis=1)
@@ -82,7 +83,7 @@ def test_the_centre_stays_on_a_curved_sheet():
 def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     """Beyond the edge: the place is the sheet's nearest grid, the depth what is left there."""
     group = int(np.argmin(((panel.centre - [0.05, 0.15, 0.0]) ** 2).sum(axis=1)))
-    effect = thickness_distribution(panel, group, 1)
+    effect = ThicknessDistribution.on(panel, group, 1)
     away = (np.array([-0.1, 0.15, 0.0]) - effect.surface.origin) @ effect.surface.axes.T
     x = np.array([0.0, np.log(0.1 / effect.size), *(away / effect.size)])
     place = np.array(effect.location(x).point_m)
@@ -91,3 +92,11 @@ def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     thinnest = (effect.apply(assembly, x).shells.thickness / assembly.shells.thickness).min()
     assert abs(place[0]) < 1e-9
     assert depth == pytest.approx(1 - thinnest, rel=1e-9)
+
+
+def test_a_small_patch_between_grids_stays_where_it_is(panel):
+    """Of a radius below the mesh's the centre is on the sheet though no grid is near."""
+    group = int(np.argmin(((panel.centre - [0.3, 0.15, 0.0]) ** 2).sum(axis=1)))
+    effect = ThicknessDistribution.on(panel, group, 1)
+    x = np.array([0.0, np.log(0.003 / effect.size), 0.0, 0.0])
+    assert effect.location(x).point_m == pytest.approx(effect.at(x), abs=1e-12)

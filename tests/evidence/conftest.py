@@ -2,8 +2,8 @@
 
 import pytest
 
+from chladni_evidence.blind import line
 from chladni_evidence.score import confusion, scored, summary
-from chladni_evidence.study import line
 
 ROWS = pytest.StashKey()
 

@@ -1,6 +1,6 @@
 """Evidence in every run of the suite: one concealed effect is found, nothing is found in one null.
 
-Through :func:`chladni.diagnose` alone, on the study's own plate; seeds nobody tuned anything on.
+Through :func:`chladni.diagnose` alone, on the plate of the blind run; seeds nobody tuned on.
 """
 
 import json
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import chladni
+from chladni_evidence.blind import Blind
 from chladni_evidence.concealed import SPECIMENS, made, write
-from chladni_evidence.study import Blind
 
 SEED = 40
 
@@ -49,16 +49,16 @@ def test_nothing_is_found_where_nothing_is_missing(tmp_path, evidence):
     assert evidence(found, truth)["right"]
 
 
-def test_the_study_asks_the_same_function(monkeypatch, tmp_path):
-    """What a study scores is what :func:`chladni.diagnose` answers."""
-    from chladni_evidence import study
+def test_the_blind_run_asks_the_same_function(monkeypatch, tmp_path):
+    """What a blind run scores is what :func:`chladni.diagnose` answers."""
+    from chladni_evidence import blind
 
     asked = []
     answer = chladni.workflows.diagnosis_result.DiagnosisResult(verdict="nothing missing")
-    assert study.diagnose is chladni.diagnose
-    monkeypatch.setattr(study, "diagnose", lambda case: asked.append(case) or answer)
-    rows = study.study(study.blinds(tmp_path, [SEED], ["nothing"], ["plate"]))
+    assert blind.diagnose is chladni.diagnose
+    monkeypatch.setattr(blind, "diagnose", lambda case: asked.append(case) or answer)
+    rows = blind.answered_rows(blind.blinds(tmp_path, [SEED], ["nothing"], ["plate"]))
     assert len(asked) == 1
     assert [r["called"] for r in rows] == ["nothing missing"]
     with pytest.raises(chladni.errors.LabelError, match="point-mass"):
-        study.blinds(tmp_path, [SEED], ["teapot"])
+        blind.blinds(tmp_path, [SEED], ["teapot"])

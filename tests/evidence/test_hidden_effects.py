@@ -8,8 +8,15 @@ from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.footing import Spots, footing
 from chladni_evidence.hidden import Hidden, Site, with_lumps
-from chladni_evidence.hidden_kinds import CATALOGUED, calibration, orthotropic, thinning
-from chladni_evidence.outside_kinds import crack, duplicated, foam, friction, resonator, rotor
+from chladni_evidence.hidden_kinds import (
+    CATALOGUED,
+    calibration,
+    crack,
+    local_resonator,
+    orthotropic,
+    thinning,
+)
+from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.part_scatter import WELDS, scattered
 from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
 from chladni_specimens.forms import FORMS
@@ -75,7 +82,7 @@ def test_a_resonator_on_a_rigid_spring_is_a_mass(site):
 
 def test_a_resonator_is_felt_where_it_is_tuned(site):
     """Its dynamic stiffness is that of its mass far below its frequency, and turns sign above."""
-    hidden = resonator(site, np.random.default_rng(1), 1.0)
+    hidden = local_resonator(site, np.random.default_rng(1), 1.0)
     D, f = hidden.couplings[0].stiffness, hidden.truth["frequency_hz"]
     low, high = 2j * np.pi * np.array([f / 50, 3 * f])
     m = hidden.truth["value"]

@@ -10,7 +10,7 @@ from chladni.effects.ordinary import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
 from chladni.effects.surroundings import Setup, Surroundings
-from chladni.effects.thickness_distribution import thickness_distribution
+from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy, products
 from chladni.updating.reduced_model import evaluate
@@ -39,7 +39,7 @@ def changes(reduced):
         "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
         "thinner": (ordinary(groups, "t", [1]), np.array([-0.2])),
         "stiffer": (ordinary(groups, "E", [0]), np.array([0.5])),
-        "thinning": (thickness_distribution(groups, 0, 1), start),
+        "thinning": (ThicknessDistribution.on(groups, 0, 1), start),
         "mass": (PointMass.near(where, k), np.array([1.0, 0.2, 0.1])),
         "masses": (sensor_mass(where)[0], np.array([0.5])),
         "spring": (ExtraSupport.near(where, k), np.array([2.0, 0.1, 0.2, 0.0, 0.0])),

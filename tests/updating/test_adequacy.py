@@ -71,7 +71,7 @@ def test_without_errors_of_form_there_is_nothing_to_test(reduced, seen):
 def modes(*hertz):
     lam = (2 * np.pi * np.array(hertz)) ** 2
     n, none = len(lam), np.zeros(0)
-    return State(lam, np.eye(n), none, none, 0.0, none, None, None)
+    return State(lam, np.eye(n), np.zeros((0, n)), none, none, 0.0, none, None, None)
 
 
 def listed(**changed):

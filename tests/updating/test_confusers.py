@@ -4,16 +4,23 @@ from types import SimpleNamespace
 
 import pytest
 
+from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.registry import families
-from chladni.updating.confusers import TIED, with_confusers
+from chladni.updating.confusers import with_confusers
 from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.ties import TIED, simplest_first
+
+
+def tried(name, S, becomes=""):
+    effect = SimpleNamespace(name=name, becomes=lambda x: becomes)
+    return SimpleNamespace(
+        neg2_log_evidence=S, effect=effect, fit=SimpleNamespace(of=lambda e: None)
+    )
 
 
 def found(*evidence, verdict="missing physics"):
-    hypotheses = tuple(
-        SimpleNamespace(neg2_log_evidence=S, effect=SimpleNamespace(name=name))
-        for name, S in zip(("point-mass", "sensor-mass", "suspension"), evidence, strict=True)
-    )
+    names = ("point-mass", "sensor-mass", "suspension")
+    hypotheses = tuple(tried(name, S) for name, S in zip(names, evidence, strict=True))
     return with_confusers(Diagnosis(None, None, None, hypotheses, verdict))
 
 
@@ -36,3 +43,26 @@ def test_where_nothing_is_named_nothing_is_tied():
 
 def test_every_family_says_what_would_settle_it():
     assert all(f.settled_by for f in families() if f.effect.__module__.startswith("chladni."))
+
+
+def test_what_has_become_the_named_effect_is_no_rival():
+    hypotheses = tried("point-mass", 0.0), tried("local-resonator", 2.0, "point-mass")
+    answer = with_confusers(Diagnosis(None, None, None, hypotheses, "missing physics"))
+    assert answer.one_of == ()
+
+
+def test_a_leader_that_has_become_a_simpler_effect_lets_it_lead():
+    lump, mass = tried("local-resonator", 0.0, "point-mass"), tried("point-mass", TIED - 1)
+    assert simplest_first([lump, mass]) == [mass, lump]
+    far = tried("point-mass", TIED + 1)
+    assert simplest_first([lump, far]) == [lump, far]
+    own = tried("local-resonator", 0.0)
+    assert simplest_first([own, mass]) == [own, mass]
+    assert simplest_first([]) == []
+
+
+def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
+    high = SimpleNamespace(value=lambda x: x, scale=100.0)
+    effect = SimpleNamespace(parameters=(None, None, None, high))
+    assert LocalResonator.becomes(effect, [0, 0, 0, 301.0]) == "point-mass"
+    assert LocalResonator.becomes(effect, [0, 0, 0, 299.0]) == ""

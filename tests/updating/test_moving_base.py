@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
 from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.ordinary import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.points import AtPoints, MassEffect
@@ -126,6 +127,7 @@ def test_slopes(reduced, data):
     effects = [
         *(ordinary(reduced.groups, q, [0]) for q in ("E", "rho", "t")), density,
         PointMass.near(where, int(inside[3])), ExtraSupport.near(where, int(inside[-2])),
+        LocalResonator.near(where, int(inside[5])),
     ]  # fmt: skip
     x = np.full(count(effects), 0.1)
     x[:8] = 0.03, -0.02, 0.01, 0.05, 0.2, 0.1, -0.2, -1.0
@@ -140,6 +142,23 @@ def test_slopes(reduced, data):
     for k, e in enumerate(h * np.eye(len(x))):
         slope = (8 * (r(x + e) - r(x - e)) - (r(x + 2 * e) - r(x - 2 * e))) / (12 * h)
         assert_allclose(J[:, k], slope, atol=1e-5 * np.abs(J[:, k]).max() + 1e-9)
+
+
+def test_the_base_carries_a_lump_on_a_spring_as_the_mass_it_is(reduced, data):
+    """Tuned far above the band it answers as a point mass, to (f / f_lump)² over the damping."""
+    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, Setup((), (), 1.2, TOP))
+    k = int(np.argmax(reduced.grids.point[:, 0]))
+    lump, mass = LocalResonator.near(where, k), PointMass.near(where, k)
+    model, m, high = reduced.model_for(mass, np.zeros(3)), 0.06, 60.0
+    ln = [np.log(m / e.parameters[0].scale) for e in (lump, mass)]
+    x = np.array([ln[0], 0.1, -0.1, np.log(high * TOP / lump.parameters[3].scale)])
+    seen = data.over(model)
+    got, due = (
+        seen.model(evaluate(model, [e], v, False))
+        for e, v in ((lump, x), (mass, np.array([ln[1], 0.1, -0.1])))
+    )
+    assert np.abs(got - due).max() < high**-2 / ZETA * np.abs(due).max()
+    assert np.abs(due - seen.model(evaluate(model, [], x[:0], False))).max() > 0.1
 
 
 @pytest.mark.parametrize("matrix", ["M", "K"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect
+from chladni.errors import ModelError
 from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
 
@@ -67,3 +68,20 @@ def test_is_widened_until_it_serves(monkeypatch):
     assert len(fits) == 2
     assert done.worst == 2e-4
     assert done.distrust == ()
+
+
+def test_a_basis_that_bears_the_fit_no_longer_is_said_and_not_trusted(monkeypatch):
+    """What the narrow basis could not feel may be negative stiffness: no crash, no trust."""
+    found = Accuracy(np.array([10.0]), np.array([2e-2]), np.zeros((3, 1)))
+    monkeypatch.setattr(renewal, "_accuracy", lambda *given: found)
+    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
+
+    def refuse(*given):
+        raise ModelError("an effect left negative stiffness")
+
+    monkeypatch.setattr(renewal, "fitted", refuse)
+    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+    done = renewal.renewed(None, prepared, a_hypothesis())
+    assert done.hypothesis.model == "narrow"
+    assert "negative stiffness" in done.note
+    assert done.distrust

@@ -1,17 +1,24 @@
 """Scans give at once what one evaluation after the other gives."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from chladni.effects.effect import Parameter
+from chladni.effects.effect import Parameter, PointTerm
 from chladni.effects.ordinary import ordinary
 from chladni.effects.points import AtPoints
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.scan import baseline, direction_scores, field_slopes, point_scores
+from chladni.updating.scan import (
+    baseline,
+    direction_scores,
+    field_slopes,
+    oscillator_scores,
+    point_scores,
+)
 
 WEIGHED = MassMeasurement(1.45, 0.01)
 STRENGTHS = {"M": np.array([0.003, 0.04, 0.3]), "K": np.array([30.0, 2e3, 1e5])}
@@ -27,6 +34,20 @@ class Weight(AtPoints):
         return m, np.array([m])
 
 
+@dataclass(frozen=True, eq=False)
+class Lump(Weight):
+    """A mass on a spring along one direction, seen by the scales."""
+
+    own_dofs = 1
+    hertz: float = 0.0
+
+    def terms(self, x):
+        m, one = np.array([self.parameters[0].value(x[0])]), np.array([[1.0]])
+        nowhere = sp.csr_array(self.rows.shape)
+        spring = PointTerm("K", self.rows, m * (2 * np.pi * self.hertz) ** 2, one, own=-one)
+        return spring, PointTerm("M", nowhere, m, one, own=one)
+
+
 @pytest.fixture(scope="module")
 def base(reduced, responses):
     effects = [ordinary(reduced.groups, q, [0]) for q in ("E", "rho")]
@@ -37,9 +58,14 @@ def directly(base, model, data, places, k, matrix, strength):
     """Score of the same thing as an effect in the reduced model."""
     kind = Weight if matrix == "M" else AtPoints
     one = kind((Parameter("c", "-", 0.0, 1.0, strength),), rows=places.rows[[k]])
-    state = evaluate(model, [*base.effects, one], np.append(base.x, 0.0), False)
+    return base.score(residuals(base, model, data, one))[0]
+
+
+def residuals(base, model, data, effect):
+    """Residuals of the base and an effect of one strength, as a column."""
+    state = evaluate(model, [*base.effects, effect], np.append(base.x, 0.0), False)
     r, _ = data.over(model).residual(state, False)
-    return base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
+    return replace(base, state=state).with_mass(r[:, None], 0.0)
 
 
 @pytest.mark.parametrize("matrix", ["M", "K"])
@@ -53,6 +79,20 @@ def test_low_rank_reanalysis_is_the_evaluation(reduced, responses, base, matrix)
         for k in range(len(places))
     ]
     assert_allclose(scores, expected, rtol=1e-6)
+
+
+def test_secant_to_a_lump_on_a_spring_passes_through_its_evaluation(reduced, responses, base):
+    """The best amount is no worse than the effect itself of the mass the secant was drawn to."""
+    places = reduced.candidates.only(np.array([4, 31]))
+    hertz, mass, rest = np.array([60.0, 130.0]), 0.02, np.zeros(2)
+    amount, score = oscillator_scores(base, reduced.model, responses, places, mass, hertz, rest)
+    for k in range(len(places)):
+        for j, f in enumerate(hertz):
+            lump = Lump((Parameter("M", "kg", 0.0, 1.0, mass),), rows=places.rows[[k]], hertz=f)
+            r = residuals(base, reduced.model, responses, lump)
+            assert base.score(r)[0] >= score[k, j] * (1 - 1e-9)
+            along = base.residual[:, None] + amount[k, j] / mass * (r - base.residual[:, None])
+            assert_allclose(base.score(along)[0], score[k, j], rtol=1e-6)
 
 
 def test_residual_flexibility_stands_for_the_attachment(reduced, responses, base):

@@ -8,7 +8,7 @@ import pytest
 
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary, random_field
-from chladni.effects.thickness_distribution import thickness_distribution
+from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
@@ -21,7 +21,7 @@ from chladni.updating.reduced_model import evaluate
 
 @pytest.fixture(scope="module")
 def hypothesis(reduced, responses):
-    effect = thickness_distribution(reduced.groups, 0, 1)
+    effect = ThicknessDistribution.on(reduced.groups, 0, 1)
     effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05), effect]
     start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
     data = responses.over(reduced.model)

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import plots
+from chladni.view import plots, study_plots
 
 F = np.linspace(10, 200, 400)
 H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))
@@ -51,12 +51,28 @@ PLOTS = {  # name: the drawing, and words that must stand on it
         lambda p: plots.deviation_map(p, np.eye(2), ["1:+Z", "2:+Z"], ["0-50", "50-100"]),
         ("1:+Z", "50-100", "Q"),
     ),
+    "slope_map": (
+        lambda p: study_plots.slope_map(p, np.eye(2), ["f1", "f2"], ["t", "E"], "slopes"),
+        ("f1", "E", "slopes", "1.00"),
+    ),
+    "parallel_coordinates": (
+        lambda p: study_plots.parallel_coordinates(
+            p, {"t [m]": F, "Q": 1 / F, "one": 0 * F}, "Q", ["t [m]"]
+        ),
+        ("t [m]", "Q", "one", "200"),
+    ),
+    "response_plots": (
+        lambda p: study_plots.response_plots(
+            p, {"Q": F, "f1": 2 * F}, {"t [m]": F, "E [Pa]": F}, {"Q": 90.0}, ["t [m]"]
+        ),
+        ("Q", "f1", "t [m]", "E [Pa]"),
+    ),
 }  # fmt: skip
 
 
 def test_every_plot_is_drawn_here():
-    own = {name for name, f in vars(plots).items()
-           if inspect.isfunction(f) and f.__module__ == plots.__name__}  # fmt: skip
+    own = {name for module in (plots, study_plots) for name, f in vars(module).items()
+           if inspect.isfunction(f) and f.__module__ == module.__name__}  # fmt: skip
     assert {name for name in own if not name.startswith("_")} == PLOTS.keys()
 
 
@@ -73,9 +89,10 @@ def test_every_plot_says_what_it_shows(tmp_path, name, monkeypatch):
     """Labels with units, names of curves and of rows."""
     saved = []
     save = plots.save
-    monkeypatch.setattr(
-        plots, "save", lambda figure, path: saved.append(figure) or save(figure, path)
-    )
+    for module in (plots, study_plots):
+        monkeypatch.setattr(
+            module, "save", lambda figure, path: saved.append(figure) or save(figure, path)
+        )
     draw, words = PLOTS[name]
     draw(tmp_path / "plot.png")
     said = [text.get_text() for text in saved[0].findobj(Text) if text.get_visible()]
@@ -89,6 +106,8 @@ def test_vector_graphics_by_suffix(tmp_path):
 def test_labels_must_fit_the_matrix(tmp_path):
     with pytest.raises(ShapeError, match="MAC"):
         plots.mac_matrix(tmp_path / "x.png", np.eye(3), "ab", "abc")
+    with pytest.raises(ShapeError, match="labels"):
+        study_plots.slope_map(tmp_path / "x.png", np.eye(3), "ab", "abc", "")
 
 
 def test_phase_is_drawn_without_vertical_lines():

@@ -27,7 +27,7 @@ _OF_LUMPS = {"springs": "K", "bushes": "K", "masses": "M"}
 _WORDS = {"springs": "a spring", "bushes": "a bush", "masses": "a mass"}
 
 
-def free_parameter(section: TomlSection, made: Assembly, deck: Deck) -> FreeParameter:
+def free_parameter(section: TomlSection, made: Assembly, deck: Deck | None) -> FreeParameter:
     """One [[parameter]], resolved.
 
     Raises
@@ -178,14 +178,15 @@ def _elements(deck: Deck, kind: str, id: int) -> list[int]:
 def _all_that_have(
     section: TomlSection, made: Assembly, field: str, what: str
 ) -> tuple[list[int], dict[str, list[int]]]:
-    """Every part, spring, bush or mass that has the field."""
+    """Every part, spring, bush or mass that has the field, and not as zero."""
     if what == "adhesive-stiffness":
         solids = [p.name for p in made.parts if isinstance(p.section, SolidSection)]
         raise FileError(
             f"{section.at('field')} = {what!r} needs the parts that are adhesive; "
             f"solids here are {', '.join(solids) or 'none'}"
         )
-    positions = [k for k, p in enumerate(made.parts) if field in fields_of(p)]
+    with_field = [k for k, p in enumerate(made.parts) if field in fields_of(p)]
+    positions = [k for k in with_field if _value(made.parts[k], field) != 0]
     lumps = {
         family: list(range(len(getattr(made, family))))
         for family, name in _OF_LUMPS.items()

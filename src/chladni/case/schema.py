@@ -11,21 +11,14 @@ from typing import get_args
 from ..dynamics.frf import Quantity
 from ..units import UNITS
 
-COMMANDS = (
-    "test",
-    "identify",
-    "correlate",
-    "calibrate",
-    "diagnose",
-    "frf",
-    "modes",
-    "render",
-    "plan",
-)
+COMMANDS = ("test", "identify", "correlate", "calibrate", "diagnose",
+            "frf", "modes", "render", "plan", "study")  # fmt: skip
 _FIT = ("calibrate", "diagnose")
 _TEST = ("correlate", *_FIT)
-_FRF = ("frf", *_TEST)
+_SCORE = ("study", *_TEST)  # what Q is taken by
+_FRF = ("frf", *_SCORE)
 _READ = ("test", "identify", *_FRF)
+_VARIED = ("study", *_FIT)
 
 
 @dataclass(frozen=True)
@@ -57,9 +50,9 @@ ALIASES = {  # effects that are an ordinary number by another name
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
 PLANNED = (  # names of the public contract that no model stands behind yet
-    *("stiffness-patch", "membrane-prestress", "viscoelastic-joint", "hem-contact"),
+    *("membrane-prestress", "viscoelastic-joint", "hem-contact"),
     *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),
-    *("joint-friction", "mass-patch", "local-resonator", "shaker-restraint", "compliant-support"),
+    *("joint-friction", "shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 
@@ -82,7 +75,7 @@ SCHEMA = (
     Key("test", "quantity", "word", "", "what the file says", "What the FRFs are.",
         '"accelerance"', _READ, get_args(Quantity)),
     Key("test", "gain", "word", "", "known",
-        "Unknown: one real factor common to all channels is free.", '"unknown"', _TEST,
+        "Unknown: one real factor common to all channels is free.", '"unknown"', _SCORE,
         ("known", "unknown")),
     Key("test", "factor", "number, not 0", "", "1",
         "What the FRFs are multiplied by: 9.80665 where g were taken for m/s².", "9.80665", _READ),
@@ -114,28 +107,29 @@ SCHEMA = (
     Key("recording", "mass", "number", "kg", "not weighed in this state",
         "Weighed mass in this state.", "1.95", _FIT),
     Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
-        "Band that is identified and fitted.", "[26.0, 195.0]", ("identify", *_TEST)),
+        "Band that is identified, scored and fitted.", "[26.0, 195.0]", ("identify", *_SCORE)),
     Key("band", "exclude", "list of [low, high]", "Hz", "none",
-        "Bands within it that are left out.", "[[23.0, 27.5]]", ("identify", *_TEST)),
+        "Bands within it that are left out.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
     Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
         "Outputs no fit may see.", '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
         "Band no fit may see.", "[200.0, 300.0]", _FIT),
     Key("parameter", "name", "text", "", "the field", "What the page calls it.", '"E steel"',
-        _FIT),
+        _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",
         "Names or property ids of parts; of joints and masses the card: `PBUSH 7`, `PELAS 3`, "
-        "`CELAS2 12`, `CONM2 5`.", '["inner", "outer upper"]', _FIT),
+        "`CELAS2 12`, `CONM2 5`.", '["inner", "outer upper"]', _VARIED),
     Key("parameter", "field", "word", "", "needed",
         "The number that is free, one factor for all its parts; or an effect's name, where it "
-        "acts being known.", '"E"', _FIT, FREEABLE),
+        "acts being known.", '"E"', _VARIED, FREEABLE),
     Key("parameter", "sd", "number, 0.001 to 2", "of the deck's value",
         "0.06 (E, rho), 0.05 (t), 0.1 (nu), 0.3 (others)",
-        "Tolerance: standard deviation of the prior of ln(value / deck's value).", "0.03", _FIT),
+        "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` goes two "
+        "of them far where `low` or `high` is missing.", "0.03", _VARIED),
     Key("parameter", "low", "number below 1", "of the deck's value", "none",
-        "Bound: the value stays above low times the deck's.", "0.8", _FIT),
+        "Bound: the value stays above low times the deck's.", "0.8", _VARIED),
     Key("parameter", "high", "number above 1", "of the deck's value", "none",
-        "Bound: the value stays below high times the deck's.", "1.25", _FIT),
+        "Bound: the value stays below high times the deck's.", "1.25", _VARIED),
 )  # fmt: skip
 
 COLUMNS = (

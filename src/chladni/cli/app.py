@@ -11,6 +11,8 @@ from ..errors import AccuracyError, ChladniError
 
 COMMANDS = (  # each a module here with a function ``run``
     "diagnose",
+    "init",
+    "check",
     "demo",
     "calibrate",
     "correlate",
@@ -20,8 +22,9 @@ COMMANDS = (  # each a module here with a function ``run``
     "frf",
     "render",
     "plan",
-    "specimen",
     "study",
+    "specimen",
+    "blind",
     "report",
 )
 DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
@@ -57,8 +60,9 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
         except OSError as error:
             name = f"{error.filename}: " if error.filename else ""
             code = _said(f"{name}{error.strerror or error}", AT_FAULT)
-        except KeyboardInterrupt:
-            code = _said("interrupted; nothing was written", INTERRUPTED)
+        except KeyboardInterrupt as error:
+            said = str(error) or "interrupted; nothing was written"
+            code = _said(said, INTERRUPTED)
         raise typer.Exit(code or DONE)
 
     return inner
@@ -71,7 +75,7 @@ def _said(error: object, code: int) -> int:
 
 def _tell(wanted: bool) -> None:
     if wanted:
-        from ..report.page import own_version
+        from ..output import own_version
 
         typer.echo(f"chladni {own_version()}")
         raise typer.Exit(DONE)

@@ -7,13 +7,22 @@ import numpy as np
 import typer
 
 from ..case import Case, load_case
-from ..dynamics.frf import UNIT, Quantity
-from ..errors import LabelError
-from ..io.tables.write_tables import write_npz
+from ..dynamics.frf import FRF, UNIT, Quantity
+from ..errors import FileError, LabelError
+from ..io.tables.write_tables import write_csv, write_npz
+from ..io.uff.write_uff import write_uff
 from ..progress import within
+from ..report.response_page import response_json, response_page
 from ..workflows.frf import frf
-from ..workflows.loaded_model import DeckModels, Model, is_case, load_deck, load_model
-from .run import Allow, Out, Units, limits, started
+from ..workflows.loaded_model import (
+    DeckModels,
+    Model,
+    as_model,
+    is_case,
+    load_deck,
+    load_model,
+)
+from .run import Allow, Out, Run, Units, limits, started
 
 
 def run(
@@ -38,8 +47,6 @@ def run(
 
     Without --input those the deck asks for, or of a case those its first recording holds.
     """
-    from ..report.response_page import response_page
-
     low, high = limits(band)
     per_force = [name for name in UNIT if name != "transmissibility"]
     if quantity not in per_force:
@@ -54,9 +61,31 @@ def run(
         for k, one in enumerate(found.frfs):
             if one.quantity != "transmissibility":
                 one = one.to(cast(Quantity, quantity))
-            name = f"frf_{k + 1}.npz" if k else "frf.npz"
-            write_npz(job.keep(name, "the responses as arrays"), one)
+            stem = f"frf_{k + 1}" if k else "frf"
+            _written(job, stem, one, given)
             job.show(response_page(job.folder, one))
+
+
+def _written(job: Run, stem: str, one: FRF, given: Case | Model | DeckModels) -> None:
+    """The responses in every format that can hold them."""
+    write_npz(job.keep(f"{stem}.npz", "the responses as arrays"), one)
+    write_csv(job.keep(f"{stem}.csv", "the same as a table"), one)
+    model = as_model(given)
+    what = "channels, peaks and levels"
+    job.json(f"{stem}.json", response_json(one, bool(model.unit)), what)
+    if not model.unit:
+        job.notes.append("A universal file of the responses needs the unit system (--units).")
+        return
+    nodes = dict(zip(model.assembly.ids.tolist(), model.assembly.points, strict=True))
+    named = [text.partition(":")[0] for text in (*one.outputs, *one.inputs)]
+    places = {int(n): nodes[int(n)] for n in named if n.isdecimal() and int(n) in nodes}
+    path = job.folder / f"{stem}.uff"
+    try:
+        write_uff(path, one, places, title=job.source.name)
+    except FileError as error:
+        job.notes.append(f"No universal file was written: {error}.")
+        return
+    job.files.append((path.name, "the same as a universal file (dataset 58)"))
 
 
 def _source(

@@ -90,7 +90,7 @@ class Run:
 @contextmanager
 def started(command: str, source: Path | str, out: Path | None) -> Iterator[Run]:
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
-    place = out or Path("runs") / f"{command}-{_name(Path(source))}"
+    place = place_of(command, Path(source), out)
     with run_folder(place) as folder:
         with terminal() as progress:
             run = Run(command, Path(source), folder, progress)
@@ -99,6 +99,11 @@ def started(command: str, source: Path | str, out: Path | None) -> Iterator[Run]
             run.page()
     page = place / "report.html"
     typer.echo(f"results in {page if page.exists() else place}")
+
+
+def place_of(command: str, source: Path, out: Path | None) -> Path:
+    """Where a run writes: --out, else a folder of its own in ./runs."""
+    return out or Path("runs") / f"{command}-{_name(source)}"
 
 
 def opened(source: Path) -> Case:

@@ -1,39 +1,120 @@
-"""``chladni study``: cases with an effect concealed, all of them, and the confusion matrix."""
+"""``chladni study``: parameters of a model sampled, on this machine or on a cluster."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
-from ..output import write_json, write_text
-from .run import Out
+from ..case import Case, load_case
+from ..dynamics.frf import Quantity
+from ..errors import AccuracyError, FileError
+from ..progress import Progress, silent, terminal
+from ..report.result_json import to_json
+from ..studies.parameter_study import ParameterStudy, study
+from ..studies.study_settings import StudySettings
+from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
+from .run import Allow, Out, Units, limits, place_of, started
 
 
 def run(
-    seeds: Annotated[str, typer.Option(help="First and last seed, as 100-109.")] = "100-101",
-    effects: Annotated[str, typer.Option(help="Names, with commas; all where empty.")] = "",
-    structures: Annotated[str, typer.Option(help="plate, panel.")] = "plate,panel",
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help='A number and its range, as "t of inner=0.6:0.8" in the deck\'s own units, '
+            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log" (repeatable); '
+            "without any the [[parameter]] of the case."
+        ),
+    ] = None,
+    samples: Annotated[int, typer.Option(help="How many samples, at most.")] = 100,
+    sampler: Annotated[
+        str,
+        typer.Option(
+            help="sobol, lhs, grid, oat (one at a time), saltelli (Sobol' indices), morris."
+        ),
+    ] = "sobol",
+    seed: Annotated[int, typer.Option(help="Seed of the samplers that draw.")] = 0,
+    modes: Annotated[int, typer.Option(help="Elastic modes that are followed.")] = 10,
+    input: Annotated[
+        list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
+    ] = None,
+    output: Annotated[
+        list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
+    ] = None,
+    band: Annotated[str, typer.Option(help="Of these responses, in Hz.")] = "1:200",
+    lines: Annotated[int, typer.Option(help="How many frequencies.")] = 400,
+    damping: Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)] = 0.01,
+    quantity: Annotated[
+        str, typer.Option(help="receptance, mobility or accelerance.")
+    ] = "accelerance",
+    frf: Annotated[bool, typer.Option("--frf", help="Keep every sample's responses.")] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Local processes; else one per core, or this one for a short study."),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, as tcp://host:8786.")
+    ] = None,
+    units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
-    from chladni_evidence.evidence_sets import seed_range
-    from chladni_evidence.score import Row, confusion, summary
-    from chladni_evidence.study import blinds, line, study
+    """Sample parameters: frequencies, mass, responses and Q of every sample, and what moves them.
 
-    place, rows = out or Path("runs") / "study", []
-    cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
+    A study that was stopped goes on with the same command. Every finished sample is a line of
+    samples.jsonl in --out.
+    """
+    settings = StudySettings(
+        samples, sampler, seed, modes, tuple(output or ()), tuple(input or ()), limits(band),
+        lines, damping, cast(Quantity, quantity), frf,
+    )  # fmt: skip
+    if frf and not (input or is_case(source)):
+        raise FileError("--frf needs --input and --output, or a case with FRFs")
+    place = place_of("study", source, out)
+    model = _source(source, units, allow or [])
+    with terminal() as bar:
+        progress = bar if bar is not silent else _tenths()
+        found = study(
+            model, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
+            progress=progress,
+        )  # fmt: skip
+    _written(source, place, found)
 
-    def told(row: Row) -> None:
-        rows.append(row)
-        typer.echo(line(row))
-        write_json(place / "study.json", rows)
 
-    study(cases, workers, told)
-    text = f"{confusion(rows)}\n\n{summary(rows)}"
-    write_text(place / "confusion.txt", text + "\n")
-    typer.echo(text)
+def _source(source: Path, units: str | None, allow: list[str]) -> Case | DeckModels:
+    if not source.exists():
+        raise FileError(f"no file or folder {source}{beside(source)}")
+    return load_case(source) if is_case(source) else load_deck(source, units, allow)
 
 
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
+def _written(source: Path, place: Path, found: ParameterStudy) -> None:
+    """The page, the tables and study.json beside the samples."""
+    from ..report.study_page import study_page
+    from ..studies.study_tables import write_csv, write_netcdf
+
+    with started("study", source, place) as job:
+        job.json("study.json", to_json(found))
+        write_csv(job.keep("samples.csv", "one line per sample"), found)
+        job.notes += write_netcdf(job.keep("study.nc", "all of it, for xarray"), found)
+        job.files.append(("samples.jsonl", "the samples as they were finished"))
+        job.progress("pictures", 0.5)
+        job.show(study_page(job.folder, found))
+    if 2 * len(found.failed) > len(found.rows):
+        number, why = found.failed[0]
+        raise AccuracyError(
+            f"{len(found.failed)} of {len(found.rows)} samples failed, the first of them, "
+            f"{number}: {why}"
+        )
+
+
+def _tenths() -> Progress:
+    """One line per tenth of the samples, where there is no terminal to draw a bar on."""
+    said = {-1}
+
+    def told(what: str, share: float) -> None:
+        tenth = int(10 * share)
+        if tenth not in said and 0 < share <= 1:
+            said.add(tenth)
+            typer.echo(what)
+
+    return told

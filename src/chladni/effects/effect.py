@@ -5,7 +5,8 @@ An effect acts in four ways, and in no other:
 - it multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells.  Multiplying calibrated operators, never subtracting nominal
   ones, keeps every stiffness positive whatever the other parameters do;
-- it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass);
+- it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass), and of
+  degrees of freedom it brings along (a lump on a spring);
 - it adds *operators* c(p) A, A what a part other than a sheet has in K or M already, c > -1;
 - it changes *channels* of the test: gain, sign.
 
@@ -77,7 +78,9 @@ class FieldChange:
 class PointTerm:
     """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters).
 
-    Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it.
+    Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it. Of an
+    effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that
+    moves carries them as it does the rows ``carrier`` of the structure.
     """
 
     matrix: Literal["K", "M"]
@@ -85,6 +88,8 @@ class PointTerm:
     coefficient: np.ndarray
     gradient: np.ndarray
     moving: dict[int, sp.csr_array] = field(default_factory=dict)
+    own: np.ndarray | None = None
+    carrier: sp.csr_array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +129,7 @@ class Effect:
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
     writable: ClassVar[bool] = True  # whether a deck could hold it
     remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
+    own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()
     text: str = ""
@@ -193,6 +199,10 @@ class Effect:
     def location(self, x: np.ndarray) -> Location:
         """Where it is once it has been fitted."""
         return self.where()
+
+    def becomes(self, x: np.ndarray) -> str:
+        """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
+        return ""
 
     def starts(self) -> list[np.ndarray]:
         """Points from which a fit begins: every combination of its parameters' starts."""

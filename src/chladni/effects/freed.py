@@ -21,7 +21,7 @@ from ..model.properties import Isotropic, Part, ShellSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
-from .ordinary import SPREAD, ordinary, scaled, value
+from .ordinary import SPREAD, ordinary, scaled, value, with_sheets
 from .shell_groups import ShellGroups
 
 UNITS = {
@@ -127,7 +127,7 @@ def freed(groups: ShellGroups, free: FreeParameter) -> Freed:
         members.append(ordinary(groups, free.field, plain))
     members += [_of_part(built, k, free.field) for k in free.positions if k not in plain]
     members += [_of_lumps(built, family, rows) for family, rows in _lumps(free) if rows]
-    values = _values(built.assembly, free)
+    values = values_of(built.assembly, free)
     alike = len(values) > 0 and np.ptp(values) <= SAME * abs(values[0])
     scale, unit = (values[0], UNITS[free.field]) if alike else (1.0, "of the deck's")
     sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
@@ -248,8 +248,24 @@ class LumpWriter:
         return replace(assembly, **{self.family: replace(members, **{column: values})})
 
 
-def _values(assembly: Assembly, free: FreeParameter) -> np.ndarray:
-    """The deck's values of what shares the factor."""
+def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assembly:
+    """The assembly with the number times a factor, everywhere it stands, nothing linearised."""
+    parts, whole = assembly.parts, free.field in ("E", "rho", "t")
+    shells = [k for k in free.positions if isinstance(parts[k].section, ShellSection)]
+    sheets = shells if whole else []
+    if sheets:
+        assembly = with_sheets(assembly, free.field, sheets, factor)
+    for k in free.positions:
+        if k not in sheets:
+            assembly = PartWriter(k, free.field)(assembly, factor)
+    for family, rows in _lumps(free):
+        if rows:
+            assembly = LumpWriter(family, rows)(assembly, factor)
+    return assembly
+
+
+def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:
+    """The deck's values of what shares the factor (n,), springs' and bushes' in any order."""
     out = [number(assembly.parts[k], free.field) for k in free.positions]
     out += [float(assembly.springs.value[r]) for r in free.springs]
     stiff = assembly.bushes.stiffness[list(free.bushes)]

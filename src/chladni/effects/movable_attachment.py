@@ -69,7 +69,7 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class MovableAttachment(Effect):
-    """x = (ln strength, place along both axes of the patch in units of its size)."""
+    """x = (ln strength, place along both axes of the patch in units of its size, what else)."""
 
     patch: Patch | None = None
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))

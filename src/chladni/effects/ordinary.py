@@ -34,16 +34,7 @@ class PartScale(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The deck with the value changed in these parts."""
-        factor = float(np.exp(x[0]))
-        parts = list(assembly.parts)
-        for k in self.positions:
-            parts[k] = scaled(parts[k], self.quantity, factor)
-        assembly = assembly.with_parts(tuple(parts))
-        if self.quantity != "t":
-            return assembly
-        chosen = np.isin(assembly.shells.part, self.positions)[:, None]
-        t = assembly.shells.thickness * np.where(chosen, factor, 1.0)
-        return replace(assembly, shells=replace(assembly.shells, thickness=t))
+        return with_sheets(assembly, self.quantity, self.positions, float(np.exp(x[0])))
 
 
 def ordinary(
@@ -97,6 +88,21 @@ def value(part: Part, quantity: str) -> float:
     if isinstance(material, Orthotropic):
         return float(np.sqrt(material.E1 * material.E2))
     return float(np.sqrt(material.Q[0, 0] * material.Q[1, 1])) if material is not None else 0.0
+
+
+def with_sheets(
+    assembly: Assembly, quantity: str, positions: Sequence[int], factor: float
+) -> Assembly:
+    """The assembly with E, rho or t of these shell parts times a factor."""
+    parts = list(assembly.parts)
+    for k in positions:
+        parts[k] = scaled(parts[k], quantity, factor)
+    assembly = assembly.with_parts(tuple(parts))
+    if quantity != "t":
+        return assembly
+    chosen = np.isin(assembly.shells.part, positions)[:, None]
+    t = assembly.shells.thickness * np.where(chosen, factor, 1.0)
+    return replace(assembly, shells=replace(assembly.shells, thickness=t))
 
 
 def scaled(part: Part, quantity: str, factor: float) -> Part:

@@ -3,7 +3,7 @@
 A package adds a family by an entry point, with nothing of chladni touched::
 
     [project.entry-points."chladni.effects"]
-    crack = "my_package.crack:FAMILY"
+    edge-mass = "my_package.edge_mass:FAMILY"
 """
 
 from functools import cache
@@ -11,11 +11,15 @@ from importlib.metadata import EntryPoint, entry_points
 
 from ..errors import ExtensionError, LabelError
 from . import (
+    crack,
     extra_support,
+    local_resonator,
+    mass_patch,
     orthotropic_material,
     point_mass,
     sensor_fault,
     sensor_mass,
+    stiffness_patch,
     suspension,
     thickness_distribution,
 )
@@ -30,6 +34,10 @@ BUILT_IN = (
     suspension.FAMILY,
     thickness_distribution.FAMILY,
     sensor_fault.FAMILY,
+    local_resonator.FAMILY,
+    stiffness_patch.FAMILY,
+    mass_patch.FAMILY,
+    crack.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -41,8 +41,26 @@ class ResponseScan(Protocol):
         ``places`` are those of :class:`Surroundings` unless others are given.
         """
 
-    def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
+    def oscillator_scores(
+        self, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz).
+
+        ``mass`` is a typical one, ``hertz`` the frequencies of the lump on the spring alone.
+        """
+
+    def field_scores(
+        self, about: int, field: str, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+
+        The amount is in units of what the set has; the responses are taken as linear in it.
+        """
 
 
 class SearchContext(Protocol):

@@ -10,6 +10,7 @@ from .blocks import Facts, PageParts, Picture, Section, Table
 from .words import number
 
 _SHOWN = 12  # modes in the picture
+_NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
 
 
 def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
@@ -20,6 +21,7 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
     modal = found.modal
     motion, f = model.motion(modal.shapes), modal.frequency
     write_vtu(folder / "modes.vtu", model.assembly, motion, f)
+    other, notes = _universal(folder, model, motion, f)
     elastic = np.flatnonzero(~found.rigid)
     shown = elastic[:_SHOWN] if len(elastic) else np.arange(min(_SHOWN, len(modal)))
     numbers = [int(k) + 1 for k in shown]
@@ -30,9 +32,27 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
         f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
         f"its mass is {number(found.mass)} {kg}."
     )
-    files = [("modes.vtu", "shapes for ParaView"), ("modes.png", "the first elastic modes")]
+    files = [("modes.vtu", "shapes for ParaView"), *other]
+    files.append(("modes.png", "the first elastic modes"))
     sections = [Section("Mode shapes", [shapes]), Section("Modes", _tables(found, kg))]
-    return PageParts(lead, sections, found.notes, files)
+    return PageParts(lead, sections, (*found.notes, *notes), files)
+
+
+def _universal(
+    folder: Path, model: Model, motion: np.ndarray, f: np.ndarray
+) -> tuple[list[tuple[str, str]], list[str]]:
+    """``modes.unv`` as (file, what it is), and notes; none of a deck whose units are not known."""
+    from ..io.uff.write_shapes import write_shapes
+
+    if not model.unit:
+        return [], ["A universal file of the shapes needs the unit system (--units)."]
+    made = model.assembly
+    step = -(-len(made.ids) // _NODES)
+    at = slice(None, None, step)
+    name = model.source.name
+    write_shapes(folder / "modes.unv", f, motion[at], made.ids[at], made.points[at], title=name)
+    notes = [f"modes.unv holds every {step}th grid of {len(made.ids)}."] if step > 1 else []
+    return [("modes.unv", "shapes as a universal file (dataset 55)")], notes
 
 
 def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:

@@ -6,11 +6,11 @@ Everything that came from a deck or a recording is text to the page: Jinja escap
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from urllib.parse import quote
 
-from ..output import write_text
+from ..output import own_version, write_text
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Picture, Section
 from .verdict import HEADING, TONE, sections, sentence
@@ -88,11 +88,3 @@ def made_with() -> str:
     tools = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     today = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return f"chladni {own_version()}, Python {platform.python_version()}, {tools}; {today}"
-
-
-def own_version() -> str:
-    """Version of this package, where it is installed."""
-    try:
-        return version("chladni")
-    except PackageNotFoundError:
-        return "(not installed)"

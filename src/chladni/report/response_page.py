@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ def response_page(folder: Path, found: FRF) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
     from ..view import plots
 
-    unit = (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
+    unit = _unit(found)
     peak = np.abs(found.values).max(axis=0)
     at = found.frequency[np.abs(found.values).argmax(axis=0)]
     count = max(1, _SHOWN // len(found.inputs))
@@ -46,6 +47,38 @@ def response_page(folder: Path, found: FRF) -> PageParts:
     lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
     table = Table(heads, rows, ("output", "input"))
     return PageParts(lead, [Section("Responses", [*pictures, table])], notes, files)
+
+
+def _unit(found: FRF) -> str:
+    """Of the values; under a deck's own loads they are motion, not motion per unit force."""
+    return (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
+
+
+def response_json(found: FRF, in_si: bool) -> dict[str, Any]:
+    """``frf.json``: what the arrays hold, and of every channel its level and its peak.
+
+    Of a bare deck without a unit system no unit is claimed.
+    """
+    size = np.abs(found.values)
+    return {
+        "quantity": found.quantity,
+        "unit": _unit(found) if in_si else None,
+        "outputs": found.outputs,
+        "inputs": found.inputs,
+        "band_hz": [found.frequency[0], found.frequency[-1]],
+        "lines": len(found.frequency),
+        "channels": [
+            {
+                "output": output,
+                "input": input,
+                "rms": np.sqrt((size[:, i, j] ** 2).mean()),
+                "peak": size[:, i, j].max(),
+                "peak_hz": found.frequency[size[:, i, j].argmax()],
+            }
+            for j, input in enumerate(found.inputs)
+            for i, output in enumerate(found.outputs)
+        ],
+    }
 
 
 def _name(output: str, drive: str) -> str:

@@ -4,14 +4,18 @@ from functools import singledispatch
 from typing import Any
 
 from ..planning import Plan, summary
+from ..studies.parameter_study import ParameterStudy
+from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
+from .check_page import check_json
 from .diagnosis_json import diagnosis_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
+from .study_page import study_json
 
 
 @singledispatch
@@ -28,6 +32,16 @@ def _(result: DiagnosisResult) -> dict[str, Any]:
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
     return plan_json(summary(result))
+
+
+@to_json.register
+def _(result: ParameterStudy) -> dict[str, Any]:
+    return study_json(result)
+
+
+@to_json.register
+def _(result: CaseCheck) -> dict[str, Any]:
+    return check_json(result)
 
 
 @to_json.register

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect
+from .effect_dofs import own_part, own_positions
 from .reduced_model import Reduced, State, evaluate, log_fields, mass_log, slices, stiffness_log
 from .reduced_problem import ReducedProblem
 
@@ -69,9 +70,9 @@ def accuracy(
     state = evaluate(model, effects, x, gradient=False)
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
     at = np.flatnonzero((f > RIGID * f_max) & (f <= f_max))
-    q = model.basis @ state.phi[:, at]
-    Kq, Mq = products(model, effects, x, q)
-    missing = np.asarray(reduced.factor.solve(Kq - state.lam[at] * Mq))
+    Kq, Mq = products(model, effects, x, _modes(model, state)[:, at])
+    force = (Kq - state.lam[at] * Mq)[: len(model.basis)]  # what effects bring lacks nothing
+    missing = np.asarray(reduced.factor.solve(force))
     better = _improved(model, effects, x, state, missing)[at]
     return Accuracy(f[at], np.maximum(np.sqrt(state.lam[at] / better) - 1, 0.0), missing)
 
@@ -82,10 +83,10 @@ def _improved(
     """λ of Rayleigh-Ritz on the basis and what it lacks, in increasing order."""
     M = model.groups.structure.system.M
     both = orthonormal(M, [model.basis, missing], kept=model.basis.shape[1])
-    Z = both[:, model.basis.shape[1] :]
+    Z = np.pad(both[:, model.basis.shape[1] :], ((0, len(state.own)), (0, 0)))
     if not Z.shape[1]:
         return state.lam
-    modes = model.basis @ state.phi
+    modes = _modes(model, state)
     KZ, MZ = products(model, effects, x, Z)
     K, B = np.diag(state.lam), np.eye(len(state.lam))
     K, B = (
@@ -95,12 +96,19 @@ def _improved(
     return sl.eigh((K + K.T) / 2, (B + B.T) / 2, eigvals_only=True)
 
 
+def _modes(model: Reduced, state: State) -> np.ndarray:
+    """Modes at all dofs of the structure, below them those that effects bring (n + n_own, m)."""
+    return np.concatenate([model.basis @ state.phi, state.own])
+
+
 def products(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """K(x) q and M(x) q (n, k) on the full operators, never assembled."""
+    """K(x) q and M(x) q (n + n_own, k) on the full operators, never assembled."""
     system, groups = model.groups.structure.system, model.groups
-    K, M = system.K.real @ q, system.M @ q
+    n = len(model.basis)
+    n_own, u = len(q) - n, q[:n]
+    K, M = system.K.real @ u, system.M @ u
     logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces().items():
@@ -108,14 +116,16 @@ def products(
             np.expm1(stiffness_log(logs, name, power)) * A
             for A, power in zip(pair, (1, 3), strict=True)
         )
-    K = K + _spread(model, np.asarray(change), q)
-    M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, q)
-    for effect, at in slices(effects):
+    K = K + _spread(model, np.asarray(change), u)
+    M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, u)
+    K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
+    for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            added = term.rows.T @ (term.coefficient[:, None] * (term.rows @ q))
+            b = sp.hstack([term.rows, sp.csr_array(own_part(term, first, n_own))], format="csr")
+            added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
         for part in effect.matrices(x[at]):
-            added = part.coefficient * (part.operator @ q)
+            added = np.pad(part.coefficient * (part.operator @ u), ((0, n_own), (0, 0)))
             K, M = (K + added, M) if part.matrix == "K" else (K, M + added)
     return K, M
 

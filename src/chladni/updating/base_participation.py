@@ -45,11 +45,18 @@ def participation(shells: ShellGroups, basis: np.ndarray, motion: BaseMotion) ->
 class Participating:
     """l(x) and ∂l/∂x (n_p, r, k) while the effects of a state are gone through."""
 
-    def __init__(self, base: BaseParticipation, weight: np.ndarray, slopes: np.ndarray) -> None:
-        """Of the shells: factors on the mass of each group (g,) and their gradients (g, n_p)."""
-        self.motion = base.motion
-        self.value = base.rest + np.einsum("g,grk->rk", weight, base.groups)
-        self.slope = np.einsum("gp,grk->prk", slopes, base.groups, optimize=True)
+    def __init__(
+        self, base: BaseParticipation, weight: np.ndarray, slopes: np.ndarray, n_own: int
+    ) -> None:
+        """Of the shells: factors on the mass of each group (g,) and their gradients (g, n_p).
+
+        ``n_own`` degrees of freedom that effects bring stand below those of the basis.
+        """
+        self.motion, self.n_own = base.motion, n_own
+        value = base.rest + np.einsum("g,grk->rk", weight, base.groups)
+        self.value = np.pad(value, ((0, n_own), (0, 0)))
+        slope = np.einsum("gp,grk->prk", slopes, base.groups, optimize=True)
+        self.slope = np.pad(slope, ((0, 0), (0, n_own), (0, 0)))
 
     def add_points(
         self, term: PointTerm, b: np.ndarray, moved: dict[int, np.ndarray], at: slice
@@ -57,7 +64,7 @@ class Participating:
         """Masses c at rows b (k, r) of the basis, ``moved`` = ∂b/∂x of what moves them."""
         if term.matrix != "M":
             return
-        along = term.rows @ self.motion.free
+        along = (term.rows if term.carrier is None else term.carrier) @ self.motion.free
         self.value = self.value + (b.T * term.coefficient) @ along
         self.slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, along, optimize=True)
         for p, db in moved.items():
@@ -69,7 +76,7 @@ class Participating:
         """A part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
-        l = basis.T @ (part.operator @ self.motion.free)
+        l = np.pad(basis.T @ (part.operator @ self.motion.free), ((0, self.n_own), (0, 0)))
         self.value = self.value + part.coefficient * l
         self.slope[at] += part.gradient[:, None, None] * l
 

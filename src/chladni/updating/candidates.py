@@ -15,7 +15,15 @@ from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
 from .reduced_model import evaluate
-from .scan import Baseline, baseline, direction_scores, field_slopes, point_scores
+from .scan import (
+    Baseline,
+    baseline,
+    bending_slopes,
+    direction_scores,
+    field_slopes,
+    oscillator_scores,
+    point_scores,
+)
 
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
@@ -132,11 +140,29 @@ class Scan:
         base = self.context.baselines[about]
         return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
 
-    def thickness_scores(self, about: int, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of each change of ln t (n_groups, k), and the score with it: (k,), (k,)."""
+    def oscillator_scores(
+        self, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
+        reduced, base = self.context.problem.reduced, self.context.baselines[about]
+        rest = reduced.flexibility(places)
+        return oscillator_scores(base, reduced.model, self.data, places, mass, hertz, rest)
+
+    def field_scores(
+        self, about: int, field: str, change: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of each change of ln t, E or rho (n_groups, k), and the score: (k,), (k,)."""
         base = self.context.baselines[about]
-        slopes = field_slopes(base, self.context.problem.reduced.model, self.data, "t")
+        slopes = field_slopes(base, self.context.problem.reduced.model, self.data, field)
         return direction_scores(base, slopes @ change)
+
+    def bending_scores(
+        self, about: int, sets: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,)."""
+        base = self.context.baselines[about]
+        slopes = bending_slopes(base, self.context.problem.reduced.model, self.data, sets)
+        return direction_scores(base, slopes)
 
 
 def _prior(effect: Effect, x: np.ndarray) -> float:

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 from ..effects.registry import family
 from .diagnosis import Diagnosis
-
-TIED = 10.0  # in -2 ln evidence, e^5: odds up to which two explanations are one answer
+from .ties import TIED
 
 
 def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
@@ -16,6 +15,7 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     behind = {
         t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
         for t in diagnosis.hypotheses
+        if t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
     }
     names = tuple(name for name, gap in behind.items() if 2 * gap < TIED)
     if len(names) < 2:

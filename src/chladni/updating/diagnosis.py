@@ -24,6 +24,7 @@ from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
 from .reduced_model import evaluate
+from .ties import simplest_first
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
 FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
@@ -98,7 +99,7 @@ def diagnose(
     progress("closing in on the place", 0.7)
     hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
     closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
-    hypotheses = _by_family([*hypotheses, *closer])
+    hypotheses = simplest_first(_by_family([*hypotheses, *closer]))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)

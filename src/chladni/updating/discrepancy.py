@@ -67,7 +67,7 @@ class Form:
 
     Attributes
     ----------
-    rows : (k, r)      of Φ⁻¹, the reference modes that take part
+    rows : (k, m)      of Φ⁻¹, the reference modes that take part
     lam : (k,)         their ω² [rad²/s²]
     G : (2, k, k)      relative change of modal stiffness and mass
     """
@@ -103,7 +103,7 @@ def form(state: State, f_max: float) -> Form:
     omega = np.sqrt(np.maximum(state.lam, 0))
     modes = np.flatnonzero((omega > RIGID * f_max) & (omega < REACH * f_max))
     k = len(modes)
-    return Form(np.linalg.inv(state.phi)[modes], state.lam[modes], np.zeros((2, k, k)))
+    return Form(np.linalg.inv(state.vectors)[modes], state.lam[modes], np.zeros((2, k, k)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +182,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     i, j = about.pairs.T
     phi_o, phi_i, d = data.modal(state)
     H, sd = data.model(state), data.std()
-    T = about.rows @ state.phi
+    T = about.rows @ state.vectors
     a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
     a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)
     a_o = a_o * (data.s**data.power)[:, None]

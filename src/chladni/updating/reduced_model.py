@@ -21,6 +21,7 @@ from ..errors import ModelError
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
+from .effect_dofs import own_part, own_positions, row, with_own
 from .matrix_stack import Bordered, MatrixStack, Whole
 
 
@@ -135,9 +136,10 @@ class State:
 
     Attributes
     ----------
-    lam : (r,)             ω² [rad²/s²]
-    phi : (r, r)           eigenvectors in the basis
-    dK, dM : (n_p, r, r)   derivatives in *modal* coordinates φᵀ(∂K)φ, where asked for
+    lam : (m,)             ω² [rad²/s²]; m = r and the degrees of freedom that effects bring
+    phi : (r, m)           eigenvectors in the basis
+    own : (m - r, m)       eigenvectors at the degrees of freedom of effects
+    dK, dM : (n_p, m, m)   derivatives in *modal* coordinates φᵀ(∂K)φ, where asked for
     weight, dweight        mass on the scales [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
@@ -145,6 +147,7 @@ class State:
 
     lam: np.ndarray
     phi: np.ndarray
+    own: np.ndarray
     dK: np.ndarray
     dM: np.ndarray
     weight: float
@@ -153,6 +156,11 @@ class State:
     doffset: np.ndarray | None
     drive: np.ndarray | None = None
     ddrive: np.ndarray | None = None
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """Eigenvectors at all degrees of freedom, those of effects last (m, m)."""
+        return np.concatenate([self.phi, self.own])
 
 
 def evaluate(
@@ -167,18 +175,22 @@ def evaluate(
     """
     n_p = count(effects)
     logs, slopes = log_fields(model, effects, x)
-    K, M, dK, dM = _shells(model, logs, slopes, gradient)
+    r, n_own = len(model.K0), sum(effect.own_dofs for effect in effects)
+    K, M, dK, dM = (with_own(A, n_own) for A in _shells(model, logs, slopes, gradient))
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
-    base = _participating(model, logs, slopes)
-    for effect, at in slices(effects):
+    base = _participating(model, logs, slopes, n_own)
+    for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            b = model.rows(term.rows, keep=not term.moving)
+            b = row(model.rows(term.rows, keep=not term.moving), own_part(term, first, n_own))
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
             target += (b.T * term.coefficient) @ b
             moving = term.moving if gradient else {}
-            moved = {p: model.rows(rows, keep=False) for p, rows in moving.items()}
+            moved = {
+                p: np.pad(model.rows(rows, keep=False), ((0, 0), (0, n_own)))
+                for p, rows in moving.items()
+            }
             if base is not None:
                 base.add_points(term, b, moved, at)
             if gradient:
@@ -187,7 +199,7 @@ def evaluate(
                     half = (b.T * term.coefficient) @ db
                     slope[at.start + p] += half + half.T
         for part in effect.matrices(x[at]):
-            A = model.operator(part.operator)
+            A = with_own(model.operator(part.operator), n_own)
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
             target += part.coefficient * A
             if base is not None:
@@ -205,17 +217,19 @@ def evaluate(
     if gradient:
         dK, dM = phi.T @ dK @ phi, phi.T @ dM @ phi
     drive, ddrive = (None, None) if base is None else base.loads(phi)
-    return State(lam, phi, dK, dM, weight, dweight, offset, doffset, drive, ddrive)
+    return State(
+        lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive
+    )  # fmt: skip
 
 
 def _participating(
-    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray]
+    model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], n_own: int
 ) -> Participating | None:
     """What the base does to the shells as these fields have them; None where it does not move."""
     if model.base is None:
         return None
     w = np.exp(mass_log(logs))
-    return Participating(model.base, w, w[:, None] * mass_log(slopes))
+    return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
 
 
 FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves

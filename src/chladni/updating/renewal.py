@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import ModelError
 from ..fem.modelled import modelled
 from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
@@ -62,7 +63,11 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
             break
         model, begun = found.renewed(hypothesis.model), hypothesis.fit
         data = hypothesis.data.over(model)
-        fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+        try:
+            fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+        except ModelError as error:  # what the coarse basis could not feel
+            note = f"{note}; with what it lacked added to its basis it could not be fitted: {error}"
+            break
         hypothesis = HypothesisFit(hypothesis.effect, fit, model)
         found = _accuracy(problem, hypothesis)
         note = f"{note}; with what it lacked added to its basis, {found.worst:.2%}"

@@ -1,13 +1,14 @@
 """Every place at once: exact low-rank re-analysis, ordinary parameters profiled out linearly.
 
-The receptance of the structure with a spring or mass D(s) at b is G_of - G_ob (1/D + G_bb)⁻¹ G_bf;
+The receptance of the structure with a dynamic stiffness D(s) at b (a spring k, a mass m s², a lump
+on a spring m s² ω²/(ω² + s²)) is G_of - G_ob (1/D + G_bb)⁻¹ G_bf;
 G_bb carries the residual flexibility of what the basis leaves out.  Ordinary parameters, scatter
 and the errors of the model's form are marginalised: C = I + W Wᵀ with W the slopes times the prior
 deviations (Woodbury).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,24 +81,84 @@ def point_scores(
     strengths : [kg] or [N/m]
     residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
     """
-    state = base.state
-    phi_o, phi_i, d = data.modal(state)
-    phi_b = model.rows(places.rows) @ state.phi
-    H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
-    G_ob = np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True)
-    G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
-    G_bb = (phi_b**2) @ d.T + residual_flexibility[:, None]
-    if matrix == "M" and model.base is not None:  # a mass feels the motion of the base as well
-        carried = places.rows @ model.base.motion.free
-        G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
+    at = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
     out = np.empty((len(places), len(strengths)))
     for k, c in enumerate(strengths):
-        D = c * data.s**2 if matrix == "M" else c + 0 * data.s
-        share = D / (1 + D * G_bb)
-        new = H[None] - G_ob[..., None] * (share[:, :, None, None] * G_bi[:, :, None, :])
-        added = c if matrix == "M" else 0.0
-        out[:, k] = base.score(base.with_mass(_residuals(data, state, new), added))
+        D, added = (c * data.s**2, c) if matrix == "M" else (c + 0 * data.s, 0.0)
+        out[:, k] = base.score(at.residuals(D, added))
     return out
+
+
+def oscillator_scores(
+    base: Baseline, model: Reduced, data: Responses, places: ShellGrids, mass: float,
+    hertz: np.ndarray, residual_flexibility: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Best mass of a lump on a spring at each place, and the score with it (n_places, n_hertz).
+
+    The responses are taken as linear in the mass along the secant from none to ``mass`` [kg].
+
+    Parameters
+    ----------
+    hertz : (k,)                    frequencies of the lump on the spring alone
+    residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
+    """
+    at = reanalysis(base, model, data, places, residual_flexibility, True)
+    amount, score = np.empty((2, len(places), len(hertz)))
+    for k, omega2 in enumerate((2 * np.pi * hertz) ** 2):
+        D = mass * data.s**2 * omega2 / (omega2 + data.s**2)
+        secant = at.residuals(D, mass) - base.residual[:, None]
+        amount[:, k], score[:, k] = direction_scores(base, secant)
+    return mass * amount, score
+
+
+@dataclass(frozen=True, eq=False)
+class Reanalysis:
+    """What the responses of a state become with something at one of many places.
+
+    Attributes
+    ----------
+    H : (n_f, n_out, n_in)                     receptances of the state
+    G_ob, G_bi : (n_places, n_f, n_out or n_in)  from the places to outputs, from inputs to them
+    G_bb : (n_places, n_f)                     of the places themselves
+    """
+
+    base: Baseline
+    data: Responses
+    H: np.ndarray
+    G_ob: np.ndarray
+    G_bi: np.ndarray
+    G_bb: np.ndarray
+
+    def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
+        """Residuals (n, n_places) with the dynamic stiffness D (n_f,), ``added`` kg weighed."""
+        share = D / (1 + D * self.G_bb)
+        change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
+        r = _residuals(self.data, self.base.state, self.H[None] - change)
+        return self.base.with_mass(r, added)
+
+
+def reanalysis(
+    base: Baseline, model: Reduced, data: Responses, places: ShellGrids,
+    residual_flexibility: np.ndarray, massive: bool,
+) -> Reanalysis:  # fmt: skip
+    """Receptances between the places, the outputs and the inputs.
+
+    What is ``massive`` feels the motion of a base as well, a spring that of the structure alone.
+    """
+    phi_o, phi_i, d = data.modal(base.state)
+    phi_b = model.rows(places.rows) @ base.state.phi
+    G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
+    if massive and model.base is not None:
+        carried = places.rows @ model.base.motion.free
+        G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
+    return Reanalysis(
+        base,
+        data,
+        np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True),
+        np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True),
+        G_bi,
+        (phi_b**2) @ d.T + residual_flexibility[:, None],
+    )
 
 
 def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
@@ -133,6 +194,30 @@ def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.n
     if base.mass_measurement is not None:
         J = np.concatenate([J, state.dweight[None] / base.mass_measurement.sd])
     return J[:, -n:]
+
+
+AT_ONCE = 64  # slopes of so many changes are in memory at a time
+
+
+def bending_slopes(
+    base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
+) -> np.ndarray:
+    """∂r/∂a of a B added to K, B the bending stiffness of each set of shells (n, n_sets)."""
+    groups, r = model.groups, len(base.state.lam)
+    U = groups.structure.T @ (model.basis @ base.state.phi)
+    dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
+    out = [np.zeros((len(base.residual), 0))]
+    for k in range(0, len(sets), AT_ONCE):
+        chunk = sets[k : k + AT_ONCE]
+        dK = np.empty((len(chunk), r, r))
+        for j, shells in enumerate(chunk):
+            V = U[dofs[shells]]
+            dK[j] = V.reshape(-1, r).T @ (groups.cubic[shells] @ V).reshape(-1, r)
+        state = replace(base.state, dK=dK, dM=np.zeros_like(dK), doffset=None)
+        J = data.scaled(state, True)[1]
+        rest = len(base.residual) - len(J)  # what the scales say does not change
+        out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
+    return np.concatenate(out, axis=1)
 
 
 def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

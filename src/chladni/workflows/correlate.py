@@ -16,6 +16,7 @@ from ..ema.mode_pairing import ModePairs, pair
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
+from .axes_check import measured_shapes, refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .output_only import with_natural_frequencies
@@ -84,14 +85,15 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
-    phi, psi = case.outputs.rows(model.structure) @ near.shapes, _shapes(found)
+    refuse_turned_axes(case, found, model)
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, measured_shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)
     by_dof = None
     if M is not None and len(pairs):
         by_dof = comac(phi[:, pairs.model], psi[:, pairs.test])
     progress("responses", 0.6)
-    responses, q, notes = _scored(case, model, test)
+    responses, q, notes = scored(case, model, test)
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
@@ -121,16 +123,7 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
                        notes=tuple(case.said("correlate")))  # fmt: skip
 
 
-def _shapes(found: Identified) -> np.ndarray:
-    """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
-    if not found.order:
-        return np.zeros((len(found.outputs), 0))
-    size = np.linalg.norm(found.residues, axis=1)
-    best = size.argmax(axis=1)
-    return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)
-
-
-def _scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
+def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
     """Responses of the model, Q over the lines that count, and how it was taken."""
     use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
     low, high = test.frequency[use][[0, -1]]

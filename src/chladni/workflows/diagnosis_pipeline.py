@@ -45,6 +45,7 @@ from ..updating.renewal import renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
 from ..updating.written_scores import noise_Q, written_Q
+from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
 from .question_of_case import question
@@ -98,6 +99,8 @@ def explained(
         if alone is None or not alone.faults:
             raise
         raise RecordingAtFault(alone) from None
+    if prepared.identified is not None:
+        refuse_turned_axes(case, prepared.identified, prepared.nominal)
     screening = screened_prepared(case, prepared)
     if diagnosing and screening is not None and unmendable(screening):
         raise RecordingAtFault(screening)

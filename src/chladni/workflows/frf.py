@@ -82,28 +82,42 @@ def _between(
     damping: float, progress: Progress,
 ) -> FrequencyResponses:  # fmt: skip
     """Receptance by modes up to ``REACH`` times the band and the static rest of the others."""
-    bases = [text for text in inputs if text.startswith("base:")]
-    if bases and len(inputs) > 1:
-        raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
+    refuse_unknown(model, outputs, inputs)
     progress("modes", 0.2)
-    known = [] if bases else [model.directions(side) for side in (outputs, inputs)]
     made = model.solved(REACH * float(frequency[-1]))
     progress("residual of higher modes", 0.6)
+    found = superposed(model, made, outputs, inputs, frequency, damping)
     note = (
         f"{len(made.modes)} modes up to {made.band:.4g} Hz were superposed with damping ratio "
         f"{damping:.4g}; what higher modes contribute was added as a static residual."
     )
-    if bases:
-        found = _from_base(made, outputs, inputs, frequency, damping)
-        return FrequencyResponses((found,), (note,))
+    return FrequencyResponses((found,), (note,))
+
+
+def refuse_unknown(model: Model, outputs: Sequence[str], inputs: Sequence[str]) -> None:
+    """Refuse ends the model does not have, and a moving base beside other inputs."""
+    bases = [text for text in inputs if text.startswith("base:")]
+    if bases and len(inputs) > 1:
+        raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
+    for side in (outputs,) if bases else (outputs, inputs):
+        model.directions(side)
+
+
+def superposed(
+    model: Model, made: Modelled, outputs: Sequence[str], inputs: Sequence[str],
+    frequency: np.ndarray, damping: float,
+) -> FRF:  # fmt: skip
+    """Receptance of solved modes, up to ``REACH`` times the band, and the static rest of others."""
+    if inputs[0].startswith("base:"):
+        return _from_base(made, outputs, inputs, frequency, damping)
     s, modal = made.structure, made.modes.with_damping(damping)
-    pick, load = (side.T.toarray() for side in known)
+    pick, load = (model.directions(side).T.toarray() for side in (outputs, inputs))
     shift = residual_shift(modal, frequency[-1])
     rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
-    return FrequencyResponses((FRF(H, frequency, tuple(outputs), tuple(inputs)),), (note,))
+    return FRF(H, frequency, tuple(outputs), tuple(inputs))
 
 
 def _from_base(

@@ -36,6 +36,8 @@ class Model:
     unit: str = "m"  # of length; "" where a bare deck came without its unit system
     notes: tuple[str, ...] = ()  # what of the deck was left out
     length: float = 1.0  # the deck's own unit of length [m]
+    units: Units | None = None  # the deck's own
+    deck: "Deck | None" = None  # it was read from
 
     @cached_property
     def structure(self) -> Structure:
@@ -127,7 +129,7 @@ class DeckModels:
 
         made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
         unit, length = ("", 1.0) if self.units is None else ("m", self.units.length)
-        return Model(self.source, made, unit, tuple(notes), length)
+        return Model(self.source, made, unit, tuple(notes), length, self.units, self.deck)
 
 
 def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Model:
@@ -137,7 +139,8 @@ def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Mod
     if isinstance(source, DeckModels):
         return source.model()
     notes = tuple(source.said(command))
-    return Model(source.path, source.assembly, notes=notes, length=source.units.length)
+    units = source.units
+    return Model(source.path, source.assembly, "m", notes, units.length, units, source.deck)
 
 
 def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:

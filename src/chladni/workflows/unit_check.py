@@ -1,4 +1,4 @@
-"""A deck whose mass is far from the weighed one was read in the wrong unit system."""
+"""A deck far from the weighed mass, or of no known material, was read in the wrong unit system."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ from ..case import Case
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
-from ..model.properties import Isotropic, Material, Section, ShellSection
 from ..units import UNITS, Units
+from .unit_guess import guessed_units, material_of, modulus_of
 
 FAR = 5.0  # times the weighed mass: no effect, no forgotten trim explains more
 STIFF, HEAVY = (1e6, 2e12), (10.0, 3e4)  # E [Pa] of rubber to diamond, rho [kg/m³] of foam to gold
@@ -16,21 +16,43 @@ STIFF, HEAVY = (1e6, 2e12), (10.0, 3e4)  # E [Pa] of rubber to diamond, rho [kg/
 def refuse_other_units(case: Case) -> None:
     """Refuse a deck that weighs ``FAR`` times more or less than the article on the scales.
 
+    So is one whose materials are known ones in another unit system, and in no way in its own.
+
     Raises
     ------
     FileError
         Naming the unit systems in which the deck would weigh right, and be of a usual material.
     """
+    _refuse_by_mass(case)
+    _refuse_by_material(case)
+
+
+def _refuse_by_material(case: Case) -> None:
+    try:
+        guess = guessed_units(case.assembly, case.deck.path.name, case.units)
+    except FileError:  # nothing to tell by, which is no fault of the user's word
+        return
+    if guess.sure and guess.units.name != case.units.name:
+        raise FileError(
+            f'{case.path}: set units = "{guess.units.name}" in [model], not {case.units.name}: '
+            f"{guess.why}"
+        )
+
+
+def _refuse_by_mass(case: Case) -> None:
     weighed, mass = case.setup.mass, mass_properties(case.assembly)[0]
     if weighed is None or mass <= 0 or 1 / FAR <= mass / weighed <= FAR:
         return
     fits = [u.name for u in UNITS.values() if _fits(case.assembly, case.units, u, mass, weighed)]
-    advice = (
-        f'set units = "{fits[0]}" in [model], in which it weighs '
-        f"{mass * UNITS[fits[0]].mass / case.units.mass:.4g} kg"
-        if fits
-        else "in no unit system it weighs right; look at its densities and at [test] mass"
-    )
+    if fits:
+        advice = (
+            f'set units = "{fits[0]}" in [model], in which it weighs '
+            f"{mass * UNITS[fits[0]].mass / case.units.mass:.4g} kg"
+        )
+    elif 1 / FAR <= 1e3 * mass / weighed <= FAR:
+        advice = f"[test] mass is in kg: write {weighed / 1e3:.4g} if {weighed:.4g} g were weighed"
+    else:
+        advice = "in no unit system it weighs right; look at its densities and at [test] mass"
     raise FileError(
         f"{case.path}: {case.deck.path.name} read in {case.units.name} weighs {mass:.4g} kg, the "
         f"article {weighed:.4g} kg: {advice}"
@@ -41,21 +63,10 @@ def _fits(made: Assembly, said: Units, other: Units, mass: float, weighed: float
     """Whether the deck's numbers make sense in another system: its mass, and usual materials."""
     if not 1 / FAR <= mass * other.mass / said.mass / weighed <= FAR:
         return False
-    materials = [m for part in made.parts if (m := _material(part.section)) is not None]
-    E = np.array([_modulus(m) for m in materials]) * other.stress / said.stress
+    materials = [m for part in made.parts if (m := material_of(part.section)) is not None]
+    E = np.array([modulus_of(m) for m in materials]) * other.stress / said.stress
     rho = np.array([m.rho for m in materials]) * other.density / said.density
     return _usual(E, STIFF) and _usual(rho, HEAVY)
-
-
-def _material(section: Section) -> Material | None:
-    if isinstance(section, ShellSection):
-        return section.membrane or section.bending
-    return getattr(section, "material", None)
-
-
-def _modulus(material: Material) -> float:
-    """E, or E1 of the plane stiffness (1 - nu² aside) [Pa]."""
-    return material.E if isinstance(material, Isotropic) else float(material.plane_stress()[0, 0])
 
 
 def _usual(values: np.ndarray, limits: tuple[float, float]) -> bool:

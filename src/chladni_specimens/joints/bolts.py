@@ -12,6 +12,7 @@ from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
 from chladni.geometry.facets import tangents
 from chladni.geometry.nearest import ShellChoice, ShellSurface
+from chladni.model.added_points import with_points
 from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
 from chladni.model.properties import BeamSection, Isotropic
 
@@ -27,7 +28,6 @@ from .builders import (
     next_id,
     tied,
     with_part,
-    with_points,
 )
 
 _ALL = (1, 2, 3, 4, 5, 6)

@@ -14,6 +14,7 @@ import numpy as np
 from chladni.errors import ModelError
 from chladni.geometry.facets import tangents
 from chladni.geometry.nearest import Feet, ShellChoice, ShellSurface, nearest_parts
+from chladni.model.added_points import with_points
 from chladni.model.assembly import Assembly, Average, Solids
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
 
@@ -55,24 +56,6 @@ def next_id(assembly: Assembly) -> int:
     scalars = (a.springs.ids, a.dampers.ids, a.scalar_masses.ids, a.bushes.ids, a.masses.ids)
     used = [int(ids.max()) for ids in (*shells, *scalars) if len(ids)]
     return 1 + max([*used, *(r.id for r in a.rigid)], default=0)
-
-
-def with_points(assembly: Assembly, places: np.ndarray) -> tuple[Assembly, np.ndarray]:
-    """The assembly with grids added, and their rows."""
-    start, n = int(assembly.ids.max()) + 1 if len(assembly.ids) else 1, len(assembly.points)
-    axes, scalar = assembly.axes, assembly.scalar_points
-    if axes is not None:
-        axes = np.concatenate([axes, np.tile(np.eye(3), (len(places), 1, 1))])
-    if scalar is not None:
-        scalar = np.r_[scalar, np.zeros(len(places), bool)]
-    grown = replace(
-        assembly,
-        ids=np.r_[assembly.ids, start + np.arange(len(places))],
-        points=np.vstack([assembly.points, places]),
-        axes=axes,
-        scalar_points=scalar,
-    )
-    return grown, n + np.arange(len(places))
 
 
 def with_part(assembly: Assembly, name: str, section: Section) -> tuple[Assembly, int]:

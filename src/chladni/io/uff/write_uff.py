@@ -48,7 +48,7 @@ def write_uff(
     partial = path.with_name(path.name + ".partial")
     partial.unlink(missing_ok=True)
     try:
-        _write_head(partial, nodes or {}, title)
+        write_head(partial, nodes or {}, title)
         with partial.open("ab") as file:
             for block in _blocks(frf, title, binary):
                 file.write(block)
@@ -57,7 +57,7 @@ def write_uff(
         partial.unlink(missing_ok=True)
 
 
-def _write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
+def write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
     """Header, units and nodes, in pyuff's hand."""
     import pyuff
 

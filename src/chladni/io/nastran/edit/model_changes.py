@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count
-from typing import Any
 
 import numpy as np
 
@@ -12,15 +11,11 @@ from ....model.assembly import Assembly, Shells
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import UNITS, Units
 from .. import Add, Deck, Replace, SetColumns, SetField
+from .added_elements import added_cards, free_system
 from .changes import Change
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
-from .split_properties import (
-    bending_changes,
-    property_ids,
-    split_changes,
-    with_new_properties,
-)
+from .split_properties import section_changes, split_changes, with_new_properties
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
@@ -41,13 +36,8 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after)
-    out = split_changes(deck, after, split, [*out, *bending_changes(before, after)])
-    cards = [
-        *_masses(before, after, units),
-        *_springs(before, after, units),
-        *_bushes(deck, before, after, units),
-    ]
-    if cards:
+    out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
+    if cards := added_cards(deck, before, after, units):
         out.append(Add(cards, "put in by the diagnosis"))
     return out
 
@@ -173,7 +163,7 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     z = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = z - x * (x @ z)
     z = z / np.linalg.norm(z)
-    cid = _free_system(deck)
+    cid = free_system(deck)
     out: list[Change] = [
         Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
     ]
@@ -188,18 +178,6 @@ def _ids(deck: Deck, kind: str) -> list[int]:
         return []
     words = deck[kind].words(1).tolist()
     return [int(w) for w in words if w.isdigit()]
-
-
-def _free_system(deck: Deck) -> int:
-    """An id above those of all coordinate systems."""
-    kinds = [kind for kind in deck.cards if kind.startswith("CORD")]
-    return 1 + max((i for kind in kinds for i in _cids(deck, kind)), default=900)
-
-
-def _cids(deck: Deck, kind: str) -> list[int]:
-    """Ids of coordinate systems; a CORD1 card holds two."""
-    second = deck[kind].words(5).tolist() if kind[4] == "1" else []
-    return [*_ids(deck, kind), *(int(w) for w in second if w.isdigit())]
 
 
 def _by_kind(shells: Shells, rows: np.ndarray) -> list[tuple[str, np.ndarray]]:
@@ -235,55 +213,3 @@ def _thickness(deck: Deck, before: Assembly, after: Assembly, units: Units) -> l
                 t = after.shells.thickness[rows, :n] / units.length
                 out.append(SetColumns(kind, after.shells.ids[rows], fields, t))
     return out
-
-
-def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
-    """CONM2 of every mass that was added, offset where it sits beside its grid."""
-    first = _free_id(after)
-    for k in range(len(before.masses), len(after.masses)):
-        M = after.masses.matrix[k]
-        m = M[0, 0]
-        arm = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m
-        x, y, z = arm
-        T = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
-        if not np.allclose(M, m * T.T @ T, rtol=1e-9, atol=1e-9 * m):
-            raise ModelError("a mass with inertia of its own was added; CONM2 here has none")
-        card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.mass]
-        yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
-
-
-def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
-    """CELAS2 of every spring that was added."""
-    s, n = after.springs, len(before.springs)
-    first = _free_id(after) + len(after.masses)
-    unit = units.force / units.length
-    for k in range(n, len(s)):
-        grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
-        yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
-
-
-def _bushes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
-    """CBUSH that was added, with its PBUSH and the CORD2R of its frame."""
-    b = after.bushes
-    first = _free_id(after) + len(after.masses) + len(after.springs)
-    system, pid = _free_system(deck), 1 + max(property_ids(deck))
-    unit = units.force / units.length
-    for n, k in enumerate(range(len(before.bushes), len(b))):
-        if np.any(b.stiffness[k, 3:]) or np.any(b.viscous[k]) or np.any(b.loss[k]):
-            raise ModelError("a bush that turns or dissipates was added; CBUSH here is a spring")
-        x, _, z = b.frame[k]
-        yield ["CORD2R", system + n, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
-        yield ["PBUSH", pid + n, "K", *(b.stiffness[k, :3] / unit).tolist()]
-        ends = [int(after.ids[row]) if row >= 0 else None for row in b.nodes[k]]
-        place = (b.place[k] / units.length).tolist()
-        yield ["CBUSH", first + k, pid + n, *ends, *[None] * 3, system + n, None, 0, *place]
-
-
-def _free_id(assembly: Assembly) -> int:
-    """An element id above all that are used."""
-    families: list[Any] = [
-        assembly.shells, assembly.beams, assembly.springs, assembly.dampers, assembly.bushes,
-        assembly.masses, assembly.scalar_masses, *assembly.solids,
-    ]  # fmt: skip
-    rigid = max((r.id for r in assembly.rigid), default=0)
-    return 1 + max(rigid, *(int(f.ids.max(initial=0)) for f in families))

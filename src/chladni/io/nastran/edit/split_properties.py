@@ -6,6 +6,7 @@ from dataclasses import replace
 from ....errors import ModelError
 from ....model.assembly import Assembly
 from ....model.properties import ShellSection
+from ....units import Units
 from .. import Add, Deck, SetField
 from ..text.cards import position
 from ..text.format import Value
@@ -66,15 +67,19 @@ def split_changes(
     return out
 
 
-def bending_changes(before: Assembly, after: Assembly) -> list[Change]:
-    """12I/T**3 of every part whose bending stiffness alone changed."""
-    pairs = zip(before.parts, after.parts, strict=True)
-    return [
-        SetField("PSHELL", now.id, "12I/T3", now.section.bending_ratio)
-        for was, now in pairs
-        if isinstance(was.section, ShellSection) and isinstance(now.section, ShellSection)
-        if was.section.bending_ratio != now.section.bending_ratio
-    ]
+def section_changes(before: Assembly, after: Assembly, units: Units) -> list[Change]:
+    """12I/T**3 and NSM of every part whose bending stiffness or mass alone changed."""
+    out: list[Change] = []
+    for was, now in zip(before.parts, after.parts, strict=True):
+        old, new = was.section, now.section
+        if not isinstance(old, ShellSection) or not isinstance(new, ShellSection):
+            continue
+        if old.bending_ratio != new.bending_ratio:
+            out.append(SetField("PSHELL", now.id, "12I/T3", new.bending_ratio))
+        if old.nonstructural != new.nonstructural:
+            load = new.nonstructural / (units.mass / units.length**2)
+            out.append(SetField("PSHELL", now.id, "NSM", load))
+    return out
 
 
 def property_ids(deck: Deck) -> list[int]:

@@ -1,10 +1,10 @@
-"""The study of concealed effects, every effect in every structure, through the one pipeline."""
+"""Effects concealed, every effect in every structure, through the one pipeline."""
 
 import pytest
 
+from chladni_evidence.blind import answered, blinds
 from chladni_evidence.concealed import SPECIMENS, concealable
 from chladni_evidence.score import NULLS
-from chladni_evidence.study import answered, blinds
 
 pytestmark = pytest.mark.slow
 

@@ -21,7 +21,7 @@ CODE = {"nothing": "n", "calibration": "c"}  # a folder's name must not say whet
 
 @dataclass(frozen=True)
 class Blind:
-    """One case to be made and diagnosed, and the folder of the study it belongs to."""
+    """One case to be made and diagnosed, and the folder of the run it belongs to."""
 
     specimen: str
     effect: str
@@ -62,7 +62,7 @@ def blinds(
     return [Blind(s, e, seed, place) for seed in seeds for s in specimens for e in effects]
 
 
-def study(
+def answered_rows(
     cases: list[Blind], workers: int = 1, told: Callable[[Row], None] = lambda row: None
 ) -> list[Row]:
     """Diagnose every case by :func:`chladni.diagnose` and score it against its seal.

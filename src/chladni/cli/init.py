@@ -1,0 +1,59 @@
+"""``chladni init``: a commented case.toml and sensors.csv from a deck and a recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..case import load_case
+from ..errors import ChladniError, FileError
+from ..output import write_text
+from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
+from .run import Allow, Out, Units, place_of, started
+
+
+def run(
+    source: Annotated[Path, typer.Argument(metavar="DECK")],
+    recordings: Annotated[list[Path] | None, typer.Argument(metavar="[RECORDING]...")] = None,
+    sensors: Annotated[
+        Path | None, typer.Option(help="A table of sensors, as chladni plan writes it.")
+    ] = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="receptance, mobility, ... where the file does not say.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Weighed mass of the article [kg].")] = None,
+    units: Units = None,
+    allow: Allow = None,
+    out: Out = None,
+) -> None:
+    """Write a case: units guessed, labels matched to the deck, what is missing named."""
+    if mass is not None and not 0 < mass < 1e9:
+        raise FileError(f"--mass {mass:g}: a weighed mass is above zero, in kg")
+    place = place_of("init", source, out)
+    taken = [n for n in ("case.toml", "sensors.csv") if (place / n).exists()]
+    if taken:
+        raise FileError(f"{place / taken[0]} is there already and is not replaced; another --out")
+    made = draft(source, recordings or (), units, quantity, sensors, mass, allow or ())
+    with started("init", source, place) as job:
+        write_text(job.folder / "case.toml", case_text(made, place))
+        if made.dofs:
+            write_text(job.folder / "sensors.csv", sensors_text(made))
+        for sentence in _sentences(made):
+            job.say(sentence)
+    typer.echo(_next(place))
+
+
+def _sentences(made: CaseDraft) -> list[str]:
+    out = [f"units = {made.units.name}: {made.units_why}", *(said_of(r) for r in made.read)]
+    if made.dofs:
+        out.append(f"outputs and inputs: {made.found}")
+    return [*out, *made.notes, *(f"missing: {text}" for text in made.missing)]
+
+
+def _next(place: Path) -> str:
+    """Whether the case can be read as it stands."""
+    try:
+        load_case(place)
+    except ChladniError as error:
+        return f"not complete yet: {error}"
+    return f"it can be read; next: chladni check {place}"

@@ -1,0 +1,210 @@
+"""A lump on a spring the model does not know of: a bracket, a plug, a cable that swings by itself.
+
+Across the sheet it answers with s² m ω²/(ω² + s²): below its frequency it is a mass, above it next
+to nothing, and in between one mode becomes two. Its motion is a degree of freedom of its own, for
+no mass or spring at the grid stands for it over a band (den Hartog 1985, Mechanical Vibrations,
+3.2). Along the sheet the lump is carried. Its own loss is left to the damping of the modes, which
+does not enter the comparison.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.eigen import normal_modes
+from ..fem.assemble import structure
+from ..geometry.facets import point_normals, tangents
+from ..geometry.sampling import farthest_point_sample
+from ..model.added_points import with_points
+from ..model.assembly import Assembly, Bushes, Masses
+from .effect import Effect, Parameter, PointTerm
+from .estimate import Estimate
+from .family import Article, Family
+from .movable_attachment import MovableAttachment, around, moved, patch, there
+from .points import strength
+from .search_context import Candidate, SearchContext, best_places, distinct
+from .surroundings import ShellGrids, Surroundings
+
+SHARE = 0.015  # of the structure's mass: prior median of the lump's
+TYPICAL = 3.0  # times the prior median of its frequency: the highest line
+LOWEST = 20.0  # the lowest of the frequencies tried lies this many times below the highest line
+TRIED = 14  # frequencies, evenly spaced in their logarithm: wide lines smooth what lies between
+PLACES = 60  # where each is tried
+LEAST = 0.05  # of the typical mass: less of it, or a negative one, is no lump
+CARRIED = 1e3  # times the spring: how firmly the written lump follows the sheet along it
+
+
+@dataclass(frozen=True, eq=False)
+class LocalResonator(MovableAttachment):
+    """x = (ln mass, place along both axes of the patch, ln frequency)."""
+
+    name = "local-resonator"
+    claim = "something on the structure swings on a spring of its own"
+    own_dofs: ClassVar[int] = 1
+
+    nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # no grid at all
+
+    @classmethod
+    def near(cls, where: Surroundings, k: int) -> Self:
+        """A lump that swings along the normal near the k-th grid."""
+        n = where.grids.normal[k]
+        m = strength("M", "kg", SHARE * where.setup.weight, 1.0, (-0.7, 0.7))
+        lowest = -np.log(LOWEST / TYPICAL)
+        f = Parameter(
+            "f", "Hz", 0.0, 0.6, where.setup.f_max / TYPICAL, step=0.15, nominal=4.0,
+            starts=tuple(np.linspace(lowest, np.log(TYPICAL), 7)),
+        )  # fmt: skip
+        at = patch(where, k, np.stack([n, *tangents(n)]))
+        nowhere = sp.csr_array((1, at.rows[0].shape[1]))
+        return cls((*moved(m), f), patch=at, direction=n, nowhere=nowhere, **there(where, k))
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """K + k (b - e)(b - e)ᵀ, M + m (e eᵀ + t tᵀ): b across, t along the sheet, e the lump."""
+        assert self.patch is not None
+        at, size = self.patch.size * x[1:3], self.patch.size
+        m, k = self.values(x)
+        rows, moving = self.patch.at(at), [self.patch.slope(at, axis) * size for axis in range(2)]
+        unit = np.eye(4)
+        across = {1 + axis: slope[:1] for axis, slope in enumerate(moving)}
+        along = {1 + axis: slope[1:] for axis, slope in enumerate(moving)}
+        by_k = (k * (unit[0] + 2 * unit[3]))[None]
+        return (
+            PointTerm("K", rows[:1], np.array([k]), by_k, across, own=np.array([[-1.0]])),
+            PointTerm(
+                "M",
+                self.nowhere,
+                np.array([m]),
+                m * unit[:1],
+                own=np.array([[1.0]]),
+                carrier=rows[:1],
+            ),
+            PointTerm("M", rows[1:], np.full(2, m), np.tile(m * unit[0], (2, 1)), along),
+        )
+
+    def values(self, x: np.ndarray) -> tuple[float, float]:
+        """Mass [kg] and spring m (2πf)² [N/m]."""
+        m = self.parameters[0].value(x[0])
+        return m, m * (2 * np.pi * self.parameters[3].value(x[3])) ** 2
+
+    def becomes(self, x: np.ndarray) -> str:
+        """Tuned above the highest line it is a lump that is carried along."""
+        f = self.parameters[3]
+        return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
+
+    def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The lump itself."""
+        m = self.parameters[0].value(x[0])
+        return m, np.array([m, 0.0, 0.0, 0.0])
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """GRID with CONM2, on a CBUSH from the nearest grid."""
+        m, k = self.values(x)
+        return with_oscillator(assembly, self.nearest(x), self.at(x), self.direction, m, k)
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Mass and frequency; the place stands in ``location``."""
+        every = Effect.reported(self, x, sd)
+        return every[0], every[3]
+
+
+def with_oscillator(
+    assembly: Assembly, grid: int, place: np.ndarray, normal: np.ndarray, m: float, k: float
+) -> Assembly:
+    """A lump m [kg] at a place on a spring k [N/m] along the normal, its foot rigid to a grid.
+
+    Along the sheet the lump follows its foot; it does not turn.
+    """
+    grown, (row,) = with_points(assembly, np.asarray(place)[None])
+    frame = np.stack([normal, *tangents(normal)])
+    if np.isclose(np.abs(normal).max(), 1.0, rtol=0, atol=1e-6):
+        frame = np.eye(3)
+    stiffness = np.where(np.abs(frame @ normal) > 0.5, k, CARRIED * k)
+    masses, bushes, none = assembly.masses, assembly.bushes, np.zeros((1, 6))
+    new_mass = Masses(
+        np.append(masses.ids, int(masses.ids.max(initial=0)) + 1),
+        np.append(masses.node, row),
+        np.concatenate([masses.matrix, np.diag([m, m, m, 0, 0, 0])[None]]),
+    )
+    new_bush = Bushes(
+        np.append(bushes.ids, int(bushes.ids.max(initial=0)) + 1),
+        np.concatenate([bushes.nodes, [[assembly.rows([grid])[0], row]]]),
+        np.concatenate([bushes.frame, frame[None]]),
+        np.concatenate([bushes.place, np.asarray(place)[None]]),
+        np.concatenate([bushes.stiffness, [[*stiffness, 0, 0, 0]]]),
+        np.concatenate([bushes.viscous, none]),
+        np.concatenate([bushes.loss, none]),
+    )
+    held = np.concatenate([assembly.supports, [[row, c] for c in (4, 5, 6)]])
+    return replace(grown, masses=new_mass, bushes=new_bush, supports=held)
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The best place and frequency about each baseline, by exact re-analysis."""
+    where = context.where
+    some = farthest_point_sample(where.places.point, PLACES)
+    if context.scan is None:
+        at = [where.grids.position(where.places.grids[k]) for k in some[: PLACES // 3]]
+        effects = [LocalResonator.near(where, k) for k in at]
+        return best_places(context, effects, where.grids.point[at])
+    mass, f_max = SHARE * where.setup.weight, where.setup.f_max
+    hertz = np.geomspace(f_max / LOWEST, f_max, TRIED)
+    places, taken = where.places.only(some), list[int]()
+    out: list[Candidate] = []
+    for about in range(len(context.bases)):
+        score = _scores(context, about, mass, hertz, places)[1]
+        (k,) = distinct(score.min(axis=1), places.point, taken, 1)
+        if not np.isfinite(score[k]).any():
+            continue
+        taken.append(k)
+        step, best = hertz[1] / hertz[0], hertz[int(np.argmin(score[k]))]
+        closer = around(where.grids, where.places, int(some[k]))
+        finer = best * step ** np.linspace(-1, 1, 5)
+        out.append(_best(context, about, mass, finer, closer))
+    return out
+
+
+def _scores(
+    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mass and score (n_places, n_hertz); no score where there is no lump."""
+    assert context.scan is not None
+    amount, score = context.scan.oscillator_scores(about, mass, hertz, places)
+    return amount, np.where(amount > LEAST * mass, score, np.inf)
+
+
+def _best(
+    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+) -> Candidate:
+    """The lump at the best of some places, with the best of some frequencies."""
+    where = context.where
+    amount, score = _scores(context, about, mass, hertz, places)
+    k, level = np.unravel_index(int(np.argmin(score)), score.shape)
+    effect = LocalResonator.near(where, where.grids.position(places.grids[k]))
+    m, f = np.clip(amount[k, level], LEAST * mass, 10 * mass), hertz[level]
+    ln_m, ln_f = (np.log(v / effect.parameters[p].scale) for v, p in ((m, 0), (f, 3)))
+    return Candidate(effect, np.array([ln_m, 0.0, 0.0, ln_f]), context.bases[about])
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """A lump of 1.5 to 5 % of the mass at a grid, tuned between the deck's first elastic modes."""
+    grid, m = article.shell_grid(rng), float(rng.uniform(0.015, 0.05)) * article.weight
+    elastic = normal_modes(structure(article.deck).system, 12).frequency[6:]
+    f = float(np.exp(rng.uniform(np.log(elastic[0]), np.log(elastic[-1]))))
+    (at,) = article.grids_at(np.array([grid]))
+    row, point = article.assembly.rows([at])[0], article.deck.points[article.deck.rows([grid])[0]]
+    made = article.assembly
+    normal = point_normals(made.points, made.shells.nodes)[row]
+    made = with_oscillator(made, at, made.points[row], normal, m, m * (2 * np.pi * f) ** 2)
+    truth = {"point_m": point.tolist(), "value": m, "parameters": {"M": m, "f": f}}
+    return replace(article, assembly=made, truth=truth)
+
+
+FAMILY = Family(
+    LocalResonator,
+    conceal,
+    candidates=candidates,
+    cards=("GRID", "CONM2", "PBUSH", "CBUSH", "CORD2R"),
+    settled_by="hold by hand what might swing there, or tap it, and measure again",
+)

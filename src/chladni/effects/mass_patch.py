@@ -1,0 +1,111 @@
+"""A mass spread over a region of a sheet: trim, mastic, a damping mat, paint that has run."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..geometry.facets import cell_areas
+from ..model.assembly import Assembly
+from ..model.properties import Part, ShellSection
+from .effect import Effect, Parameter
+from .estimate import Estimate
+from .family import Article, Family
+from .points import strength
+from .property_bands import levels, with_bands
+from .search_context import Candidate, SearchContext
+from .sheet_patch import SheetPatch, patches
+from .shell_groups import ShellGroups
+
+SHARE = 0.03  # of the structure's mass: prior median
+
+
+@dataclass(frozen=True, eq=False)
+class MassPatch(SheetPatch):
+    """M q(x) / ∫ q dA more mass per area, M in all; it does not stiffen the sheet."""
+
+    name = "mass-patch"
+    claim = "something lies spread on the sheet that the model does not have"
+    quantity = "rho"
+    scanned = -1.0
+    grows = (0.05, np.inf)  # of the mass scanned: less of it, or a negative one, is none
+
+    area: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [m²]
+    weight_of: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [kg]
+
+    @classmethod
+    def strength(cls, groups: ShellGroups) -> Parameter:
+        """The mass, of a few per cent of the shells'."""
+        return strength("M", "kg", SHARE * float(groups.weight.sum()), 1.2, (-1.0, 0.3))
+
+    @classmethod
+    def more(cls, groups: ShellGroups) -> dict[str, Any]:
+        """Areas and weights of the groups."""
+        return {"area": groups.area, "weight_of": groups.weight}
+
+    def log(self, x: np.ndarray) -> np.ndarray:
+        """ln(1 + M q A / (w Σ q A)) over the groups; massless sheets cannot be made heavier."""
+        share = self.bump(x, self.centre, self.variance) * self.inside * self.area
+        m = self.parameters[0].value(x[0]) * share / max(float(share.sum()), 1e-300)
+        heavy = self.weight_of > 0
+        return np.log1p(np.divide(m, self.weight_of, out=np.zeros_like(m), where=heavy))
+
+    @classmethod
+    def begun(cls, amount: float) -> float:
+        """Masses up to ten times the one scanned."""
+        return cls.scanned + float(np.log(np.clip(amount, 0.05, 10.0)))
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """Properties of their own with more mass per area, by bands."""
+        centre = assembly.points[assembly.shells.nodes].mean(axis=1)
+        q = self.bump(x, centre) * self.shells
+        return spread_mass(assembly, q, self.parameters[0].value(x[0]))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """The mass and the radius R; the place stands in ``location``."""
+        return Effect.reported(self, x, sd)[:2]
+
+
+def spread_mass(assembly: Assembly, q: np.ndarray, m: float) -> Assembly:
+    """M [kg] on the shells, per area in the shares of q (m,), in bands that hold the sum."""
+    share = levels(q)[0]
+    return with_bands(assembly, m * share / float(share @ _areas(assembly)), heavier)
+
+
+def _areas(assembly: Assembly) -> np.ndarray:
+    return cell_areas(assembly.points, assembly.shells.nodes)
+
+
+def heavier(part: Part, load: float) -> Part:
+    """The part with more mass per area [kg/m²]."""
+    section = part.section
+    assert isinstance(section, ShellSection)
+    return part.with_section(nonstructural=section.nonstructural + load)
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The places where a spread mass explains most."""
+    return patches(context, MassPatch, each=1)
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """2 to 8 % of the mass spread over a disc of 40 to 90 mm round a grid of the first part."""
+    made, m = article.assembly, float(rng.uniform(0.02, 0.08)) * article.weight
+    first = made.shells.part == 0
+    centre = made.points[rng.choice(np.unique(made.shells.nodes[first]))]
+    radius = float(rng.uniform(0.04, 0.09))
+    middle = made.points[made.shells.nodes].mean(axis=1)
+    q = (first & (np.linalg.norm(middle - centre, axis=1) <= radius)).astype(float)
+    truth = {
+        "point_m": centre.tolist(), "value": m, "radius_m": radius, "parameters": {"M": m},
+    }  # fmt: skip
+    return replace(article, assembly=spread_mass(made, q, m), truth=truth)
+
+
+FAMILY = Family(
+    MassPatch,
+    conceal,
+    candidates=candidates,
+    cards=("PSHELL", "CQUAD4", "CTRIA3"),
+    settled_by="look what lies on the sheet there, and weigh it",
+)

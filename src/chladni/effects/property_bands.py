@@ -1,0 +1,36 @@
+"""A smooth field over shells as a deck can hold it: properties of their own, by bands."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..model.assembly import Assembly
+from ..model.properties import Part
+
+BANDS = 6  # properties between nothing and the field's largest value
+
+
+def levels(value: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whole numbers (m,) of equal steps, and the step."""
+    step = float(np.abs(value).max(initial=0.0)) / BANDS
+    return np.round(value / step).astype(int) if step else np.zeros(len(value), int), step
+
+
+def with_bands(
+    assembly: Assembly, value: np.ndarray, changed: Callable[[Part, float], Part]
+) -> Assembly:
+    """The assembly with its shells in parts changed by ``value`` (m,), in equal steps.
+
+    ``changed`` gives a part as it is with a value; its name and id are made here.
+    """
+    level, step = levels(value)
+    old, parts = assembly.shells.part, list(assembly.parts)
+    part = old.copy()
+    pairs = set(zip(old.tolist(), level.tolist(), strict=True))
+    for k, n in sorted((k, n) for k, n in pairs if n):
+        part[(old == k) & (level == n)] = len(parts)
+        new = changed(assembly.parts[k], n * step)
+        name = f"{assembly.parts[k].name}, band {n}"
+        parts.append(replace(new, id=1 + max(p.id for p in parts), name=name))
+    return replace(assembly, parts=tuple(parts), shells=replace(assembly.shells, part=part))

@@ -1,0 +1,200 @@
+"""A smooth patch of a sheet where one field is not what the deck says, at an unknown place.
+
+q(x) = exp(-|x - c|² / 2R²) about a centre c that lies on the quadric following the sheet. Parts
+that share grids are one sheet: what happens to a pressed panel does not end at a fold.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..geometry.sampling import farthest_point_sample
+from .effect import Effect, FieldChange, Parameter
+from .estimate import Location
+from .search_context import Candidate, SearchContext, best_places, distinct
+from .shell_groups import ShellGroups
+
+
+@dataclass(frozen=True, eq=False)
+class Quadric:
+    """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
+
+    ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
+    uv, v² in metres, and holds within ``reach``: further out h stays at what it is there.
+    """
+
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3)[:2])
+    normal: np.ndarray = field(default_factory=lambda: np.eye(3)[2])
+    bend: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    reach: float = np.inf
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """The point (3,) [m] that has the coordinates u (2,) [m]."""
+        near = u * min(1.0, self.reach / max(float(np.linalg.norm(u)), 1e-300))
+        h = float(_quadric(near[None])[0] @ self.bend)
+        return np.asarray(self.origin + u @ self.axes + h * self.normal)
+
+
+def _quadric(u: np.ndarray) -> np.ndarray:
+    """1, u, v, u², uv, v² (n, 6)."""
+    x, y = u.T
+    return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
+
+
+def surface(groups: ShellGroups, group: int, size: float) -> Quadric:
+    """The quadric through the corners of the part's shells, near ones counting most."""
+    assembly = groups.structure.assembly
+    own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
+    X, c = assembly.points[own], groups.centre[group]
+    w = np.exp(-((X - c) ** 2).sum(axis=1) / (2 * (0.25 * size) ** 2))
+    middle = np.average(X, axis=0, weights=w)
+    axes = np.linalg.svd((X - middle) * np.sqrt(w)[:, None], full_matrices=False)[2]
+    u = (X - c) @ axes[:2].T
+    A = _quadric(u) * np.sqrt(w)[:, None]
+    ridge = 1e-10 * np.diag([0, 0, 0, 1, 1, 1]) * (A**2).sum()
+    bend = np.linalg.solve(A.T @ A + ridge, A.T @ (np.sqrt(w) * ((X - c) @ axes[2])))
+    return Quadric(c, axes[:2], axes[2], bend, 0.5 * size)
+
+
+@dataclass(frozen=True, eq=False)
+class SheetPatch(Effect):
+    """x = (strength, ln R, u, v [length scale]): a field of the sheet changed by its bump q.
+
+    Subclasses say which ``quantity`` of the sheet it is, what the strength makes of q
+    (:meth:`log`), its parameter (:meth:`strength`), and where a scan begins.
+    """
+
+    quantity: ClassVar[str] = "t"  # t, E or rho
+    scanned: ClassVar[float] = 0.0  # strength x[0] of which a scan takes the slope
+    grows: ClassVar[tuple[float, float]] = (0.0, np.inf)  # amounts of it that are such a patch
+
+    shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
+    inside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # groups of the sheet
+    centre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of the groups
+    surface: Quadric = field(default_factory=Quadric)
+    size: float = 1.0
+    variance: np.ndarray = field(default_factory=lambda: np.zeros(0))  # spread of a group itself
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # grids of the sheet
+    ids: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    spacing: float = 0.0  # of these grids [m]
+
+    @classmethod
+    def strength(cls, groups: ShellGroups) -> Parameter:
+        """The first parameter."""
+        raise NotImplementedError
+
+    def log(self, x: np.ndarray) -> np.ndarray:
+        """Logarithm of the factor on the field, over the groups (n_groups,)."""
+        raise NotImplementedError
+
+    @classmethod
+    def begun(cls, amount: float) -> float:
+        """The strength x[0] at ``amount`` times that of the scan."""
+        raise NotImplementedError
+
+    @classmethod
+    def on(cls, groups: ShellGroups, group: int, trials_factor: int) -> Self:
+        """A patch of the sheet one group of shells belongs to, searched from that group on.
+
+        The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
+        """
+        part = int(groups.part[group])
+        inside = groups.connected == groups.connected[group]
+        assembly = groups.structure.assembly
+        grids = np.unique(groups.nodes[inside[groups.group]])
+        size = float(np.sqrt(groups.area[groups.part == part].sum()))
+        name = assembly.parts[part].name
+        unknown = (
+            cls.strength(groups),
+            Parameter("R", "m", np.log(0.15), 0.5, size, step=0.3, starts=(np.log(0.18),)),
+            Parameter("along", "m", 0.0, 0.4, size, "linear", step=0.1, starts=(0.0,)),
+            Parameter("across", "m", 0.0, 0.3, size, "linear", step=0.1, starts=(0.0,)),
+        )
+        return cls(
+            unknown, f"on {name}", (name,), trials_factor=trials_factor,
+            shells=inside[groups.group], inside=inside.astype(float), centre=groups.centre,
+            surface=surface(groups, group, size), size=size, variance=groups.area / 12,
+            points=assembly.points[grids], ids=assembly.ids[grids],
+            spacing=float(np.sqrt(groups.area[inside].sum() / len(grids))), **cls.more(groups),
+        )  # fmt: skip
+
+    @classmethod
+    def more(cls, groups: ShellGroups) -> dict[str, Any]:
+        """Fields of its own that a subclass fills from the groups."""
+        return {}
+
+    def bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
+        """q at points X (n,), averaged over a group of variance ``blur``."""
+        d2 = ((X - self.at(x)) ** 2).sum(axis=1)
+        R2 = self.radius_at(x) ** 2
+        return np.asarray(R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur))))
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """The logarithm over the groups; its slope by central differences of a scalar formula."""
+        h = 1e-5
+        slope = np.stack(
+            [(self.log(x + h * e) - self.log(x - h * e)) / (2 * h) for e in np.eye(4)], 1
+        )
+        return (FieldChange(self.quantity, self.log(x), slope),)
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """The centre in the basic frame (3,) [m]."""
+        return self.surface.at(self.size * x[2:4])
+
+    def radius_at(self, x: np.ndarray) -> float:
+        """R [m]."""
+        return float(self.size * np.exp(x[1]))
+
+    def location(self, x: np.ndarray) -> Location:
+        """The place a fit moved it to: where the sheet is changed most."""
+        grid, deepest = self.deepest(x)
+        point = tuple(float(v) for v in deepest)
+        text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
+        radius = self.radius_at(x)
+        return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
+
+    def deepest(self, x: np.ndarray) -> tuple[int, np.ndarray]:
+        """Grid and point where q is largest: c, or the grid next to it if c is off the sheet."""
+        c = self.at(x)
+        d2 = ((self.points - c) ** 2).sum(axis=1)
+        k = int(np.argmin(d2))
+        outside = d2[k] > max(0.25 * self.radius_at(x), self.spacing) ** 2
+        return int(self.ids[k]), self.points[k] if outside else c
+
+
+RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
+TRIED = 30  # groups that are evaluated one by one where only natural frequencies are known
+
+
+def patches(context: SearchContext, kind: type[SheetPatch], each: int = 2) -> list[Candidate]:
+    """Patches of a kind: its slope at every group and radius, the best places per baseline.
+
+    Parameters
+    ----------
+    each : places per baseline
+    """
+    groups = context.where.groups
+    sheets = len(set(groups.connected.tolist()))
+    if context.scan is None:
+        some = farthest_point_sample(groups.centre, TRIED)
+        tried = [kind.on(groups, int(g), sheets) for g in some]
+        return best_places(context, tried, groups.centre[some])
+    tried = [kind.on(groups, g, sheets) for g in range(len(groups))]
+    effects = [e for e in tried for _ in RADII]
+    starts = [np.array([kind.scanned, np.log(R), 0.0, 0.0]) for _ in tried for R in RADII]
+    changes = np.stack([e.log(x) for e, x in zip(effects, starts, strict=True)], axis=1)
+    centre = np.repeat(groups.centre, len(RADII), axis=0)
+    least, most = kind.grows
+    out: list[Candidate] = []
+    taken: list[int] = []
+    for about, base in enumerate(context.bases):
+        amount, score = context.scan.field_scores(about, kind.quantity, changes)
+        score = np.where((amount > least) & (amount < most), score, np.inf)
+        for k in distinct(score, centre, taken, each):
+            if np.isfinite(score[k]):
+                taken.append(k)
+                start = np.array([kind.begun(float(amount[k])), *starts[k][1:]])
+                out.append(Candidate(effects[k], start, base))
+    return out

@@ -1,0 +1,100 @@
+"""Cards of grids, masses, springs and bushes that were added to a deck."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ....errors import ModelError
+from ....model.assembly import Assembly
+from ....units import Units
+from .. import Deck
+from .split_properties import property_ids
+
+
+def added_cards(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[list]:
+    """All of them; elements are numbered from the first id that is free.
+
+    Raises
+    ------
+    ModelError
+        If a mass was added that no CONM2 here holds.
+    """
+    return [
+        *_grids(before, after, units),
+        *_masses(before, after, units),
+        *_springs(before, after, units),
+        *_bushes(deck, before, after, units),
+    ]
+
+
+def _grids(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """GRID of every point that was added, what holds it in PS."""
+    for row in range(len(before.points), len(after.points)):
+        held = sorted(int(c) for r, c in after.supports if r == row)
+        place = after.points[row] / units.length
+        yield ["GRID", int(after.ids[row]), 0, *place.tolist(), 0, "".join(map(str, held)) or None]
+
+
+def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CONM2 of every mass that was added, offset where it sits beside its grid."""
+    first = _free_id(after)
+    for k in range(len(before.masses), len(after.masses)):
+        M = after.masses.matrix[k]
+        m = M[0, 0]
+        arm = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m
+        x, y, z = arm
+        T = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+        if not np.allclose(M, m * T.T @ T, rtol=1e-9, atol=1e-9 * m):
+            raise ModelError("a mass with inertia of its own was added; CONM2 here has none")
+        card = ["CONM2", first + k, int(after.ids[after.masses.node[k]]), 0, m / units.mass]
+        yield [*card, *(a / units.length for a in arm)] if np.abs(arm).max() > 1e-9 else card
+
+
+def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CELAS2 of every spring that was added."""
+    s, n = after.springs, len(before.springs)
+    first = _free_id(after) + len(after.masses)
+    unit = units.force / units.length
+    for k in range(n, len(s)):
+        grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
+        yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
+
+
+def _bushes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+    """CBUSH that was added, with its PBUSH and, where it lies askew, the CORD2R of its frame."""
+    b = after.bushes
+    first = _free_id(after) + len(after.masses) + len(after.springs)
+    system, pid = free_system(deck), 1 + max(property_ids(deck))
+    unit = units.force / units.length
+    for n, k in enumerate(range(len(before.bushes), len(b))):
+        if np.any(b.stiffness[k, 3:]) or np.any(b.viscous[k]) or np.any(b.loss[k]):
+            raise ModelError("a bush that turns or dissipates was added; CBUSH here is a spring")
+        x, _, z = b.frame[k]
+        turned = not np.allclose(b.frame[k], np.eye(3), rtol=0, atol=1e-9)
+        if turned:
+            yield ["CORD2R", system + n, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
+        yield ["PBUSH", pid + n, "K", *(b.stiffness[k, :3] / unit).tolist()]
+        ends = [int(after.ids[row]) if row >= 0 else None for row in b.nodes[k]]
+        place, cid = (b.place[k] / units.length).tolist(), system + n if turned else 0
+        yield ["CBUSH", first + k, pid + n, *ends, None, None, None, cid, None, 0, *place]
+
+
+def free_system(deck: Deck) -> int:
+    """An id above those of all coordinate systems; a CORD1 card holds two."""
+    used = [900]
+    for kind in (kind for kind in deck.cards if kind.startswith("CORD")):
+        second = deck[kind].words(5).tolist() if kind[4] == "1" else []
+        words = [*deck[kind].words(1).tolist(), *second]
+        used += [int(word) for word in words if word.isdigit()]
+    return 1 + max(used)
+
+
+def _free_id(assembly: Assembly) -> int:
+    """An element id above all that are used."""
+    families: list[Any] = [
+        assembly.shells, assembly.beams, assembly.springs, assembly.dampers, assembly.bushes,
+        assembly.masses, assembly.scalar_masses, *assembly.solids,
+    ]  # fmt: skip
+    rigid = max((r.id for r in assembly.rigid), default=0)
+    return 1 + max(rigid, *(int(f.ids.max(initial=0)) for f in families))

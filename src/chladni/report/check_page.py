@@ -1,0 +1,66 @@
+"""A checked case as a page: what was understood, what looks wrong, where the sensors are."""
+
+from pathlib import Path
+from typing import Any
+
+from ..case import Case
+from ..output import plain
+from ..view.surface import surface
+from ..workflows.case_check import CaseCheck, CheckedDof
+from ..workflows.case_model import markers
+from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table
+from .words import number
+
+
+def check_json(found: CaseCheck) -> dict[str, Any]:
+    """``check.json``."""
+    return {
+        "facts": [{"what": what, "text": text} for what, text in found.facts],
+        "findings": [vars(f) for f in found.findings],
+        "model_hz": found.frequency,
+        "sensors": [plain(vars(d)) for d in found.dofs],
+        "notes": found.unused,
+    }
+
+
+def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
+    """Sections of the page; the picture is written into the folder."""
+    from ..view import scene
+
+    path = folder / "sensors.png"
+    scene.sensors(path, surface(case.assembly), markers(case.outputs), markers(case.inputs))
+    looks = [
+        f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
+    ]
+    blocks: list[Block] = [Picture(path, "Blue: sensors; red: shakers; arrows: their directions.")]
+    if found.dofs:
+        blocks.append(_table(found.dofs))
+    modes = ", ".join(number(f) for f in found.frequency)
+    facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
+    told = [Section(f"For {c}", [Items(said)]) for c, said in found.unused.items() if said]
+    sections = [
+        Section("What looks wrong", [Items(looks)] if looks else []),
+        Section("What will be used", [Facts(facts)]),
+        Section("Sensors", blocks),
+        *told,
+    ]
+    return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
+
+
+def _lead(found: CaseCheck) -> str:
+    faults, rest = len(found.faults), len(found.findings) - len(found.faults)
+    if not found.findings:
+        return "Nothing looks wrong with the case."
+    return f"{faults} things are to be mended first, {rest} more are worth a look."
+
+
+def _table(dofs: tuple[CheckedDof, ...]) -> Table:
+    rows = [
+        (d.label, d.role, d.place, *(number(x) for x in d.point_m),
+         " ".join(f"{x:+.2f}" for x in d.direction), number(1e3 * d.off_mesh_m, 3),
+         number(1e3 * d.mass_kg, 3))
+        for d in dofs
+    ]  # fmt: skip
+    heads = ("label", "role", "where", "x [m]", "y [m]", "z [m]", "direction", "off the mesh [mm]",
+             "mass [g]")  # fmt: skip
+    return Table(heads, rows, words=("label", "role", "where", "direction"))

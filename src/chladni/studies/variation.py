@@ -1,0 +1,214 @@
+"""What a study varies: a number of the deck, between two values."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..case.free_parameters import free_parameter
+from ..case.schema import FIELDS
+from ..case.toml_sections import TomlSection
+from ..effects.freed import SD, SD_OTHERS, UNITS, values_of, with_factor
+from ..errors import FileError
+from ..io.nastran import Deck
+from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..units import Units
+
+_SAME = 1e-9
+_FORM = re.compile(r"\s*([A-Za-z][\w-]*)(?:\s+of\s+(.+?))?\s*")
+_REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # joints are unknown by decades; of a sheet's t FARTHEST
+FARTHEST = 20.0  # times the deck's own value, or a part of it
+_SDS = 2.0  # prior standard deviations to either side, where a case gives no bounds
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One number of the deck and the range it is sampled over.
+
+    Attributes
+    ----------
+    name : as it is called in tables, "t of inner"
+    free : FreeParameter    which number, of which parts
+    nominal : the deck's own value; 1 where its members have different ones
+    low, high : in ``unit``, as ``nominal``
+    unit : SI; "deck units" of a bare deck, "of the deck's" where members differ
+    log : sampled uniformly in the logarithm
+    """
+
+    name: str
+    free: FreeParameter
+    nominal: float
+    low: float
+    high: float
+    unit: str
+    log: bool = False
+
+    def value(self, u: np.ndarray) -> np.ndarray:
+        """Values at u in [0, 1]."""
+        if self.log:
+            return np.asarray(self.low * (self.high / self.low) ** u)
+        return np.asarray(self.low + (self.high - self.low) * u)
+
+    def applied(self, assembly: Assembly, value: float) -> Assembly:
+        """The assembly with this value in place of the deck's."""
+        return with_factor(assembly, self.free, value / self.nominal)
+
+
+def of_case(
+    frees: Sequence[FreeParameter], assembly: Assembly
+) -> tuple[list[Variation], list[str]]:
+    """The [[parameter]] of a case between their bounds, and what of them cannot be varied.
+
+    Where a bound is missing, two standard deviations of the prior stand in for it.
+    """
+    out, notes = [], []
+    for free in frees:
+        if free.field not in FIELDS:
+            notes.append(f"{free.name} is an effect, not a number of the deck: it is not varied.")
+            continue
+        sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
+        low = float(np.exp(-_SDS * sd)) if free.low is None else free.low
+        high = float(np.exp(_SDS * sd)) if free.high is None else free.high
+        nominal, unit = _nominal(assembly, free, True)
+        name = free.name if free.name != free.field else _called(free)
+        out.append(Variation(name, free, nominal, low * nominal, high * nominal, unit))
+    return out, notes
+
+
+def of_text(text: str, assembly: Assembly, deck: Deck | None, units: Units | None) -> Variation:
+    """A range as `t of inner=0.6:0.8`, `E=90%:110%` or `K of PBUSH 7=10:1e4:log`.
+
+    Plain numbers are in the deck's own units, as they stand in its cards; per cent are of the
+    deck's own value.
+
+    Raises
+    ------
+    FileError, LabelError
+        One sentence that names the text, what is wrong with it, and what there is.
+    """
+    wanted, _, span = text.rpartition("=")
+    found = _FORM.fullmatch(wanted)
+    if not found:
+        raise FileError(
+            f'--vary {text!r} is not of the form "t of inner=0.6:0.8" or "E=90%:110%"; fields are '
+            f"{', '.join(FIELDS)}"
+        )
+    section = _section(text, found[1], found[2], assembly)
+    free = free_parameter(section, assembly, deck)
+    if free.field not in FIELDS:
+        raise FileError(f"--vary {text!r}: {free.field} is an effect; a study varies numbers")
+    nominal, unit = _nominal(assembly, free, units is not None)
+    low, high, log = _range(text, span, nominal, _scale(text, span, assembly, free, units))
+    return Variation(_called(free), free, nominal, low, high, unit, log)
+
+
+class _Wish(TomlSection):
+    """Words of the command line read as those of a [[parameter]]."""
+
+    def at(self, key: str) -> str:
+        return f"{self.name} ({key})"
+
+
+def _section(text: str, field: str, parts: str | None, assembly: Assembly) -> TomlSection:
+    values: dict[str, Any] = {"field": field}
+    if parts is not None:
+        whole = any(parts == p.name for p in assembly.parts)
+        values["parts"] = [parts] if whole else [p.strip() for p in parts.split(",")]
+    return _Wish(Path("--vary"), f"--vary {text!r}", values, {}, 0)
+
+
+def _called(free: FreeParameter) -> str:
+    """'t of inner, outer'; the field alone where all that have it share it."""
+    return f"{free.field} of {', '.join(free.parts)}" if free.parts else free.field
+
+
+def _nominal(assembly: Assembly, free: FreeParameter, si: bool) -> tuple[float, str]:
+    """The deck's own value and its unit; 1 where the members' values differ."""
+    values = values_of(assembly, free)
+    if np.ptp(values) > _SAME * abs(values[0]) or values[0] == 0:
+        return 1.0, "of the deck's"
+    return float(values[0]), (_unit(assembly, free) if si else "deck units")
+
+
+def _unit(assembly: Assembly, free: FreeParameter) -> str:
+    return "N m/rad" if free.field == "K" and _turns(assembly, free) else UNITS[free.field]
+
+
+def _turns(assembly: Assembly, free: FreeParameter) -> bool:
+    """Whether the springs are springs against rotation."""
+    springs = assembly.springs.component[list(free.springs)]
+    turned = assembly.bushes.stiffness[list(free.bushes), 3:]
+    return bool((springs > 3).any() or turned.any())
+
+
+def _scale(
+    text: str, span: str, assembly: Assembly, free: FreeParameter, units: Units | None
+) -> float:
+    """What a plain number is multiplied by; refused where there is no one value to stand for."""
+    plain = any("%" not in piece for piece in span.split(":")[:2])
+    _, unit = _nominal(assembly, free, True)
+    if not plain or (units is None and unit != "of the deck's"):
+        return 1.0
+    if unit == "of the deck's":
+        values = np.unique(values_of(assembly, free))
+        raise FileError(
+            f"--vary {text!r}: {_called(free)} has {len(values)} different values in the deck; "
+            "give a share of the deck's own, as 90%:110%, or vary one part at a time"
+        )
+    assert units is not None
+    moment = units.force * units.length if unit == "N m/rad" else units.force / units.length
+    return {
+        **dict.fromkeys(("E", "E1", "E2", "G12"), units.stress),
+        **{"rho": units.density, "t": units.length, "K": moment, "M": units.mass},
+    }.get(free.field, 1.0)
+
+
+def _range(text: str, span: str, nominal: float, scale: float) -> tuple[float, float, bool]:
+    """(low, high, sampled in the logarithm), in the unit of the nominal value."""
+    pieces = span.split(":")
+    log = len(pieces) == 3 and pieces[2].strip() == "log"
+    try:
+        low, high = (_number(p, nominal, scale) for p in pieces[: 2 if log else None])
+    except ValueError:
+        raise FileError(
+            f"--vary {text!r}: {span.strip()!r} is no range; write 0.6:0.8, 90%:110% or 1e2:1e6:log"
+        ) from None
+    if not 0 < low < high < np.inf:
+        raise FileError(f"--vary {text!r}: the range must increase and be above zero")
+    field = text.split("=")[0].split()[0]
+    reach = _REACH.get(field, FARTHEST)
+    for value in (low, high):
+        if not 1 / reach <= value / nominal <= reach:
+            raise FileError(
+                f"--vary {text!r}: {value / scale:g} is {value / nominal:.3g} times the deck's own "
+                f"{nominal / scale:g}; plain numbers are in the deck's own units, a share of its "
+                "value is written 90%:110%"
+            )
+    return low, high, log
+
+
+def _number(piece: str, nominal: float, scale: float) -> float:
+    piece = piece.strip()
+    if piece.endswith("%"):
+        return float(piece[:-1]) / 100 * nominal
+    return float(piece) * scale
+
+
+def refuse_impossible(chosen: Sequence[Variation], assembly: Assembly) -> None:
+    """Refuse two ranges for one number, and Poisson's ratios of 1/2 and more."""
+    for k, a in enumerate(chosen):
+        if a.free.field == "nu":
+            most = float(values_of(assembly, a.free).max()) * a.high / a.nominal
+            if most >= 0.5:
+                raise FileError(f"{a.name!r} would reach {most:.3g}; no material has 0.5 or more")
+        for b in chosen[:k]:
+            shared = any(
+                set(getattr(a.free, name)) & set(getattr(b.free, name))
+                for name in ("positions", "springs", "bushes", "masses")
+            )
+            if a.name == b.name or (a.free.field == b.free.field and shared):
+                raise FileError(f"{b.name!r} and {a.name!r} vary the same number; leave one out")

@@ -1,0 +1,156 @@
+"""Samples on this process, on local processes, or on the workers of any Dask cluster."""
+
+import logging
+import os
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from .sample import SampleResult, StudyModel, computed
+
+PATIENCE = 15  # seconds a scheduler may take to answer
+WORTH = 10.0  # seconds of one process above which it pays to start others
+_AHEAD = 2  # samples per thread that are on the cluster at a time
+_COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
+
+
+def affordable(samples: int, seconds: float) -> int:
+    """Local processes for so many samples of so many seconds each."""
+    if samples * seconds < WORTH:
+        return 1
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min(cores or 1, samples))
+
+
+def results(
+    study: StudyModel, X: np.ndarray, todo: Sequence[int], workers: int, scheduler: Any = None
+) -> Iterator[SampleResult]:
+    """Samples ``todo`` of X in whatever order they are finished.
+
+    Parameters
+    ----------
+    workers : local processes; with one, and no scheduler, samples are computed in this process
+    scheduler : address of a running Dask scheduler, or a ``distributed.Client``
+    """
+    if not todo:
+        return
+    if scheduler is None and workers == 1:
+        for k in todo:
+            yield computed(study, k, X[k])
+        return
+    with _client(workers, scheduler) as client:
+        yield from _distributed(client, study, X, todo)
+
+
+@contextmanager
+def _client(workers: int, scheduler: Any) -> Iterator[Any]:
+    """A client of the scheduler, or of processes started for this study and ended with it."""
+    from distributed import Client, LocalCluster
+
+    if isinstance(scheduler, Client):
+        yield scheduler
+        return
+    with _quiet("distributed", "distributed.client"):
+        if scheduler is not None:
+            with _connected(str(scheduler)) as client:
+                yield client
+            return
+        with (
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster) as client,
+        ):  # fmt: skip
+            yield client
+
+
+@contextmanager
+def _quiet(*names: str) -> Iterator[None]:
+    """Without what Dask logs: a worker that dies, a scheduler that is lost have their sentences."""
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def _connected(address: str) -> Any:
+    from distributed import Client
+
+    try:
+        return Client(address, timeout=PATIENCE)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise FileError(
+            f"no Dask scheduler answers at {address!r} ({why[:120]}); give its address as "
+            "tcp://host:8786"
+        ) from error
+
+
+def _distributed(
+    client: Any, study: StudyModel, X: np.ndarray, todo: Sequence[int]
+) -> Iterator[SampleResult]:
+    """Few samples at a time, so that a cluster that shrinks or a kill costs no more than these.
+
+    The model is a task of its own: the scheduler makes it again where the worker that held it dies.
+    """
+    from distributed import as_completed
+
+    held = client.submit(_itself, study, pure=False)
+    asked: dict[Any, int] = {}
+    waiting = list(reversed(todo))
+    ready, counted, ahead = as_completed(), -np.inf, 1
+    while waiting or asked:
+        if time.monotonic() - counted > _COUNTED:
+            counted = time.monotonic()
+            ahead = _AHEAD * _threads(client)
+        while waiting and len(asked) < ahead:
+            k = waiting.pop()
+            future = client.submit(computed, held, k, X[k], pure=False)
+            asked[future] = k
+            ready.add(future)
+        future = next(ready)
+        yield _result(future, asked.pop(future))
+
+
+def _threads(client: Any) -> int:
+    """Threads of the cluster now, one while none has come yet."""
+    try:
+        return max(1, sum(client.nthreads().values()))
+    except OSError as error:
+        raise FileError("the connection to the scheduler was lost") from error
+
+
+def _itself(study: StudyModel) -> StudyModel:
+    return study
+
+
+def _result(future: Any, k: int) -> SampleResult:
+    """What a worker found; a sample that ends its workers has failed, all else ends the study."""
+    from distributed import KilledWorker
+    from distributed.client import FutureCancelledError
+
+    try:
+        found = future.result()
+    except KilledWorker:
+        why = "its worker ended without a word each time it was tried: is there memory enough?"
+        return SampleResult(k, {}, why)
+    except (FutureCancelledError, OSError) as error:
+        raise FileError("the connection to the scheduler was lost") from error
+    except Exception as error:
+        why = " ".join(str(error).split())[:200]
+        raise FileError(
+            f"the workers could not run a sample ({type(error).__name__}: {why}); they need the "
+            "same chladni as this process"
+        ) from error
+    assert isinstance(found, SampleResult)
+    return found

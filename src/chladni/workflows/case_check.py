@@ -1,0 +1,217 @@
+"""A case before minutes are spent on it: what will be used, what not, what cannot be right."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..case import Case
+from ..errors import ChladniError, FileError
+from ..fem.energy import mass_properties
+from ..fem.measured_dofs import MeasuredDofs
+from ..geometry.nearest import ShellSurface
+from ..progress import Progress, silent
+from .case_draft import said_of
+from .correlate import correlate
+from .loaded_model import as_model
+from .unit_check import FAR, refuse_other_units
+from .unit_guess import SIZE, guessed_units
+
+COMMANDS = ("correlate", "calibrate", "diagnose", "study")  # whose use of the words is told
+MODES = 12  # of the model that are looked at
+OFF_MASS = 0.1  # of the weighed mass: more is no scatter of sheets
+OFF_MESH = 0.005  # of the structure's size: a sensor farther from the mesh is worth a look
+TOGETHER = 1e-4  # [m]; two channels nearer than this in one direction are one place
+
+
+@dataclass(frozen=True)
+class CaseFinding:
+    """Something that looks wrong: a fault is to be mended before anything is fitted."""
+
+    text: str
+    remedy: str
+    fault: bool = False
+
+
+@dataclass(frozen=True)
+class CheckedDof:
+    """One row of the table of sensors as it was understood."""
+
+    label: str
+    role: str
+    place: str  # "grid 412", "on a shell", "the supports"
+    point_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    off_mesh_m: float
+    mass_kg: float
+
+
+@dataclass(frozen=True, eq=False)
+class CaseCheck:
+    """What a case holds, as it was understood.
+
+    Attributes
+    ----------
+    facts : (what, in words)
+    frequency : (r,)      lowest elastic modes of the model [Hz]
+    dofs : tuple of CheckedDof
+    findings : tuple of CaseFinding
+    unused : {command: sentences}   what each command makes no use of, and how the rest is read
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    frequency: np.ndarray
+    dofs: tuple[CheckedDof, ...]
+    findings: tuple[CaseFinding, ...]
+    unused: dict[str, tuple[str, ...]]
+
+    @property
+    def faults(self) -> tuple[CaseFinding, ...]:
+        """What is to be mended first."""
+        return tuple(f for f in self.findings if f.fault)
+
+
+def check(case: Case, progress: Progress = silent) -> CaseCheck:
+    """Units, mass, size, places, band and words of a case, with the model's lowest modes."""
+    progress("modes of the model", 0.1)
+    model = as_model(case, "modes")
+    modal = model.modes(MODES + 6)
+    f = modal.frequency
+    elastic = f[f > 1e-3 * f[-1]][:MODES]
+    progress("places", 0.7)
+    dofs = (*_dofs(case, case.outputs, "output"), *_dofs(case, case.inputs, "input"))
+    findings = [
+        *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
+    ]  # fmt: skip
+    if not any(f.fault for f in findings):
+        progress("the recording beside the model", 0.8)
+        findings += _correlated(case)
+    unused = {c: tuple(case.said(c)) for c in COMMANDS}
+    return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
+
+
+def _facts(case: Case) -> list[tuple[str, str]]:
+    made, mass = case.assembly, mass_properties(case.assembly)[0]
+    count = {
+        "shells": len(made.shells), "solids": sum(map(len, made.solids)),
+        "beams": len(made.beams), "springs and bushes": len(made.springs) + len(made.bushes),
+        "rigid elements": len(made.rigid), "masses": len(made.masses),
+    }  # fmt: skip
+    held = ", ".join(f"{n} {what}" for what, n in count.items() if n)
+    size = " x ".join(f"{x:.3g}" for x in np.ptp(made.points, axis=0))
+    weighed = "not weighed" if case.setup.mass is None else f"{case.setup.mass:.5g} kg weighed"
+    out = [
+        ("deck", f"{case.deck.path.name} in {case.units.name}: {len(made.ids)} grids, {held}"),
+        ("size", f"{size} m"),
+        ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
+        *(("recording", said_of(r)) for r in case.recordings),
+        ("sensors", f"{len(case.outputs.labels)} outputs, {len(case.inputs.labels)} inputs"),
+    ]
+    band = "all the recording holds" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
+    without = "".join(f", without {a:g} to {b:g} Hz" for a, b in case.exclude)
+    out.append(("band", band + without))
+    free = ", ".join(p.name for p in case.parameters) or "the usual ones: E, t, rho"
+    return [*out, ("free", free)]
+
+
+def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:
+    off = np.zeros(len(at.labels))
+    free = np.flatnonzero((at.grids <= 0) & ~at.base)
+    if len(free) and len(case.assembly.shells):
+        off[free] = ShellSurface.whole(case.assembly).feet(at.points[free]).distance
+    rows = zip(
+        at.labels, at.grids.tolist(), at.points.tolist(), at.directions.tolist(), at.base.tolist(),
+        off.tolist(), at.mass.tolist(), strict=True,
+    )  # fmt: skip
+    return [
+        CheckedDof(
+            label, role, "the supports" if base else f"grid {grid}" if grid else "on a shell",
+            tuple(point), tuple(axis), away, mass,
+        )
+        for label, grid, point, axis, base, away, mass in rows
+    ]  # fmt: skip
+
+
+def _units(case: Case) -> list[CaseFinding]:
+    """A system the deck cannot be in, by its weighed mass or its materials."""
+    try:
+        refuse_other_units(case)
+    except FileError as error:
+        return [CaseFinding(str(error).partition(": ")[2], "nothing can be fitted before", True)]
+    try:
+        guessed_units(case.assembly, case.deck.path.name, case.units)
+    except FileError as error:
+        return [CaseFinding(str(error).partition(": ")[2], "look at E and rho of the materials")]
+    return []
+
+
+def _mass(case: Case) -> list[CaseFinding]:
+    weighed, mass = case.setup.mass, float(mass_properties(case.assembly)[0])
+    if weighed is None or mass <= 0 or abs(mass / weighed - 1) <= OFF_MASS:
+        return []
+    if not 1 / FAR <= mass / weighed <= FAR:  # that is said of its units
+        return []
+    said = f"the deck weighs {mass:.4g} kg, the article {weighed:.4g} kg"
+    return [CaseFinding(said, "is the article the one of the deck, trim and sensors off?")]
+
+
+def _size(case: Case) -> list[CaseFinding]:
+    size = float(np.linalg.norm(np.ptp(case.assembly.points, axis=0)))
+    if SIZE[0] <= size <= SIZE[1]:
+        return []
+    return [CaseFinding(f"the deck is {size:.3g} m across", "is its unit of length right?", True)]
+
+
+def _places(case: Case, dofs: tuple[CheckedDof, ...]) -> list[CaseFinding]:
+    size = float(np.linalg.norm(np.ptp(case.assembly.points, axis=0)))
+    out = []
+    far = [d for d in dofs if d.off_mesh_m > OFF_MESH * size]
+    if far:
+        worst = max(far, key=lambda d: d.off_mesh_m)
+        said = (
+            f"{len(far)} places are off the mesh, {worst.label} by {1e3 * worst.off_mesh_m:.3g} mm"
+        )
+        out.append(CaseFinding(said, "look at the picture: metres, and the deck's axes?"))
+    twice = [
+        (a.label, b.label)
+        for k, a in enumerate(dofs)
+        for b in dofs[:k]
+        if a.role == b.role and _same(a, b)
+    ]
+    if twice:
+        said = f"{twice[0][1]} and {twice[0][0]} are one place and one direction"
+        more = f" ({len(twice)} such pairs)" if len(twice) > 1 else ""
+        out.append(CaseFinding(said + more, "two labels for one sensor? look at sensors.csv"))
+    return out
+
+
+def _same(a: CheckedDof, b: CheckedDof) -> bool:
+    near = float(np.linalg.norm(np.subtract(a.point_m, b.point_m))) < TOGETHER
+    return near and abs(float(np.dot(a.direction, b.direction))) > 1 - 1e-6
+
+
+def _correlated(case: Case) -> list[CaseFinding]:
+    """What only shows when the recording is held against the model."""
+    if not case.frfs:
+        return []
+    try:
+        screening = correlate(case).screening
+    except ChladniError as error:
+        said = str(error).removeprefix(f"{case.path}: ")
+        return [CaseFinding(said, "nothing can be fitted before", True)]
+    if screening is None:
+        return []
+    return [
+        CaseFinding(f.text.rstrip("."), f.repair, f.severity == "fault") for f in screening.findings
+    ]
+
+
+def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:
+    """A recording in whose band the model has nothing to say."""
+    frfs = case.frfs
+    if not frfs or not len(elastic):
+        return []
+    high = case.band[1] if case.band else float(frfs[0].frequency[-1])
+    if elastic[0] <= high:
+        return []
+    said = f"the model's first elastic mode is at {elastic[0]:.4g} Hz, the band ends at {high:g} Hz"
+    return [CaseFinding(said, "are the deck's units right, and is the band in Hz?", True)]

@@ -1,0 +1,292 @@
+"""A first case from a deck and a recording: what is guessed, from what, and what is missing."""
+
+import json
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..case.free_parameters import fields_of
+from ..ema.setup import Recording
+from ..errors import FileError
+from ..fem.energy import mass_properties
+from ..io.nastran import assembly
+from ..io.tables.read_tables import read_recordings
+from ..io.tables.sensor_table import read_sensors
+from ..model.assembly import Assembly
+from ..units import Units
+from ..units import units as unit_system
+from .loaded_model import beside, load_deck
+from .matched_dofs import MatchedDof, matched
+from .unit_guess import guessed_units
+
+COLUMNS = (
+    *("label", "grid", "x", "y", "z", "direction", "nx", "ny", "nz"),
+    *("role", "mass", "position_sd"),
+)
+WAYS = {
+    "grid": "by the number of their grid",
+    "place": "by a grid at their place",
+    "nearest": "on the nearest point of the mesh",
+    "table": "by the table given",
+    "base": "as the motion of the supports",
+    "missing": "nowhere: their place is missing",
+}
+_NAMED = 8  # labels a sentence names
+_FAR = 0.01  # [m] from the mesh: worth saying
+
+
+@dataclass(frozen=True, eq=False)
+class CaseDraft:
+    """What `chladni init` writes.
+
+    Attributes
+    ----------
+    deck, recordings : files
+    units : Units, and ``units_why`` how they are known
+    assembly : SI
+    mass : of the deck [kg]
+    quantity : the user's word, "" where the files say it
+    read : recordings as read, the compared one first
+    dofs : where its outputs and inputs are
+    notes : what was assumed
+    missing : what is not there yet, and how to supply it
+    """
+
+    deck: Path
+    recordings: tuple[Path, ...]
+    units: Units
+    units_why: str
+    assembly: Assembly
+    mass: float
+    quantity: str
+    weighed: float | None
+    read: tuple[Recording, ...]
+    dofs: tuple[MatchedDof, ...]
+    notes: tuple[str, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def found(self) -> str:
+        """How many dofs were found in which way."""
+        count: Counter[str] = Counter(d.way for d in self.dofs)
+        return ", ".join(f"{count[way]} {text}" for way, text in WAYS.items() if count[way])
+
+
+def draft(
+    deck: Path,
+    recordings: Sequence[Path] = (),
+    units: str | None = None,
+    quantity: str | None = None,
+    table: Path | None = None,
+    weighed: float | None = None,
+    allow: Sequence[str] = (),
+) -> CaseDraft:
+    """Read what there is, guess what is not said, and name what is missing.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be read, or the unit system cannot be told.
+    """
+    bare = load_deck(deck, None, allow)
+    if units is None:
+        guess = guessed_units(assembly(bare.deck), deck.name)
+        system, why = guess.units, guess.why
+        sure = "no other system fits" if guess.sure else "another system fits, too: look at this"
+        why = f"{why}; {sure}"
+    else:
+        system, why = unit_system(units), "as given"
+    made = assembly(bare.deck, system)
+    read = [r for path in recordings for r in _recordings(path, quantity)]
+    read.sort(key=lambda r: (r.frf is None, r.poles is None))
+    dofs, notes = matched(made, read[0], read_sensors(table) if table else ()) if read else ([], [])
+    mass = float(mass_properties(made)[0])
+    notes += [note for r in read for note in r.notes]
+    notes += _far(dofs)
+    return CaseDraft(
+        deck, tuple(recordings), system, why, made, mass, quantity or "", weighed, tuple(read),
+        tuple(dofs), tuple(notes), tuple(_missing(read, dofs, mass, weighed)),
+    )  # fmt: skip
+
+
+def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:
+    if not path.is_file():
+        raise FileError(f"no file {path}{beside(path)}")
+    try:
+        return read_recordings(path, quantity)
+    except FileError as error:
+        if quantity is None and "quantity" in str(error):
+            raise FileError(f"{error} (--quantity)") from error
+        raise
+
+
+def _far(dofs: Sequence[MatchedDof]) -> list[str]:
+    far = [d for d in dofs if d.way == "nearest" and d.distance > _FAR]
+    if not far:
+        return []
+    worst = max(far, key=lambda d: d.distance)
+    return [
+        f"{len(far)} places are more than {1e3 * _FAR:g} mm off the mesh, {worst.label} "
+        f"{1e3 * worst.distance:.3g} mm: is the recording in the deck's frame?"
+    ]
+
+
+def _missing(
+    read: Sequence[Recording], dofs: Sequence[MatchedDof], mass: float, weighed: float | None
+) -> list[str]:
+    """What is not there yet, and how to supply it."""
+    out = []
+    lost = [f"{d.label} ({d.role})" for d in dofs if d.way == "missing"]
+    if lost:
+        more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
+        out.append(
+            f"places of {', '.join(lost[:_NAMED])}{more}: the deck has no such grid and the "
+            "recording no such node; a row each in sensors.csv, with a grid or x, y, z in metres"
+        )
+    if not read:
+        out.append("a recording: [test] recordings, a universal file, .npz or .csv")
+    elif all(r.frf is None and r.poles is None for r in read):
+        out.append("FRFs or a table of poles: the recordings hold neither")
+    if weighed is None:
+        out.append(
+            f"the weighed mass: [test] mass in kg, sensors taken off; the deck weighs {mass:.4g} "
+            "kg, and a wrong unit system shows by it"
+        )
+    return out
+
+
+def sensors_text(made: CaseDraft) -> str:
+    """``sensors.csv``; what is missing has no row."""
+    rows = [_row(d) for d in made.dofs if d.way != "missing"]
+    return "\n".join([",".join(COLUMNS), *(",".join(row) for row in rows), ""])
+
+
+def _row(d: MatchedDof) -> list[str]:
+    place = [""] * 3 if d.place is None else [f"{x:.7g}" for x in d.place]
+    way, axis = "n", [""] * 3
+    if d.axis is not None:
+        k = int(np.abs(d.axis).argmax())
+        plain = np.isclose(abs(d.axis[k]), 1.0, atol=1e-9)
+        way = f"{'+' if d.axis[k] > 0 else '-'}{'XYZ'[k]}" if plain else ""
+        axis = [""] * 3 if plain else [f"{x:.9g}" for x in d.axis]
+    grid = "" if d.grid is None or d.way == "base" else str(d.grid)
+    mass = f"{d.mass:g}" if d.mass else ""
+    return [d.label, grid, *place, way, *axis, d.role, mass, ""]
+
+
+def case_text(made: CaseDraft, folder: Path) -> str:
+    """``case.toml`` with a comment on every word, its paths as seen from ``folder``."""
+    name = lambda path: json.dumps(_seen_from(path, folder), ensure_ascii=False)  # noqa: E731
+    lines = [
+        "# A case of chladni, drafted by chladni init. Lines that begin with # are off: take the",
+        "# mark away to use them. chladni check says what will be used.",
+        "",
+        "[model]",
+        f"deck = {name(made.deck)}",
+        *_comment(made.units_why),
+        f'units = "{made.units.name}"',
+        "# damping = 0.01  # of critical, where responses are drawn or scored",
+        "",
+        "[test]",
+        *_of_recordings(made, name),
+        _of_mass(made),
+        "# mass_sd = 0.005  # standard deviation of the weighing [kg]",
+        "# hangers = [101, 102]  # grids at which cords hold it",
+        '# gain = "unknown"  # one real factor common to all channels is then free',
+        "",
+        *_of_band(made),
+        "",
+        "[held_out]",
+        "# sensors = 6  # outputs no fit may see; else a fifth of them is chosen",
+        "",
+        *_of_parts(made),
+    ]  # fmt: skip
+    missing = [line for text in made.missing for line in _comment(f"MISSING {text}")]
+    notes = [line for text in made.notes for line in _comment(f"NOTE {text}")]
+    return "\n".join([*lines, *([""] if missing or notes else []), *missing, *notes, ""])
+
+
+def _of_mass(made: CaseDraft) -> str:
+    """The weighed mass; where there is none no number that could be taken for one."""
+    if made.weighed is not None:
+        return f"mass = {made.weighed:g}  # weighed [kg]"
+    return (
+        f"# mass = 0.0  # weigh the article [kg], sensors off; the deck weighs {made.mass:.4g} kg"
+    )
+
+
+def _seen_from(path: Path, folder: Path) -> str:
+    """A path relative to the case, whole where there is no way (another drive)."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return path.resolve().as_posix()
+
+
+def _comment(text: str) -> list[str]:
+    """A sentence as lines that begin with #, whatever a file put into it."""
+    words, lines = "".join(c if c.isprintable() else " " for c in text).split(), ["#"]
+    for word in words:
+        if len(lines[-1]) + len(word) > 98 and lines[-1] != "#":
+            lines.append("#  ")
+        lines[-1] += f" {word}"
+    return lines
+
+
+def _of_recordings(made: CaseDraft, name: object) -> list[str]:
+    assert callable(name)
+    if not made.read:
+        return ['# recordings = ["recording.uff"]  # universal file, .npz or .csv']
+    out = [f"recordings = [{', '.join(name(p) for p in made.recordings)}]"]
+    for r in made.read:
+        out += _comment(said_of(r))
+    frf = made.read[0].frf
+    if made.quantity:
+        out.append(f'quantity = "{made.quantity}"')
+    elif frf is not None:
+        out.append(f'# quantity = "{frf.quantity}"  # the file says so; only to overrule it')
+    if made.dofs:
+        out += _comment(f"Found on the deck: {made.found}.")
+        out.append('sensors = "sensors.csv"')
+    return out
+
+
+def said_of(r: Recording) -> str:
+    """A recording in one sentence."""
+    if r.poles is not None and r.frf is None:
+        return f"{r.name}: {len(r.poles.frequency)} poles"
+    if r.frf is None:
+        return f"{r.name}: neither FRFs nor poles"
+    f = r.frf
+    shown = ", ".join(f.inputs[:4]) + (" ..." if len(f.inputs) > 4 else "")
+    return (
+        f"{r.name}: {f.quantity} of {len(f.outputs)} outputs from {shown}, {len(f.frequency)} "
+        f"lines from {f.frequency[0]:g} to {f.frequency[-1]:g} Hz, "
+        f"{'with' if f.coherence is not None else 'without'} coherence"
+    )
+
+
+def _of_band(made: CaseDraft) -> list[str]:
+    frf = next((r.frf for r in made.read if r.frf is not None), None)
+    ends = (frf.frequency[frf.frequency > 0][[0, -1]]) if frf is not None else (20.0, 200.0)
+    return [
+        "[band]",
+        f"# fit = [{ends[0]:g}, {ends[1]:g}]  # Hz; without it all the recording holds",
+        "# exclude = [[23.0, 27.5]]  # bands left out: cords, mains",
+    ]
+
+
+def _of_parts(made: CaseDraft) -> list[str]:
+    out = ["# What may be calibrated; without any, E and t of every sheet, rho of every material."]
+    for part in made.assembly.parts[:20]:
+        if fields := fields_of(part):
+            out += _comment(f"{part.name} ({part.id}) has {', '.join(fields)}")
+    first = next((p for p in made.assembly.parts if fields_of(p)), None)
+    if first is not None:
+        quoted = json.dumps(first.name, ensure_ascii=False)
+        out += ["# [[parameter]]", f"# parts = [{quoted}]", f'# field = "{fields_of(first)[0]}"']
+    return out

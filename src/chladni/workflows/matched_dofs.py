@@ -1,0 +1,155 @@
+"""Where the dofs of a recording are on a deck: by the grid's number, by place, by the nearest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..ema.setup import Recording, Role, Sensor
+from ..geometry.nearest import ShellSurface
+from ..io.tables.sensor_table import direction
+from ..model.assembly import Assembly
+
+SAME_PLACE = 0.002  # of the structure's size: a place this near to a grid is that grid
+OFF = 0.02  # of the size: a node farther from the grid of its number is another one
+SCALES = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 0.01, "units 1000 times as large": 1e3}
+_ENOUGH, _LOOKED = 3, 200  # nodes by which a scale can be told; and that are looked at
+Way = Literal["grid", "place", "nearest", "base", "table", "missing"]
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedDof:
+    """One output or input, and how it was found.
+
+    Attributes
+    ----------
+    way : "grid" (its number is a grid of the deck), "place" (a grid lies where the recording has
+          it), "nearest" (on the nearest shell or grid), "base", "table" (a row of the user's own),
+          or "missing"
+    grid, place : one of them, [m]; neither where it is missing or the base
+    distance : between the recording's place and the deck's [m], nan where one is unknown
+    axis : (3,) unit vector, basic frame; None: the surface's normal
+    mass : of the sensor, where a table says so [kg]
+    """
+
+    label: str
+    role: Role
+    way: Way
+    grid: int | None = None
+    place: np.ndarray | None = None
+    distance: float = np.nan
+    axis: np.ndarray | None = None
+    mass: float = 0.0
+
+
+def matched(
+    made: Assembly, recording: Recording, table: Sequence[Sensor] = ()
+) -> tuple[list[MatchedDof], list[str]]:
+    """Every dof of a recording's FRFs on the deck, and sentences on what was assumed.
+
+    Parameters
+    ----------
+    made : the deck in SI
+    table : rows of a table of sensors (of ``chladni plan``, say), which go before all else
+    """
+    if recording.frf is None:
+        return [], []
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
+    unit, scale = _scale(made, recording, size)
+    notes = []
+    if scale != 1:
+        notes.append(
+            f"the places of {recording.name} fit the deck if they are read in {unit}: so they "
+            "were, though the file says otherwise or nothing"
+        )
+    own = {(s.label, s.role): s for s in table}
+    nodes = {n: scale * x for n, x in recording.nodes.items()}
+    by_number = _numbers_agree(made, nodes, size)
+    if nodes and not by_number and set(nodes) & set(made.ids.tolist()):
+        notes.append(
+            f"nodes of {recording.name} have numbers of grids that lie elsewhere: places count, "
+            "numbers do not"
+        )
+    sides: tuple[tuple[Role, Sequence[str]], ...] = (
+        ("output", recording.frf.outputs), ("input", recording.frf.inputs),
+    )  # fmt: skip
+    found = [
+        _of_table(own[label, role])
+        if (label, role) in own
+        else _one(made, recording, nodes, by_number, size, label, role)
+        for role, labels in sides
+        for label in labels
+    ]
+    return found, notes
+
+
+def _of_table(s: Sensor) -> MatchedDof:
+    return MatchedDof(s.label, s.role, "table", s.grid, s.place, np.nan, s.direction, s.mass)
+
+
+def _one(
+    made: Assembly, recording: Recording, nodes: dict[int, np.ndarray], by_number: bool,
+    size: float, label: str, role: Role,
+) -> MatchedDof:  # fmt: skip
+    """One label: its number, its place, the nearest; else missing."""
+    node = label.partition(":")[0].strip()
+    axis = direction(label, label)
+    if node == "base":
+        return MatchedDof(label, role, "base", axis=axis)
+    id = int(node) if node.isdecimal() and node.isascii() else 0
+    row = int(np.searchsorted(made.ids, id))
+    is_grid = row < len(made.ids) and made.ids[row] == id
+    if axis is not None and id in recording.axes:
+        axis = axis @ recording.axes[id]
+    elif axis is not None and is_grid and by_number and made.axes is not None:
+        axis = axis @ made.axes[row]
+    if is_grid and (by_number or id not in nodes):
+        away = float(np.linalg.norm(made.points[row] - nodes[id])) if id in nodes else np.nan
+        return MatchedDof(label, role, "grid", id, distance=away, axis=axis)
+    if id not in nodes:
+        return MatchedDof(label, role, "missing", axis=axis)
+    return _by_place(made, nodes[id], size, label, role, axis)
+
+
+def _by_place(
+    made: Assembly, place: np.ndarray, size: float, label: str, role: Role, axis: np.ndarray | None
+) -> MatchedDof:
+    away = np.linalg.norm(made.points - place, axis=1)
+    near = int(away.argmin())
+    if away[near] <= SAME_PLACE * size or not len(made.shells):
+        way: Way = "place" if away[near] <= SAME_PLACE * size else "nearest"
+        grid = int(made.ids[near])
+        return MatchedDof(label, role, way, grid, distance=float(away[near]), axis=axis)
+    off = float(ShellSurface.whole(made).feet(place).distance[0])
+    return MatchedDof(label, role, "nearest", None, place, off, axis)
+
+
+def _scale(made: Assembly, recording: Recording, size: float) -> tuple[str, float]:
+    """(unit, factor) that brings the recording's places onto the deck; metres unless far better."""
+    if len(recording.nodes) < _ENOUGH:
+        return "m", 1.0
+    places = np.array(list(recording.nodes.values()))
+    off = {unit: _off(made, places * factor, size) for unit, factor in SCALES.items()}
+    best = min(off, key=lambda unit: off[unit])
+    if off["m"] > 5 * OFF and off[best] < OFF:
+        return best, SCALES[best]
+    return "m", 1.0
+
+
+def _off(made: Assembly, places: np.ndarray, size: float) -> float:
+    """Median distance from the nearest grid over the structure's size; a mere dot is far off."""
+    if float(np.linalg.norm(np.ptp(places, axis=0))) < OFF * size:
+        return np.inf
+    away = [float(np.linalg.norm(made.points - x, axis=1).min()) for x in places[:_LOOKED]]
+    return float(np.median(away)) / size
+
+
+def _numbers_agree(made: Assembly, nodes: dict[int, np.ndarray], size: float) -> bool:
+    """Whether nodes lie where the grids of their numbers do; nothing known speaks for them."""
+    ids = [n for n in nodes if n in set(made.ids.tolist())]
+    if not ids:
+        return True
+    places = np.array([nodes[n] for n in ids])
+    away = np.linalg.norm(made.points[made.rows(ids)] - places, axis=1)
+    return bool(np.median(away) <= OFF * size)

@@ -1,0 +1,116 @@
+"""Which unit system a bare deck is in, by its materials, its size and its mass."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import FileError
+from ..fem.energy import mass_properties
+from ..model.assembly import Assembly
+from ..model.properties import Isotropic, Material, Section, ShellSection
+from ..units import UNITS, Units
+
+MATERIALS = {  # E [Pa], rho [kg/m³]: what decks are made of
+    "steel": (2.1e11, 7850.0),
+    "aluminium or glass": (7.0e10, 2650.0),
+    "magnesium": (4.5e10, 1770.0),
+    "titanium": (1.1e11, 4430.0),
+    "copper": (1.2e11, 8900.0),
+    "a carbon laminate": (7.0e10, 1550.0),
+    "wood": (1.1e10, 450.0),
+    "a plastic": (2.5e9, 1150.0),
+    "an adhesive or rubber": (6.0e6, 1050.0),
+}
+SIZE, MASS = (0.005, 50.0), (1e-3, 1e5)  # [m], [kg] of what is tested in one piece
+NEAR = 0.5  # decades: farther from every material a system is not believed
+CLEAR = 1.0  # decades the next system must be worse by
+
+
+@dataclass(frozen=True)
+class UnitGuess:
+    """A unit system, whether it is the only one that fits, and why in one sentence."""
+
+    units: Units
+    sure: bool
+    why: str
+
+
+def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> UnitGuess:
+    """The system in which the deck's numbers are those of known materials.
+
+    Parameters
+    ----------
+    made : the deck as it was read
+    read_in : in which system; a deck read without one counts as SI
+
+    Raises
+    ------
+    FileError
+        If it has no material with a modulus and a density, or none is usual in any system.
+    """
+    pairs = _materials(made, read_in)
+    if not pairs:
+        raise FileError(
+            f"{source}: no material has a modulus and a density to tell the unit system by; give "
+            f"--units, one of {', '.join(UNITS)}"
+        )
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0))) / read_in.length
+    mass = float(mass_properties(made)[0]) / read_in.mass
+    ranked = sorted((_misfit(pairs, size, mass, u), k, u) for k, u in enumerate(UNITS.values()))
+    (best, _, units), (second, *_) = ranked[:2]
+    E, rho = pairs[0]
+    if best > NEAR:
+        raise FileError(
+            f"{source}: E = {E:g} and rho = {rho:g} are usual in no unit system "
+            f"({', '.join(UNITS)}); look at the materials, or give --units"
+        )
+    E, rho = E * units.stress, rho * units.density
+    why = (
+        f"in {units.name} the deck is {size * units.length:.3g} m across, weighs "
+        f"{mass * units.mass:.4g} kg and its first material is {_named(E, rho)} "
+        f"(E = {E / 1e9:.4g} GPa, rho = {rho:.4g} kg/m³)"
+    )
+    return UnitGuess(units, second > best + CLEAR, why)
+
+
+def material_of(section: Section) -> Material | None:
+    """The material of a section; of a shell that of its membrane."""
+    if isinstance(section, ShellSection):
+        return section.membrane or section.bending
+    return getattr(section, "material", None)
+
+
+def modulus_of(material: Material) -> float:
+    """E, or E1 of the plane stiffness (1 - nu² aside) [Pa]."""
+    return material.E if isinstance(material, Isotropic) else float(material.plane_stress()[0, 0])
+
+
+def _materials(made: Assembly, read_in: Units) -> list[tuple[float, float]]:
+    """(E, rho) of every part that has both, as they stand in the deck."""
+    found = [m for part in made.parts if (m := material_of(part.section)) is not None]
+    return [
+        (E / read_in.stress, m.rho / read_in.density)
+        for m in found
+        if (E := modulus_of(m)) > 0 and m.rho > 0
+    ]
+
+
+def _misfit(pairs: list[tuple[float, float]], size: float, mass: float, u: Units) -> float:
+    """Decades from known materials, median of the parts; one more for an odd size or mass each."""
+    each = [_distance(E * u.stress, rho * u.density)[0] for E, rho in pairs]
+    small_or_large = not SIZE[0] <= size * u.length <= SIZE[1]
+    light_or_heavy = mass > 0 and not MASS[0] <= mass * u.mass <= MASS[1]
+    return float(np.median(each)) + small_or_large + light_or_heavy
+
+
+def _distance(E: float, rho: float) -> tuple[float, str]:
+    """(decades, name) of the nearest material."""
+    return min(
+        (float(np.hypot(np.log10(E / E0), np.log10(rho / rho0))), name)
+        for name, (E0, rho0) in MATERIALS.items()
+    )
+
+
+def _named(E: float, rho: float) -> str:
+    away, name = _distance(E, rho)
+    return name if away < NEAR / 2 else f"nearest to {name}"

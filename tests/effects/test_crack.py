@@ -1,0 +1,120 @@
+"""A crack is a hinge: what beam theory says of it, and what the scan of its lines says."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.effects.crack import LEAST, LineFinder, candidates, crack, left
+from chladni.effects.ordinary import ordinary
+from chladni.effects.shell_groups import shell_groups
+from chladni.fem.assemble import structure
+from chladni.model.properties import Isotropic
+from chladni.updating.likelihood import Responses
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import reduced_problem
+from chladni.updating.scan import baseline, bending_slopes, direction_scores
+from chladni_specimens.plates import folded_panel, plate
+
+TOP = 300.0
+
+
+def test_lines_lie_on_one_part_and_are_as_long_as_they_should_be():
+    """Of a folded panel: every line within a shell's width of straight, none round the fold."""
+    deck = folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3)
+    lines = LineFinder.of(deck)
+    found = lines.drawn(np.arange(0, len(deck.shells), 37), (1.0, 2.0))
+    assert len(found) > 20
+    for line in found:
+        X = lines.middle[line.shells]
+        assert set(lines.part[line.shells]) == {line.part}
+        extent = np.linalg.svd(X - X.mean(axis=0), compute_uv=False) / np.sqrt(len(X))
+        assert extent[1] < lines.width[line.shells].max()
+        assert extent[0] > extent[1]
+        assert np.ptp(X, axis=0).max() <= 0.5 * lines.size[line.part] + 0.02
+
+
+def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
+    """∂ln λ/∂ln f = ∫_line φ''² dx / ∫ φ''² dx, φ'' of a free beam's first mode, nu = 0."""
+    n, length = 25, 0.5
+    strip = plate(length, 0.06, n, 3, 1e-3, Isotropic(2.1e11, 0.0, 7850.0))
+    reduced = reduced_problem(strip, 60.0)
+    lines = LineFinder.of(strip)
+    middle = int(np.argmin(np.linalg.norm(lines.middle - [length / 2, 0.03, 0], axis=1)))
+    across = [
+        line for line in lines.drawn(np.array([middle]), (10.0,))
+        if len(line.shells) == 3 and np.ptp(lines.middle[line.shells][:, 0]) < 1e-9
+    ]  # fmt: skip
+    effect, x = crack(reduced.groups, across[0], 1), np.array([-8.0])
+    state = evaluate(reduced.model_for(effect, x), [effect], x)
+    got = state.dK[0, 6, 6] / state.lam[6] / effect.matrices(x)[0].gradient[0]
+    k, s = 4.730040744862704, np.linspace(0, 1, 5001)  # cos k cosh k = 1
+    r = (np.cosh(k) - np.cos(k)) / (np.sinh(k) - np.sin(k))
+    bent = np.cosh(k * s) - np.cos(k * s) - r * (np.sinh(k * s) - np.sin(k * s))
+    inside = np.abs(s - 0.5) <= 0.5 / n
+    due = (bent[inside] ** 2).sum() / (bent**2).sum()
+    assert_allclose(got, due, rtol=(k / n) ** 2)  # elements of length 1/n err with its square
+
+
+def test_a_sheet_too_coarse_for_a_line_has_none():
+    """Two by two shells hold no three in a row, and nothing is proposed."""
+    coarse = plate(0.2, 0.2, 2, 2, 1e-3)
+    context = SimpleNamespace(where=SimpleNamespace(groups=shell_groups(structure(coarse))))
+    assert candidates(context) == []
+
+
+def test_something_is_always_left():
+    x = np.linspace(-50, 50, 11)
+    assert all(LEAST <= left(v) <= 1 for v in x)
+    assert left(-40.0) == pytest.approx(1, abs=1e-15)
+
+
+@pytest.fixture(scope="module")
+def scanned():
+    """A plate, a recording of it with a weak crack, and its baseline."""
+    deck = plate(0.4, 0.3, 8, 6, 1.5e-3)
+    reduced = reduced_problem(deck, TOP)
+    outputs, inputs = reduced.grids.rows[[0, 6, 20, 45]], reduced.grids.rows[[3]]
+    s = 2 * np.pi * np.linspace(25, TOP, 60) * (0.05 + 1j)
+    use = np.ones((60, 4), bool)
+    lines = LineFinder.of(deck).drawn(np.arange(48), (1.0, 2.0))
+    true = lines[7]
+    effect = crack(reduced.groups, true, 1)
+    x = np.array([-4.0])
+    empty = Responses(np.ones((60, 4, 1), complex), s, outputs, inputs, use).over(reduced.model)
+    with_it = evaluate(reduced.model, [effect], x, False)
+    data = Responses(empty.model(with_it), s, outputs, inputs, use).over(reduced.model)
+    base = baseline(reduced.model, [ordinary(reduced.groups, "E", [0])], data, None, np.zeros(1))
+    return reduced, data, base, lines, true, 1 - left(x[0])
+
+
+def test_slopes_of_a_line_are_those_of_its_effect(scanned):
+    reduced, data, base, lines, _, _ = scanned
+    slopes = bending_slopes(base, reduced.model, data, [line.shells for line in lines[:70]])
+    for k in (0, 5, 69):
+        effect, x = crack(reduced.groups, lines[k], 1), np.array([0.0, -40.0])
+        state = evaluate(reduced.model, [*base.effects, effect], x)
+        J = data.scaled(state, True)[1][:, 1]
+        a = effect.matrices(np.array([0.0]))[0]
+        at = np.array([0.0, 0.0])
+        bent = data.scaled(evaluate(reduced.model, [*base.effects, effect], at), True)[1][:, 1]
+        assert np.abs(J).max() < 1e-12  # idle: the logit is flat there
+        h = 1e-5
+        r = [
+            data.scaled(evaluate(reduced.model, [*base.effects, effect], [0.0, v], False), False)[0]
+            for v in (-40.0, np.log(0.9 / (0.9 - h) - 1))
+        ]
+        assert_allclose((r[0] - r[1]) / h, slopes[:, k], atol=1e-3 * np.abs(slopes[:, k]).max())
+        assert a.gradient[0] < 0
+        assert np.abs(bent).max() > 0
+
+
+def test_the_best_line_is_the_true_one_and_its_loss(scanned):
+    _, _, base, lines, true, lost = scanned
+    reduced, data = scanned[:2]
+    slopes = bending_slopes(base, reduced.model, data, [line.shells for line in lines])
+    amount, score = direction_scores(base, slopes)
+    best = int(np.argmin(np.where(amount < 0, score, np.inf)))
+    assert lines[best] is true
+    assert amount[best] == pytest.approx(-lost, rel=0.1)

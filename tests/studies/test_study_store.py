@@ -1,0 +1,234 @@
+"""A study's folder: what a kill at any instant leaves, and that nothing is run twice."""
+
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.errors import FileError, Interrupted
+from chladni.output import write_json
+from chladni.studies import StudySettings, parameter_study
+from chladni.studies.study_store import BEGUN, ROWS
+
+from .conftest import THREE
+
+SETTINGS = StudySettings(samples=12, modes=2)
+
+
+def rows(folder):
+    return [json.loads(line) for line in (folder / ROWS).read_text().splitlines()]
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Numbers of the samples that are computed, in order; -1 is the nominal one."""
+    seen = []
+    computed = parameter_study.computed
+
+    def counted(study, number, values):
+        seen.append(number)
+        return computed(study, number, values)
+
+    monkeypatch.setattr(parameter_study, "computed", counted)
+    monkeypatch.setattr("chladni.studies.workers.computed", counted)
+    return seen
+
+
+def results(found):
+    return {c: found.column(c) for c in (*found.names, *found.columns)}
+
+
+@pytest.mark.parametrize("torn", [b"", b'{"sample": 5, "st', b"{"])
+def test_it_goes_on_where_it_stopped(model, tmp_path, calls, torn):
+    whole = chladni.study(model, THREE, SETTINGS, out=tmp_path / "whole")
+    part = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
+    kept = (tmp_path / "part" / ROWS).read_bytes().splitlines(keepends=True)[:5]
+    (tmp_path / "part" / ROWS).write_bytes(b"".join(kept) + torn)
+    calls.clear()
+    part = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
+    assert calls == [-1, *range(5, 12)]
+    assert part.kept == 5
+    for name, values in results(whole).items():
+        np.testing.assert_array_equal(results(part)[name], values)
+    calls.clear()
+    again = chladni.study(model, THREE, SETTINGS, out=tmp_path / "part")
+    assert calls == [-1]
+    assert again.rows == part.rows
+    assert sorted(r["sample"] for r in rows(tmp_path / "part")) == list(range(12))
+
+
+def test_a_failed_sample_is_finished_too(model, tmp_path, calls):
+    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    text = (tmp_path / "out" / ROWS).read_text().splitlines()
+    failed = {"sample": 3, "status": "failed", "why": "no", "seconds": 0.0}
+    text[3] = json.dumps(failed)
+    (tmp_path / "out" / ROWS).write_text("\n".join([*text, ""]))
+    calls.clear()
+    found = chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    assert calls == [-1]
+    assert found.failed == [(3, "no")]
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"vary": THREE[:2]}, "what is varied"),
+        ({"vary": ("t=90%:111%", *THREE[1:])}, "what is varied"),
+        ({"settings": StudySettings(samples=13, modes=2)}, "samples (12 there, 13 now)"),
+        ({"settings": StudySettings(samples=12, modes=2, seed=1)}, "seed (0 there, 1 now)"),
+        ({"settings": StudySettings(samples=12, modes=2, sampler="lhs")}, "sampler (sobol there"),
+        ({"settings": StudySettings(samples=12, modes=3)}, "what is asked of a sample"),
+    ],
+)
+def test_another_study_is_refused(model, tmp_path, change, named):
+    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    before = (tmp_path / "out" / ROWS).read_bytes()
+    given = {"vary": THREE, "settings": SETTINGS} | change
+    with pytest.raises(FileError, match="another study") as caught:
+        chladni.study(model, **given, out=tmp_path / "out")
+    assert named in str(caught.value)
+    assert (tmp_path / "out" / ROWS).read_bytes() == before
+
+
+def test_another_deck_is_another_study(deck, tmp_path):
+    thicker = tmp_path / "plate.bdf"
+    text = deck.read_text()
+    assert "2.1+11" in text or "2.1E" in text
+    thicker.write_text(text)
+    first = chladni.load_model(thicker, "SI")
+    chladni.study(first, THREE, SETTINGS, out=tmp_path / "out")
+    same = chladni.load_model(deck, "SI")  # the same structure under another name
+    assert chladni.study(same, THREE, SETTINGS, out=tmp_path / "out").kept == 12
+    made = first.assembly
+    parts = tuple(p.with_section(nonstructural=0.1) for p in made.parts)
+    other = type(first)(first.source, made.with_parts(parts))
+    with pytest.raises(FileError, match="the deck, the case or the recording differs"):
+        chladni.study(other, THREE, SETTINGS, out=tmp_path / "out")
+
+
+def test_files_that_are_no_study_are_left_alone(model, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FileError, match="no study"):
+        chladni.study(model, THREE, SETTINGS, out=tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+    with pytest.raises(FileError, match="is a file"):
+        chladni.study(model, THREE, SETTINGS, out=tmp_path / "notes.txt")
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "named"),
+    [
+        (ROWS, b"{}\n" + b'{"sample":1,"status":"done"}\n', "line 1 is damaged"),
+        (ROWS, b'{"sample":99,"status":"done"}\n', "line 1 is damaged"),
+        (ROWS, b"\xff\xfe\n", "line 1 is damaged"),
+        (BEGUN, b"{", "is damaged"),
+        (BEGUN, b"[]", "is damaged"),
+        (BEGUN, b'{"identity": 3}', "is damaged"),
+    ],
+)
+def test_damage_is_said(model, tmp_path, file, content, named):
+    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    (tmp_path / "out" / file).write_bytes(content)
+    with pytest.raises(FileError, match=named):
+        chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+
+
+def test_a_second_process_is_refused(model, tmp_path):
+    """While one study has the folder open no other gets in; afterwards it does."""
+    tried = []
+
+    def second(what, share):
+        if share > 0.3 and not tried:
+            tried.append(share)
+            with pytest.raises(FileError, match="in use by another process"):
+                chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+
+    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out", progress=second)
+    assert tried
+    assert chladni.study(model, THREE, SETTINGS, out=tmp_path / "out").kept == 12
+
+
+def test_ctrl_c_says_what_is_kept(model, tmp_path):
+    def stop(what, share):
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match=r"6 of 12 samples are kept in .*out; the same command"):
+        chladni.study(model, THREE, SETTINGS, out=tmp_path / "out", progress=stop)
+    assert len(rows(tmp_path / "out")) == 6
+
+
+def test_whole_responses_are_there_before_their_row(model, tmp_path):
+    settings = StudySettings(
+        samples=4, modes=1, outputs=("3:+Z",), inputs=("1:+Z",), lines=50, keep_frf=True
+    )
+    found = chladni.study(model, THREE, settings, out=tmp_path / "out")
+    for row in rows(tmp_path / "out"):
+        with np.load(tmp_path / "out/frf" / f"{row['sample']:06d}.npz", allow_pickle=False) as held:
+            size = np.abs(held["values"][:, 0, 0])
+        assert row["rms 3:+Z from 1:+Z"] == pytest.approx(np.sqrt((size**2).mean()))
+    assert found.store == tmp_path / "out"
+
+
+def test_rows_are_written_as_json_alone(model, tmp_path):
+    """A lost mode is null, never NaN, which is no JSON."""
+    chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
+    write_json(tmp_path / "x.json", rows(tmp_path / "out"))
+    assert "NaN" not in (tmp_path / "out" / ROWS).read_text()
+
+
+def command(deck, out, samples, *more):
+    return [
+        *(sys.executable, "-m", "chladni", "study", str(deck), "--units", "SI", "--modes", "2"),
+        *("--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", str(samples)),
+        *("--out", str(out), *more),
+    ]
+
+
+def killed_often(deck, out, samples, kills, seed, *more):
+    """A study killed with SIGKILL at random instants, started again until it ends."""
+    rng, starts = random.Random(seed), 0
+    while True:
+        starts += 1
+        study = subprocess.Popen(
+            command(deck, out, samples, *more), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            env=os.environ, text=True,
+        )  # fmt: skip
+        if starts <= kills:
+            file, before = out / ROWS, len((out / ROWS).read_bytes()) if starts > 1 else -1
+            while study.poll() is None and not (file.exists() and file.stat().st_size > before):
+                time.sleep(0.01)
+            time.sleep(rng.uniform(0.0, 0.4))
+            study.kill()
+        said, _ = study.communicate()
+        if study.returncode == 0:
+            return starts, said
+        assert study.returncode == -9, said
+        assert starts <= kills, said
+
+
+@pytest.mark.parametrize(
+    ("kills", "samples", "more"),
+    [
+        (3, 60, ("--workers", "1")),
+        pytest.param(50, 400, ("--workers", "2"), marks=pytest.mark.slow),
+    ],
+)
+def test_kill_9_loses_nothing_and_repeats_nothing(deck, model, tmp_path, kills, samples, more):
+    starts, said = killed_often(deck, tmp_path / "out", samples, kills, 7, *more)
+    assert starts > 1
+    assert f"{samples} of {samples} samples" in said
+    written = rows(tmp_path / "out")
+    assert sorted(r["sample"] for r in written) == list(range(samples))
+    straight = chladni.study(
+        model, ["t=90%:110%", "E=80%:120%"], StudySettings(samples=samples, modes=2)
+    )
+    by_sample = sorted(written, key=lambda r: r["sample"])
+    np.testing.assert_allclose([r["f1_hz"] for r in by_sample], straight.column("f1_hz"))
+    assert not [p for p in tmp_path.iterdir() if p.name != "out"], "scratch was left"

@@ -1,0 +1,136 @@
+"""The same study on this process, on local processes and on clusters that lose their workers."""
+
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+import chladni
+from chladni.errors import FileError
+from chladni.studies import StudySettings
+from chladni.studies.study_store import ROWS
+
+RANGES = ["t=90%:110%", "E=80%:120%"]
+SETTINGS = StudySettings(samples=40, modes=3)
+
+
+@pytest.fixture(scope="module")
+def straight(model):
+    """In this process."""
+    return chladni.study(model, RANGES, SETTINGS)
+
+
+def started(deck, out, *more):
+    command = [
+        *(sys.executable, "-m", "chladni", "study", str(deck), "--units", "SI", "--modes", "3"),
+        *("--vary", RANGES[0], "--vary", RANGES[1], "--samples", "40", "--out", str(out), *more),
+    ]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ
+    )
+
+
+def wait_for(out, lines, process):
+    file = out / ROWS
+    while process.poll() is None and not (
+        file.exists() and file.read_bytes().count(b"\n") >= lines
+    ):
+        time.sleep(0.02)
+
+
+def agrees(out, straight):
+    table = np.genfromtxt(out / "samples.csv", delimiter=",", names=True, dtype=None)
+    assert (table["status"] == "done").all()
+    np.testing.assert_array_equal(table["sample"], np.arange(40))
+    for name in ("t", "E", "f1_hz", "f3_hz", "mass_kg"):
+        np.testing.assert_allclose(table[name], straight.column(name), rtol=1e-9)
+
+
+def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
+    """Of two local workers one is killed; the rows are those of a study nobody disturbed."""
+    study = started(deck, tmp_path / "out", "--workers", "2")
+    wait_for(tmp_path / "out", 3, study)
+    children = psutil.Process(study.pid).children(recursive=True)
+    workers = [p for p in children if "spawn_main" in " ".join(p.cmdline())]
+    assert len(workers) >= 2
+    workers[-1].kill()
+    said, _ = study.communicate()
+    assert study.returncode == 0, said
+    assert "Traceback" not in said
+    agrees(tmp_path / "out", straight)
+    psutil.wait_procs(children, timeout=20)
+    assert not [p for p in children if p.is_running()], "workers outlived the study"
+
+
+@pytest.fixture
+def cluster():
+    """A scheduler and two workers as a user starts them, each a process of its own."""
+    dask = [sys.executable, "-m", "dask"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"], **quiet
+    )
+    address = next(
+        word for line in scheduler.stderr for word in line.split() if word.startswith("tcp://")
+    )
+    options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    quiet["stderr"] = subprocess.DEVNULL
+    workers = [subprocess.Popen([*dask, "worker", address, *options], **quiet) for _ in range(2)]
+    yield address, scheduler, workers
+    for process in (*workers, scheduler):
+        process.kill()
+        process.wait()
+    scheduler.stderr.close()
+
+
+def test_a_cluster_of_others_that_loses_a_worker(deck, straight, tmp_path, cluster):
+    address, _, workers = cluster
+    study = started(deck, tmp_path / "out", "--scheduler", address)
+    wait_for(tmp_path / "out", 3, study)
+    workers[0].kill()
+    said, _ = study.communicate()
+    assert study.returncode == 0, said
+    agrees(tmp_path / "out", straight)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
+    deck, straight, tmp_path, cluster
+):
+    address, scheduler, _ = cluster
+    study = started(deck, tmp_path / "out", "--scheduler", address)
+    wait_for(tmp_path / "out", 3, study)
+    scheduler.kill()
+    said, _ = study.communicate()
+    assert study.returncode == 2, said
+    assert said.splitlines()[-1].startswith("chladni: the connection to the scheduler was lost; ")
+    assert "Traceback" not in said
+    again = started(deck, tmp_path / "out", "--workers", "1")
+    said, _ = again.communicate()
+    assert again.returncode == 0, said
+    agrees(tmp_path / "out", straight)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x:1", ""])
+def test_no_scheduler_is_one_sentence(model, address, monkeypatch):
+    monkeypatch.setattr("chladni.studies.workers.PATIENCE", 1)
+    with pytest.raises(FileError, match="no Dask scheduler answers at"):
+        chladni.study(model, RANGES, SETTINGS, scheduler=address)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # its open pipes
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_jobs_of_a_batch_system(deck, straight, tmp_path):
+    """dask-jobqueue as on SLURM, its jobs shells of this machine."""
+    jobqueue = pytest.importorskip("dask_jobqueue.local")
+    with jobqueue.LocalCluster(cores=1, processes=1, memory="2GB") as jobs:
+        jobs.scale(jobs=2)
+        study = started(deck, tmp_path / "out", "--scheduler", jobs.scheduler_address)
+        said, _ = study.communicate()
+    assert study.returncode == 0, said
+    agrees(tmp_path / "out", straight)

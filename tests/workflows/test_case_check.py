@@ -1,0 +1,164 @@
+"""A case looked over: what is wrong is said before minutes are spent, and nothing else is."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.io.tables.write_tables import write_npz
+from chladni.output import plain
+from chladni.report.result_json import to_json
+from chladni.workflows.unit_check import refuse_other_units
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+@pytest.fixture
+def copied(folder, tmp_path):
+    """The plate's case, to be spoilt."""
+    place = tmp_path / "case"
+    shutil.copytree(folder, place)
+    return place
+
+
+def rewritten(place, old, new):
+    text = (place / "case.toml").read_text()
+    assert old in text
+    (place / "case.toml").write_text(text.replace(old, new))
+    return place
+
+
+def test_a_good_case_is_not_blamed(case):
+    found = chladni.check(case)
+    assert not found.findings
+    assert found.frequency[0] == pytest.approx(chladni.modes(case, 7).modal.frequency[6], rel=1e-6)
+    assert [d.label for d in found.dofs if d.role == "output"] == list(case.outputs.labels)
+
+
+def test_what_the_command_writes(copied, tmp_path):
+    out = tmp_path / "out"
+    done = call("check", copied, "--out", out)
+    assert done.exit_code == 0, (done.output, done.exception)
+    assert "Nothing looks wrong" in done.output
+    case = chladni.load_case(copied)
+    assert json.loads((out / "check.json").read_text()) == plain(to_json(chladni.check(case)))
+    assert (out / "sensors.png").stat().st_size > 10_000
+    page = (out / "report.html").read_text(encoding="utf-8")
+    for word in ("sensors.png", "What will be used", *case.outputs.labels):
+        assert word in page
+
+
+def test_words_nobody_reads_are_told_by_command(copied):
+    rewritten(copied, "[band]", "hangers = [1]\n[band]")
+    found = chladni.check(chladni.load_case(copied))
+    assert any("hangers" in said for said in found.unused["correlate"])
+    assert not any("hangers" in said for said in found.unused["diagnose"])
+
+
+FAULTS = {  # how a case is spoilt: what must be said
+    "millimetres declared SI": ('units = "SI"', 'units = "mm-t-s"', 'set units = "SI"'),
+    "milliseconds": ('units = "SI"', 'units = "mm-kg-ms"', 'set units = "SI"'),
+    "grams": ("mass = 0.", "mass = 1", "is in kg"),
+    "kilohertz": ("fit = [20.0, 170.0]", "fit = [15.0, 16.0]", "the band ends at 16 Hz"),
+}
+
+
+@pytest.mark.parametrize("spoilt", FAULTS)
+def test_what_cannot_be_right_is_exit_3_and_said(copied, tmp_path, spoilt):
+    old, new, said = FAULTS[spoilt]
+    if spoilt == "grams":
+        text = (copied / "case.toml").read_text()
+        mass = next(line for line in text.splitlines() if line.startswith("mass"))
+        old, new = mass, f"mass = {1e3 * float(mass.split('=')[1]):.4g}"
+    rewritten(copied, old, new)
+    done = call("check", copied, "--out", tmp_path / "out")
+    assert done.exit_code == 3, (done.output, done.exception)
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "Fault" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["correlate", "calibrate", "diagnose"])
+def test_a_deck_of_no_material_is_refused_though_nothing_was_weighed(copied, tmp_path, command):
+    """Its mass in mm-kg-s would be right: kilograms in either; its modulus is not."""
+    text = (copied / "case.toml").read_text().splitlines()
+    kept = [line for line in text if not line.startswith("mass")]
+    (copied / "case.toml").write_text("\n".join(kept).replace('units = "SI"', 'units = "mm-t-s"'))
+    done = call(command, copied, "--out", tmp_path / "out")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert 'set units = "SI" in [model], not mm-t-s' in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_odd_material_is_the_users_own(case):
+    """A modulus that is known in no system says nothing of the units."""
+    parts = tuple(
+        p.with_section(**{
+            side: replace(m, E=m.E * 1e-4)
+            for side in ("membrane", "bending", "shear")
+            if (m := getattr(p.section, side)) is not None
+        })
+        for p in case.assembly.parts
+    )  # fmt: skip
+    odd = replace(case, assembly=case.assembly.with_parts(parts))
+    refuse_other_units(odd)
+    (finding,) = (f for f in chladni.check(odd).findings if "usual in no unit" in f.text)
+    assert not finding.fault
+
+
+def test_a_mass_that_is_far_off_is_worth_a_look(case):
+    heavier = replace(case, setup=replace(case.setup, mass=1.3 * case.setup.mass))
+    (finding,) = chladni.check(heavier).findings
+    assert "weighs" in finding.text
+    assert not finding.fault
+
+
+def test_places_off_the_mesh_and_double_ones(copied):
+    rows = "label,grid,x,y,z,direction,role\n2:+Z,,0.0,0.04,0.009,+Z,output\n4:+Z,7,,,,+Z,output\n"
+    (copied / "sensors.csv").write_text(rows)
+    rewritten(copied, "[band]", 'sensors = "sensors.csv"\n[band]')
+    found = chladni.check(chladni.load_case(copied))
+    off, double = found.findings
+    assert "2:+Z by 9 mm" in off.text
+    assert "4:+Z and 7:+Z are one place" in double.text
+    assert np.isclose(max(d.off_mesh_m for d in found.dofs), 0.009)
+
+
+@pytest.fixture(scope="module")
+def along_x(folder, tmp_path_factory):
+    """Nine sensors that measured along Z; their table says X."""
+    place = tmp_path_factory.mktemp("axes")
+    shutil.copy(folder / "plate.bdf", place)
+    article = chladni.load_model(folder / "article.bdf", "SI")
+    ends = [f"{g}:+Z" for g in (2, 4, 7, 18, 24, 30, 36, 43, 47)]
+    made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 250, 1200)).frfs[0]
+    write_npz(place / "frf.npz", made.to("accelerance"))
+    rows = [f"{label},{label.partition(':')[0]},+X,output" for label in ends]
+    (place / "sensors.csv").write_text("\n".join(["label,grid,direction,role", *rows, ""]))
+    text = (folder / "case.toml").read_text().replace("[20.0, 170.0]", "[20.0, 240.0]")
+    (place / "case.toml").write_text(text.replace("[band]", 'sensors = "sensors.csv"\n[band]'))
+    return place
+
+
+@pytest.mark.parametrize("command", ["check", "correlate", "calibrate", "diagnose"])
+def test_sensors_declared_along_another_axis_are_told(along_x, tmp_path, command):
+    done = call(command, along_x, "--out", tmp_path / "out")
+    assert done.exit_code == (3 if command == "check" else 2), (done.output, done.exception)
+    assert "declared along X" in done.stderr
+    assert "shapes along Z" in done.stderr
+    assert (tmp_path / "out").exists() == (command == "check")
+
+
+def test_sensors_declared_as_they_are_pass(along_x, tmp_path):
+    place = tmp_path / "case"
+    shutil.copytree(along_x, place)
+    (place / "sensors.csv").write_text((along_x / "sensors.csv").read_text().replace("+X", "+Z"))
+    assert not chladni.check(chladni.load_case(place)).faults
+    assert len(chladni.correlate(chladni.load_case(place)).pairs) > 3

@@ -1,0 +1,235 @@
+"""A first case: whatever system a deck is in, wherever its recording has its places."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.errors import ChladniError, FileError
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_csv, write_npz
+from chladni.io.uff.write_uff import write_uff
+from chladni.model.properties import Isotropic
+from chladni.units import UNITS
+from chladni.workflows.case_draft import draft
+from chladni_specimens.plates import plate
+
+ENDS = ("3:+Z", "8:+Z", "17:-Z", "30:+Z")
+
+
+def call(*arguments):
+    return CliRunner().invoke(application(), [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return plate(0.3, 0.22, 5, 5, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def deck(structure, tmp_path_factory):
+    path = tmp_path_factory.mktemp("deck") / "plate.bdf"
+    write_assembly(structure, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def frf(deck):
+    model = chladni.load_model(deck, "SI")
+    found = chladni.frf(model, ENDS, ["1:+Z"], np.linspace(15, 100, 120)).frfs[0]
+    return found.to("accelerance")
+
+
+@pytest.fixture(scope="module")
+def places(structure):
+    return dict(zip(structure.ids.tolist(), structure.points, strict=True))
+
+
+MATERIALS = {"steel": (2.1e11, 7850.0), "aluminium": (7e10, 2700.0), "plastic": (2e9, 1100.0)}
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("material", MATERIALS)
+def test_the_unit_system_is_told_by_the_material(structure, tmp_path, units, material):
+    E, rho = MATERIALS[material]
+    parts = tuple(
+        p.with_section(**dict.fromkeys(("membrane", "bending", "shear"), Isotropic(E, 0.3, rho)))
+        for p in structure.parts
+    )
+    write_assembly(structure.with_parts(parts), tmp_path / "deck.bdf", UNITS[units])
+    made = draft(tmp_path / "deck.bdf")
+    assert made.units.name == units
+    assert made.mass == pytest.approx(0.3 * 0.22 * 1e-3 * rho, rel=1e-4)
+
+
+def test_a_material_of_no_system_is_refused(deck, tmp_path):
+    text = deck.read_text()
+    odd = tmp_path / "odd.bdf"
+    odd.write_text(text.replace("7850.", ".0785"))
+    assert odd.read_text() != text
+    with pytest.raises(FileError, match="usual in no unit system"):
+        draft(odd)
+    assert draft(odd, units="SI").units.name == "SI"
+
+
+def ways(made):
+    return {d.label: d.way for d in made.dofs}
+
+
+def test_by_number_where_the_file_has_no_places(deck, frf, tmp_path):
+    write_npz(tmp_path / "a.npz", frf)
+    made = draft(deck, [tmp_path / "a.npz"])
+    assert set(ways(made).values()) == {"grid"}
+    assert made.dofs[2].axis.tolist() == [0, 0, -1]
+
+
+def renumbered(frf, places, shift):
+    """The recording with the lab's own numbers for the places of the deck's grids."""
+    label = lambda text: f"{int(text.split(':')[0]) + shift}:{text.split(':')[1]}"  # noqa: E731
+    one = replace(frf, outputs=tuple(map(label, frf.outputs)), inputs=tuple(map(label, frf.inputs)))
+    used = {int(t.split(":")[0]) for t in (*one.outputs, *one.inputs)}
+    return one, {n: places[n - shift] for n in used}
+
+
+@pytest.mark.parametrize("shift", [1000, 2])
+def test_by_place_where_the_lab_has_numbers_of_its_own(deck, frf, places, tmp_path, shift):
+    """Numbers that are other grids' (2) must not count where the places say otherwise."""
+    one, nodes = renumbered(frf, places, shift)
+    write_uff(tmp_path / "a.uff", one, nodes)
+    made = draft(deck, [tmp_path / "a.uff"])
+    assert set(ways(made).values()) == {"place"}
+    assert [d.grid for d in made.dofs] == [3, 8, 17, 30, 1]
+    assert any("numbers do not" in n for n in made.notes) == (shift == 2)
+
+
+def test_places_in_millimetres_are_seen_to_be(deck, frf, places, tmp_path):
+    one, nodes = renumbered(frf, places, 1000)
+    write_uff(tmp_path / "a.uff", one, {n: 1e3 * x for n, x in nodes.items()})
+    made = draft(deck, [tmp_path / "a.uff"])
+    assert [d.grid for d in made.dofs] == [3, 8, 17, 30, 1]
+    assert any("read in mm" in n for n in made.notes)
+
+
+def test_by_the_nearest_with_its_distance(deck, frf, places, tmp_path):
+    one, nodes = renumbered(frf, places, 1000)
+    off = {n: x + np.array([0.013, 0.011, 0.02]) for n, x in nodes.items()}
+    write_uff(tmp_path / "a.uff", one, off)
+    made = draft(deck, [tmp_path / "a.uff"])
+    assert set(ways(made).values()) == {"nearest"}
+    inside = made.dofs[0]  # the others may lie beyond the plate's edge
+    assert inside.distance == pytest.approx(0.02, rel=1e-3)
+    assert any("places are more than 10 mm off the mesh" in n for n in made.notes)
+
+
+def test_what_is_missing_is_named_with_its_remedy(deck, frf, places, tmp_path):
+    one, nodes = renumbered(frf, places, 1000)
+    write_uff(tmp_path / "a.uff", one, {n: x for n, x in nodes.items() if n != 1017})
+    out = tmp_path / "case"
+    done = call("init", deck, tmp_path / "a.uff", "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "missing: places of 1017:-Z (output)" in done.output
+    assert "not complete yet: case.toml" in done.output
+    text = (out / "case.toml").read_text()
+    assert "MISSING places of 1017:-Z" in text
+    assert "MISSING the weighed mass" in text
+    rows = (out / "sensors.csv").read_text()
+    assert "1017" not in rows
+    (out / "sensors.csv").write_text(rows + "1017:-Z,17,,,,-Z,,,,output,,\n")
+    case = chladni.load_case(out)
+    assert case.outputs.grids.tolist() == [3, 8, 17, 30]
+
+
+@pytest.mark.parametrize("units", ["mm-t-s", "SI"])
+def test_what_it_writes_is_the_case_that_was_meant(structure, frf, tmp_path, units):
+    """From deck and file alone to a case whose model answers as the one recorded."""
+    write_assembly(structure, tmp_path / "plate.bdf", UNITS[units])
+    nodes = dict(zip(structure.ids.tolist(), structure.points, strict=True))
+    write_uff(tmp_path / "a.uff", frf, nodes)
+    out = tmp_path / "deep" / "case"
+    done = call("init", tmp_path / "plate.bdf", tmp_path / "a.uff", "--mass", 0.518, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert "it can be read" in done.output
+    case = chladni.load_case(out)
+    assert case.units.name == units
+    assert case.setup.mass == 0.518
+    (found,) = chladni.frf(case).frfs
+    np.testing.assert_allclose(np.abs(found.values), np.abs(frf.values), rtol=0.02)
+
+
+def test_a_plan_is_read(deck, frf, tmp_path):
+    """The table that plan writes takes the place of guesses, masses included."""
+    done = call("plan", deck, "--units", "SI", "--sensors", 6, "--modes", 4, "--drawn", 0,
+                "--out", tmp_path / "plan")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    table = (tmp_path / "plan/sensors.csv").read_text().splitlines()[1:]
+    outputs = [row.split(",")[0] for row in table if ",output," in row]
+    inputs = [row.split(",")[0] for row in table if ",input," in row]
+    n = (len(frf.frequency), len(outputs), len(inputs))
+    rng = np.random.default_rng(0)
+    recorded = replace(frf, values=rng.normal(size=n) + 0j, outputs=outputs, inputs=inputs)
+    write_csv(tmp_path / "lab.csv", recorded)
+    done = call("init", deck, tmp_path / "lab.csv", "--quantity", "accelerance",
+                "--sensors", tmp_path / "plan/sensors.csv", "--out", tmp_path / "case")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    case = chladni.load_case(tmp_path / "case")
+    assert case.outputs.mass.tolist() == [0.005] * 6
+    assert case.frfs[0].quantity == "accelerance"
+    assert "by the table given" in done.output
+
+
+def test_nothing_is_replaced(deck, tmp_path):
+    (tmp_path / "case.toml").write_text("mine")
+    done = call("init", deck, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "is not replaced" in done.stderr
+    assert (tmp_path / "case.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("word", ['quo"te', "new\nline", "back\\slash", "#[model]", "Blech Ä"])
+def test_names_from_files_cannot_break_the_case(deck, frf, tmp_path, word):
+    """A recording of any name, a part of any name."""
+    name = word.replace("\n", " ")
+    odd = tmp_path / f"{name}.npz"
+    write_npz(odd, frf)
+    named = tmp_path / "plate.bdf"
+    named.write_text(f"$ANSA_NAME;1;PSHELL;{name}\n" + deck.read_text())
+    done = call("init", named, odd, "--out", tmp_path / "case")
+    assert done.exit_code == 0, done.output
+    text = (tmp_path / "case" / "case.toml").read_text(encoding="utf-8")
+    (tmp_path / "case" / "case.toml").write_text(
+        text.replace("# [[parameter]]", "[[parameter]]").replace("# parts", "parts")
+        .replace("# field", "field"), encoding="utf-8",
+    )  # fmt: skip
+    assert chladni.load_case(tmp_path / "case").parameters
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["nothing.bdf"], "nothing.bdf"),
+        (["DECK", "nothing.uff"], "nothing.uff"),
+        (["DECK", "DECK"], "recordings end in"),
+        (["DECK", "--mass", "-1"], "above zero"),
+        (["DECK", "--units", "cubits"], "mm-t-s"),
+        (["DECK", "CSV"], "--quantity"),
+        (["DECK", "CSV", "--quantity", "weight"], "weight"),
+        (["DECK", "--sensors", "none.csv", "CSV", "--quantity", "mobility"], "none.csv"),
+    ],
+)
+def test_bad_input_is_one_sentence(deck, frf, tmp_path, arguments, named):
+    write_csv(tmp_path / "a.csv", frf)
+    known = {"DECK": deck, "CSV": tmp_path / "a.csv"}
+    done = call("init", *(known.get(a, a) for a in arguments), "--out", tmp_path / "out")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert named in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_errors_are_ours(tmp_path):
+    (tmp_path / "empty.bdf").write_text("")
+    with pytest.raises(ChladniError):
+        draft(tmp_path / "empty.bdf")
