@@ -7,7 +7,7 @@ import pytest
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import equalised, identify
-from chladni.ema.recording_noise import equalised_noise
+from chladni.ema.recording_noise import equalised_noise, sample_noise
 
 F = np.arange(5, 120, 0.25)
 POLES = np.array([12.0, 31.0, 44.0, 80.0, 101.0])
@@ -63,3 +63,21 @@ def test_is_in_proportion_to_the_variance_of_the_recording():
     np.testing.assert_allclose(four / one, 4.0, rtol=1e-3)
     doubled = equalised_noise(replace(modal, chi=2.0), frf, S, use)
     np.testing.assert_allclose(doubled / one, 4.0, rtol=1e-9)
+
+
+def test_samples_summed_as_independent_know_no_more_than_the_lines_they_come_from():
+    """By the half-bandwidth: half as many lines, half the information; so has a fit its intervals.
+
+    The exact noise of a sample is smaller, for it is that of all lines of a mode at once.
+    """
+    phi = np.random.default_rng(7).normal(size=(3, len(POLES)))
+    H = response(2j * np.pi * F, phi)
+    frf = FRF(H, F, ("a", "b", "c"), ("a",), "accelerance", variance=(0.01 * np.abs(H)) ** 2)
+    modal = replace(identify(frf), chi=1.0)
+    high = S[S.imag > 2 * np.pi * 60]  # where a half-bandwidth holds lines enough
+    dense = sample_noise(modal, frf, high)
+    half = replace(frf, values=frf.values[::2], frequency=F[::2], variance=frf.variance[::2])
+    sparse = sample_noise(modal, half, high)
+    np.testing.assert_allclose((sparse / dense) ** 2, 2.0, rtol=0.1)
+    exact = np.sqrt(equalised_noise(modal, frf, high, np.ones(len(F), bool)))
+    assert np.median(exact) < np.median(dense)

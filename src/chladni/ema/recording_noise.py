@@ -53,6 +53,21 @@ def equalised_noise(
     return (out / (np.abs(H) * LN10) ** 2).reshape(len(s), *identified.lower.shape)
 
 
+def sample_noise(identified: Identified, frf: FRF, s: np.ndarray) -> np.ndarray:
+    """Standard deviation of log10 H(s), sample by sample, for a likelihood that sums them (n, ...).
+
+    :func:`equalised_noise` is smaller, for a sample is known from all lines of its modes; but then
+    its noise is that of its neighbours too, and a sum over samples would count it many times. Here
+    a sample is known only from the lines within the half-bandwidth of a mode, π ζ f / Δf of them.
+    """
+    sd = np.sqrt(frf_variance(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
+    f, own = s.imag / (2 * np.pi), frf.frequency
+    near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
+    lines = np.pi * np.median(identified.damping) * f / np.median(np.diff(own))
+    per_line = np.minimum(sd[near], 1.0) * max(identified.chi, 1.0)
+    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
+
+
 def _channel(
     w: np.ndarray, F: np.ndarray, G: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

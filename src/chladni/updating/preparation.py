@@ -20,7 +20,7 @@ from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import Identified, equalised, identify, noise_source
 from ..ema.level_shift import level_notes
-from ..ema.recording_noise import equalised_noise
+from ..ema.recording_noise import equalised_noise, sample_noise
 from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -85,18 +85,17 @@ def _by_responses(question: Question) -> Prepared:
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)
-    data, spreads, noises = [], [], []
+    data, spreads = [], []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
         use = _training(f, low, fit_max, held_sensors)
         H = equalised(found, s)
-        variance = equalised_noise(found, frf, s, counted(frf, question.exclude))
-        spread = measured_spread(H, others, s)
+        noise, spread = sample_noise(found, frf, s), measured_spread(H, others, s)
         spreads.append(spread)
-        noises.append(variance if spread is None else np.maximum(variance, spread**2))
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
-            noise=np.sqrt(noises[-1]), direct=question.outputs.carried_by(question.inputs),
+            noise=noise if spread is None else np.maximum(noise, spread),
+            direct=question.outputs.carried_by(question.inputs),
         )  # fmt: skip
         data.append(read.over(reduced.model))
     nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
@@ -140,10 +139,13 @@ def _by_responses(question: Question) -> Prepared:
         *said, *spread_note(spreads[1], data[1].use, others),
         *level_notes([(question.level, found), *levels(others)]),
     ]  # fmt: skip
+    floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
+    if spreads[1] is not None:
+        floor = np.maximum(floor, spreads[1] ** 2)
     borne = min(seen, _own_modes(nominal, low, fit_max))  # what a rig rings with bears no name
     few = too_little(borne, int(data[0].use.any(axis=0).sum()))
     return Prepared(
-        problem, data[1], held, what, tuple(notes), nominal, noises[1], found, few, unseen=unseen,
+        problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
         others=tuple(others),
     )  # fmt: skip
 

@@ -213,7 +213,8 @@ def bending_slopes(
         for j, shells in enumerate(chunk):
             V = U[dofs[shells]]
             dK[j] = V.reshape(-1, r).T @ (groups.cubic[shells] @ V).reshape(-1, r)
-        state = replace(base.state, dK=dK, dM=np.zeros_like(dK), doffset=None)
+        still = replace(base.state, doffset=None, ddrive=None)  # stiffness moves no load of a base
+        state = replace(still, dK=dK, dM=np.zeros_like(dK))
         J = data.scaled(state, True)[1]
         rest = len(base.residual) - len(J)  # what the scales say does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
