@@ -175,11 +175,11 @@ FAULTS = {
 
 def outcome(screening: Screening, kind: FaultKind, channels: Sequence[str]) -> str:
     """named: the fault and its channels; seen: another name or more beside; missed."""
-    named = [f for f in screening.faults if f.kind in kind.kinds]
+    named = [f for f in screening.findings if f.kind in kind.kinds]
     if any(not channels or set(f.channels) & set(channels) for f in named):
         exact = any(not channels or set(f.channels) == set(channels) for f in named)
         return "named" if exact else "seen"
-    return "seen" if screening.faults else "missed"
+    return "seen" if screening.findings else "missed"
 
 
 def tally(

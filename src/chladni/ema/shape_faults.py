@@ -9,6 +9,9 @@ the common factor c of the frequencies are those that make the recording most li
 is profiled, ln L = Σ_r -n/2 ln(ψ_rᵀ C_r⁻¹ ψ_r) - ½ ln|C_r|. A fault of a channel (its sign, its
 gain, an exchange of two, another direction, another place) changes ψ or the rows of Φ; it is named
 where ln L rises by more than the number of trials explains.
+
+A patch that the model lacks bends shapes about a sensor as well as a move of it does, so that what
+physics may mimic (gain, place, direction) is a warning; a reversed sign, an exchange are faults.
 """
 
 from collections.abc import Callable
@@ -17,7 +20,7 @@ from itertools import combinations
 
 import numpy as np
 
-from .finding import Finding
+from .finding import Finding, Severity
 
 LEAST_CHANNELS, LEAST_MODES = 5, 4
 MIX = (0.02, 0.06, 0.2)  # ε
@@ -27,6 +30,7 @@ GAINS = np.log(np.geomspace(0.15, 6.5, 61))
 LEAST_GAIN = 0.18  # ln: 3 % is the tolerance of a sensor; no model knows a shape to much better
 THRESHOLD = 30.0  # of ln L, after the price of the trials: physics left out reaches half of it
 RARE = np.log(100.0)  # one recording in a hundred has a given fault
+_UNLESS = ", unless the model is wrong about the shapes there"
 WORST = 3  # channels for which other places are tried
 COPY = 0.05  # of the power of two channels, their difference: they may be one
 MOST = 3  # faults that are named one after another
@@ -192,8 +196,10 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
             f"output {label} is {abs(g):.2g} times as large as it can be{turned}",
         )
         mend = f"in sensors.csv give {label} the gain {g:.3g}"
-    text += f" (e^{gain:.0f} times more likely)."
-    return _Fault(gain, Finding(kind, text, "fault", (label,), mend, g))
+    unless = "" if g == -1.0 else _UNLESS
+    text += f" (e^{gain:.0f} times more likely){unless}."
+    severity: Severity = "fault" if g == -1.0 else "warning"
+    return _Fault(gain, Finding(kind, text, severity, (label,), mend, g))
 
 
 def _exchanges(
@@ -289,18 +295,21 @@ def _replaced(
     label = labels[i]
     if kind == "copy":
         text = (
-            f"output {label} shows what {names[k]} shows (e^{gain:.0f} times more likely): one "
-            "place under two labels."
+            f"output {label} shows what {names[k]} shows (e^{gain:.0f} times more likely), as if "
+            f"both were at one place{_UNLESS}."
         )
         mend = f'in sensors.csv give {label} the cell use = "no"'
         both = (label, names[k])
-        finding = Finding("duplicated channels", text, "fault", both, mend)
+        finding = Finding("duplicated channels", text, "warning", both, mend)
     elif kind == "turned":
-        text = f"output {label} points along {names[k]} (e^{gain:.0f} times more likely)."
+        text = f"output {label} points along {names[k]} (e^{gain:.0f} times more likely){_UNLESS}."
         mend = f"in sensors.csv give {label} the direction {names[k]}"
-        finding = Finding("turned sensor", text, "fault", (label,), mend)
+        finding = Finding("turned sensor", text, "warning", (label,), mend)
     else:
-        text = f"output {label} sits elsewhere, near {names[k]} (e^{gain:.0f} times more likely)."
+        text = (
+            f"output {label} seems to sit elsewhere, near {names[k]} (e^{gain:.0f} times more "
+            f"likely){_UNLESS}."
+        )
         mend = f"look where {label} sits and put that place into sensors.csv"
-        finding = Finding("misplaced sensor", text, "fault", (label,), mend)
+        finding = Finding("misplaced sensor", text, "warning", (label,), mend)
     return _Fault(gain, finding)

@@ -19,6 +19,7 @@ from ..geometry.grid_normals import grid_normals
 from ..geometry.sampling import farthest_point_sample
 
 ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
+AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a shorter move would
 PLACES = 400  # of the shells where a misplaced sensor may sit
 EQUAL_LINES, EQUAL_DAMPING = 200, 0.02  # of the model's responses at two channels that are equal
 UNLIKE = 0.3  # 1: nothing in common; the recorded difference below this share of the model's
@@ -158,7 +159,7 @@ def _elsewhere(
     points = made.points[rows]
     pick = farthest_point_sample(points, min(PLACES, len(rows)))
     far = np.linalg.norm(points[pick] - dofs.points[i], axis=1)
-    pick = pick[far > 0.04 * np.ptp(points, axis=0).max()]
+    pick = pick[far > AWAY * np.ptp(points, axis=0).max()]
     grids, normals = made.ids[rows[pick]], grid_normals(made, rows[pick])
     own = np.tile(dofs.directions[i], (len(pick), 1))
     other = np.abs((own * normals).sum(axis=1)) < ACROSS

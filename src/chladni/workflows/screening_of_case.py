@@ -14,7 +14,7 @@ from ..updating.question import Prepared
 from ..updating.result import NamedEffect
 from .diagnosis_result import DiagnosisResult
 
-FITTED = ("wrong gain", "reversed sign")  # of one channel: diagnosis weighs and measures these
+FITTED = ("reversed sign",)  # of one channel: diagnosis weighs and measures it
 
 
 class RecordingAtFault(ChladniError):
