@@ -11,8 +11,6 @@ import os
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 import tempfile
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,16 +20,7 @@ from chladni.fem.assemble import structure
 from chladni.io.nastran import read_deck, write_assembly
 from chladni.units import units
 from chladni_specimens.plates import plate
-
-
-def seconds(call: Callable[[], object], times: int = 3) -> float:
-    """Shortest of several runs."""
-    out = []
-    for _ in range(times):
-        start = time.process_time()
-        call()
-        out.append(time.process_time() - start)
-    return min(out)
+from timing import timed
 
 
 def main() -> None:
@@ -49,7 +38,7 @@ def main() -> None:
         ]
         print(f"{len(flat.shells)} quads\n\n| step | seconds |\n|---|---|")
         for name, call in rows:
-            print(f"| {name} | {seconds(call):.2f} |", flush=True)
+            print(f"| {name} | {timed(call, 3)[0]:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ import os
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 import sys
-import time
 
 from chladni import load_case
 from chladni.io.package_files import mesh_path
@@ -21,16 +20,7 @@ from chladni.updating.hypothesis_fit import fitted
 from chladni.updating.preparation import prepare
 from chladni.updating.reduced_model import evaluate
 from chladni.workflows.question_of_case import question
-
-
-def best(method, repeats=3):
-    """Shortest processor time of several runs [s]."""
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        method()
-        times.append(time.process_time() - begin)
-    return min(times)
+from timing import timed
 
 
 def row(path):
@@ -40,9 +30,11 @@ def row(path):
     weighed = problem.mass_measurement
     state = evaluate(model, base, x)
     learned = problem.allowing_errors(state).data
-    made = best(lambda: problem.allowing_errors(state), 1)
-    values = [best(lambda d=d: d.residual(state, True)) for d in (problem.data, learned)]
-    fits = [best(lambda d=d: fitted(model, base, d, weighed, x)) for d in (problem.data, learned)]
+    made = timed(lambda: problem.allowing_errors(state), 1)[0]
+    values = [timed(lambda d=d: d.residual(state, True), 3)[0] for d in (problem.data, learned)]
+    fits = [
+        timed(lambda d=d: fitted(model, base, d, weighed, x), 3)[0] for d in (problem.data, learned)
+    ]
     samples = 2 * int(learned.use.sum()) * learned.values.shape[2]
     return (
         f"| {len(model.K0)} | {samples} | {len(x)} | {1e3 * values[0]:.0f} | {1e3 * values[1]:.0f} "

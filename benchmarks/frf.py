@@ -3,12 +3,11 @@
 python benchmarks/frf.py
 """
 
-import time
-
 import numpy as np
 
 from chladni.dynamics.frf import transfer
 from chladni.dynamics.modes import ModalModel
+from timing import timed
 
 OUTPUTS, LINES, MODES = 40, 1500, 100
 
@@ -43,25 +42,15 @@ def ours(modal, f):
     return transfer(modal, modal.shapes, modal.shapes[:1], 2j * np.pi * f)
 
 
-def best(method, *given, repeats=20):
-    """Shortest processor time of several runs [ms]."""
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        method(*given)
-        times.append(time.process_time() - begin)
-    return 1e3 * min(times)
-
-
 def main():
     """Print the table."""
     modal, f = specimen()
     due = ours(modal, f)
-    base = best(ours, modal, f)
+    base = 1e3 * timed(lambda: ours(modal, f), 20)[0]
     print("| way | ms | times ours | largest difference |\n|---|---|---|---|")
     for name, way in {"chladni": ours, "einsum": einsum, "loop over modes": by_modes}.items():
         difference = np.abs(way(modal, f) - due).max() / np.abs(due).max()
-        ms = best(way, modal, f)
+        ms = 1e3 * timed(lambda way=way: way(modal, f), 20)[0]
         print(f"| {name} | {ms:.1f} | {ms / base:.1f} | {difference:.0e} |")
 
 

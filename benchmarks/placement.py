@@ -16,18 +16,9 @@ import numpy as np
 
 import chladni_envs  # noqa: F401
 from chladni.planning import effective_independence, exchange, greedy, independence, log_det_fisher
+from timing import timed
 
 Shapes = np.ndarray
-
-
-def timed(run: Callable[[], Any], repeats: int = 5) -> tuple[float, Any]:
-    """Least CPU time of some repeats [s], and the result."""
-    times = []
-    for _ in range(repeats):
-        t = process_time()
-        result = run()
-        times.append(process_time() - t)
-    return min(times), result
 
 
 def determinant_loop(phi: Shapes, n: int) -> Shapes:

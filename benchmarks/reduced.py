@@ -22,25 +22,16 @@ from chladni.effects.effect import count
 from chladni.effects.ordinary import ordinary
 from chladni.effects.points import MassEffect, strength
 from chladni.effects.suspension import Suspension
-from chladni.effects.thickness_distribution import thickness_distribution
+from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import REACH, reduced_problem
 from chladni_specimens.plates import folded_panel
+from timing import timed
 
 TOP = 380.0  # Hz
 SIZES = {"demonstration": 0.02, "fine": 0.0065, "large": 0.00314}
-
-
-def best(method, repeats):
-    """Shortest processor time of several runs [s]."""
-    times = []
-    for _ in range(repeats):
-        begin = time.process_time()
-        method()
-        times.append(time.process_time() - begin)
-    return min(times)
 
 
 def effects(reduced):
@@ -50,7 +41,7 @@ def effects(reduced):
     grids = tuple(int(places.grids[k]) for k in (3, 7))
     mass = strength("m", "kg", 0.05, 1.0, (0.0,))
     spring = strength("k", "N/m", 5e3, 1.0, (0.0,))
-    thin = thickness_distribution(reduced.groups, 0, 1)
+    thin = ThicknessDistribution.on(reduced.groups, 0, 1)
     return [
         *(ordinary(reduced.groups, q, (k,)) for k in (0, 1) for q in ("E", "rho")),
         MassEffect((mass,), "", grids=grids[:1], rows=one),
@@ -67,14 +58,14 @@ def row(name, edge):
     ready = time.process_time() - begin
     chosen = effects(reduced)
     x = np.full(count(chosen), 0.05)
-    plain = best(lambda: evaluate(reduced.model, chosen, x, gradient=False), 10)
-    full_gradient = best(lambda: evaluate(reduced.model, chosen, x), 10)
+    plain = timed(lambda: evaluate(reduced.model, chosen, x, gradient=False), 10)[0]
+    full_gradient = timed(lambda: evaluate(reduced.model, chosen, x), 10)[0]
 
     def solve():
         normal_modes(structure(assembly).system, band=TOP)
 
-    full = best(solve, 2 if len(assembly.points) < 10_000 else 1)
-    error = best(lambda: accuracy(reduced, reduced.model, chosen, x, TOP), 1)
+    full = timed(solve, 2 if len(assembly.points) < 10_000 else 1)[0]
+    error = timed(lambda: accuracy(reduced, reduced.model, chosen, x, TOP), 1)[0]
     n, r = reduced.model.basis.shape
     ratios = f"{full / full_gradient:.0f} | {(1 + count(chosen)) * full / full_gradient:.0f}"
     times = (
