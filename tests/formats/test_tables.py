@@ -102,6 +102,7 @@ HEAD = "frequency_hz,output,input,real,imag\n"
     [
         ("", "empty"),
         (HEAD, "no rows"),
+        ("frequency_hz,magnitude\n1,2\n", "line 1: neither FRFs .* nor poles .*; there are freq"),
         ("frequency_hz,output,real,imag\n1,1:+Z,1,1\n", "no column input"),
         ("frequency_hz,output,input,real,imag,phase\n", "unknown column 'phase'; known are"),
         (HEAD + "1,1:+Z,1:+Z,1\n", "line 2: 4 cells, the header has 5"),

@@ -187,12 +187,14 @@ def test_damaged_and_new_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "d.wav").write_bytes(b"RIFF" + bytes(30))
     objects = np.array([{"a": 1}], dtype=object)
     np.savez(tmp_path / "e.npz", fs=RATE, force=objects, acceleration=MOTION)
+    (tmp_path / "g.npz").write_bytes(bytes(range(256)))
     for name, said in (
         ("b.mat", "cannot be read as MAT"),
         ("c.mat", "MATLAB 7.3 .HDF5., which is not read; save it with -v7"),
         ("d.wav", "cannot be read as WAV"),
         ("e.npz", "cannot be read as NPZ: Object arrays"),
         ("f.wav", "no file"),
+        ("g.npz", "cannot be read as NPZ: it is no archive"),
     ):
         with pytest.raises(ChladniError, match=rf"{name}.*{said}|{said}.*{name}"):
             read_recordings(tmp_path / name)

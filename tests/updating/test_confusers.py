@@ -8,6 +8,7 @@ from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.registry import families
 from chladni.updating.confusers import with_confusers
 from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.result_parts import why_not
 from chladni.updating.ties import TIED, simplest_first
 
 
@@ -49,6 +50,14 @@ def test_what_has_become_the_named_effect_is_no_rival():
     hypotheses = tried("point-mass", 0.0), tried("local-resonator", 2.0, "point-mass")
     answer = with_confusers(Diagnosis(None, None, None, hypotheses, "missing physics"))
     assert answer.one_of == ()
+
+
+def test_what_has_become_the_named_effect_is_told_as_that():
+    """It is left out of the ties, so the table of alternatives must say why."""
+    mass, lump = tried("point-mass", 0.0), tried("local-resonator", 2.0, "point-mass")
+    null = SimpleNamespace(neg2_log_evidence=500.0, data=None)
+    diagnosis = Diagnosis(null, null, null, (mass, lump), "missing physics")
+    assert "it is point-mass" in why_not(diagnosis, lump, mass)
 
 
 def test_a_leader_that_has_become_a_simpler_effect_lets_it_lead():

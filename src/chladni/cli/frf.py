@@ -22,23 +22,17 @@ from ..workflows.loaded_model import (
     load_deck,
     load_model,
 )
-from .run import Allow, Out, Run, Units, limits, started
+from .run import Allow, Answering, Damping, Driven, Kind, Out, Run, Units, limits, started
 
 
 def run(
     source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
-    input: Annotated[
-        list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
-    ] = None,
-    output: Annotated[
-        list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
-    ] = None,
+    input: Driven = None,
+    output: Answering = None,
     band: Annotated[str, typer.Option(help="From and to, in Hz.")] = "1:200",
     lines: Annotated[int, typer.Option(help="How many frequencies.", min=2)] = 800,
-    damping: Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)] = 0.01,
-    quantity: Annotated[
-        str, typer.Option(help="receptance, mobility or accelerance.")
-    ] = "accelerance",
+    damping: Damping = 0.01,
+    quantity: Kind = "accelerance",
     units: Units = None,
     allow: Allow = None,
     out: Out = None,

@@ -31,6 +31,14 @@ Allow = Annotated[
     list[str] | None,
     typer.Option("--allow", help="Card of a deck to leave out although it carries stiffness."),
 ]
+Driven = Annotated[
+    list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
+]
+Answering = Annotated[
+    list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
+]
+Damping = Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)]
+Kind = Annotated[str, typer.Option(help="receptance, mobility or accelerance.")]
 
 
 @dataclass

@@ -13,7 +13,7 @@ from ..report.result_json import to_json
 from ..studies.parameter_study import ParameterStudy, study
 from ..studies.study_settings import StudySettings
 from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
-from .run import Allow, Out, Units, limits, place_of, started
+from .run import Allow, Answering, Damping, Driven, Kind, Out, Units, limits, place_of, started
 
 
 def run(
@@ -35,18 +35,12 @@ def run(
     ] = "sobol",
     seed: Annotated[int, typer.Option(help="Seed of the samplers that draw.")] = 0,
     modes: Annotated[int, typer.Option(help="Elastic modes that are followed.")] = 10,
-    input: Annotated[
-        list[str] | None, typer.Option("--input", help="Where it is driven: 12:+Z, 12:n, base:+Z.")
-    ] = None,
-    output: Annotated[
-        list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
-    ] = None,
+    input: Driven = None,
+    output: Answering = None,
     band: Annotated[str, typer.Option(help="Of these responses, in Hz.")] = "1:200",
     lines: Annotated[int, typer.Option(help="How many frequencies.")] = 400,
-    damping: Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)] = 0.01,
-    quantity: Annotated[
-        str, typer.Option(help="receptance, mobility or accelerance.")
-    ] = "accelerance",
+    damping: Damping = 0.01,
+    quantity: Kind = "accelerance",
     frf: Annotated[bool, typer.Option("--frf", help="Keep every sample's responses.")] = False,
     workers: Annotated[
         int | None,

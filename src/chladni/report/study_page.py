@@ -9,7 +9,7 @@ from ..output import plain
 from ..studies.parameter_study import ParameterStudy
 from ..studies.sensitivity import Sensitivity
 from .blocks import Block, Code, Facts, Items, PageParts, Picture, Section, Table
-from .words import number, unit_text
+from .words import number, quantity, unit_text
 
 _SHOWN = 4  # results drawn over the parameters
 _AXES = 5  # parameters drawn
@@ -93,14 +93,14 @@ def _notes(found: ParameterStudy) -> list[str]:
 
 def _ranges(found: ParameterStudy) -> Block:
     rows = [
-        (v.name, number(v.nominal), number(v.low), number(v.high),
-         unit_text(v.unit) + (", logarithmic" if v.log else ""))
+        (v.name, *(quantity(value, v.unit) for value in (v.nominal, v.low, v.high)),
+         "logarithmic" if v.log else "even")
         for v in found.varied
     ]  # fmt: skip
     s = found.settings
     caption = f"{len(found.rows)} samples, {s.sampler}, seed {s.seed}."
-    heads = ("parameter", "deck", "from", "to", "unit")
-    return Table(heads, rows, words=("parameter", "unit"), caption=caption)
+    heads = ("parameter", "deck", "from", "to", "steps")
+    return Table(heads, rows, words=("parameter", "steps"), caption=caption)
 
 
 def _sensitivities(

@@ -131,7 +131,7 @@ def _first(data: Responses, state: State) -> float:
     """Well below the first flexible mode of the model [Hz]."""
     omega = np.sqrt(np.maximum(state.lam, 0))
     flexible = omega[omega > RIGID * data.s.imag.max()]
-    return BELOW * float(flexible.min(initial=np.inf)) / (2 * np.pi) if len(flexible) else 0.0
+    return BELOW * float(flexible.min()) / (2 * np.pi) if len(flexible) else 0.0
 
 
 def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:

@@ -13,12 +13,12 @@ from typing import Protocol, Self
 import numpy as np
 
 from ..ema.correlation import wrapped
+from ..ema.identification import DERIVATIVES
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
 from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
 
 LN10 = np.log(10.0)
-POWER = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
 
 class Data(Protocol):
@@ -66,7 +66,7 @@ class Responses:
     @property
     def power(self) -> int:
         """Power of s by which the receptance is multiplied."""
-        return POWER[self.quantity]
+        return DERIVATIVES[self.quantity]
 
     def over(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""

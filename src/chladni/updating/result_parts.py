@@ -63,6 +63,8 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
             "before anything is named"
         )
+    if hypothesis.effect.becomes(hypothesis.fit.of(hypothesis.effect)) == best.effect.name:
+        return f"as it was fitted it is {best.effect.name} for all these data can tell"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
         f"e^{gap:.0f} times less probable than {best.effect.name}; leaves "

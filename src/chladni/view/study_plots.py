@@ -30,7 +30,8 @@ def slope_map(
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if abs(value) > 0.6 * most else "#333333"
-            ax.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
+            text = f"{round(value, 2) + 0.0:.2f}"  # no sign before a zero
+            ax.text(j, i, text, ha="center", va="center", fontsize=8, color=colour)
     ax.set_xticks(range(len(columns)), columns, rotation=30, ha="right", fontsize=8)
     ax.set_yticks(range(len(rows)), rows, fontsize=8)
     ax.set_title(title, loc="left", **TITLE)
@@ -68,7 +69,7 @@ def parallel_coordinates(
     for line, s in zip(place, shade, strict=True):
         ax.plot(at, line, color=cmap(s), lw=0.9, alpha=alpha)
     for k in at:
-        ax.axvline(k, color="#333333", lw=0.8)
+        ax.plot([k, k], [0.0, 1.0], color="#333333", lw=0.8)
         for y, value in ((-0.05, low[k]), (1.02, high[k])):
             ax.text(k, y, f"{value:.4g}", ha="center", va="top" if y < 0 else "bottom", fontsize=7)
     ax.set_xticks(at, list(axes), rotation=20, ha="right", fontsize=8)

@@ -79,7 +79,13 @@ def _asked(r: Recording, quantity: str | None) -> Recording:
 def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
     """FRFs (one recording per article and level) or poles, told apart by the header."""
     path = Path(path)
-    if path.is_file() and _first_line(path).isdisjoint({"real", "imag", "output", "input"}):
+    head = _first_line(path) - {""} if path.is_file() else set()
+    if head and head.isdisjoint({"real", "imag", "output", "input"}):
+        if "mode" not in head:
+            raise FileError(
+                f"{path.name}, line 1: neither FRFs (columns {', '.join(_FRF)}) nor poles (columns "
+                f"mode, frequency_hz); there are {', '.join(sorted(head))}"
+            )
         return (Recording(name=path.name, poles=read_poles(path)),)
     table = read_table(path, _FRF, _FRF_OPTIONAL)
     if quantity is None:
@@ -203,6 +209,8 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     path = Path(path)
     if not path.is_file():
         raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+    if not zipfile.is_zipfile(path):
+        raise FileError(f"{path.name} cannot be read as NPZ: it is no archive of arrays")
     try:
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             if timed := not {"frequency_hz", "values"} & set(file.files) and is_time(file.files):

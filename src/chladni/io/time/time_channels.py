@@ -10,7 +10,6 @@ from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError
 from ..uff.uff_units import force_factor, numerator
 
-MOTIONS = {"m": "displacement", "m/s": "velocity", "m/s^2": "acceleration"}
 BY_NAME = {  # what an array is by its name, and the unit where none is stated
     **dict.fromkeys(("force", "f", "hammer"), "N"),
     **dict.fromkeys(("acceleration", "accel", "acc", "a"), "m/s^2"),
