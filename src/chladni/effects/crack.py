@@ -85,7 +85,7 @@ class LineFinder:
         return Line(shells, self.middle[shells].mean(axis=0), p) if len(shells) >= SHELLS else None
 
     def drawn(self, shells: np.ndarray, lengths: Sequence[float]) -> list[Line]:
-        """LineFinder through these shells at all angles, each set of shells once."""
+        """Lines through these shells at all angles, each set of shells once."""
         angles = np.pi * np.arange(ANGLES) / ANGLES
         found = {
             line.shells.tobytes(): line
