@@ -10,6 +10,7 @@ import numpy as np
 
 from .finding import Check, Finding
 from .identification import Identified
+from .shapes import constants
 
 LEAST_MODES = 4
 TURNED = 0.1  # rad at the highest mode: a smaller delay bends nothing
@@ -31,11 +32,6 @@ FACTORS = {  # what multiplies the recording to mend it: how it comes about
     9.80665 / 4.4482216: "responses in g and forces in lbf taken for m/s² and N",
 }
 QUANTITIES = ("receptance", "mobility", "accelerance")
-
-
-def constants(identified: Identified) -> np.ndarray:
-    """A_r = 2i Im(p_r) R_r, [1/kg] of a receptance (r, n_out, n_in)."""
-    return np.asarray(identified.residues * (2j * identified.poles.imag)[:, None, None])
 
 
 def phases(identified: Identified) -> np.ndarray:

@@ -39,12 +39,31 @@ class MeasuredShapes:
     polarity: np.ndarray
 
 
+def constants(identified: Identified) -> np.ndarray:
+    """A_r = 2i Im(p_r) R_r, [1/kg] of a receptance (r, n_out, n_in); real of a normal mode."""
+    return np.asarray(identified.residues * (2j * identified.poles.imag)[:, None, None])
+
+
+def driven_shapes(identified: Identified) -> np.ndarray:
+    """Shapes (n_out, r) complex: the residues of the input that drives each mode most."""
+    if not identified.order:
+        return np.zeros((len(identified.outputs), 0))
+    best = np.linalg.norm(identified.residues, axis=1).argmax(axis=1)
+    return np.stack([R[:, j] for R, j in zip(identified.residues, best, strict=True)], axis=1)
+
+
+def real_shapes(identified: Identified) -> np.ndarray:
+    """The same (n_out, r), turned so that they are as real as they can be, of unit norm."""
+    psi = _turned(driven_shapes(identified).T).T.real
+    return np.asarray(psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300))
+
+
 def shapes(identified: Identified) -> MeasuredShapes:
     """Ψ_r of R_r = Ψ_r ψ_rᵀ / (2i Im p_r): the first singular vectors of every residue.
 
     Mass-normalised where an input is also an output (with either sign), Ψ_drive = ψ_drive.
     """
-    A = identified.residues * (2j * identified.poles.imag)[:, None, None]
+    A = constants(identified)
     U, S, Vh = np.linalg.svd(A, full_matrices=False)
     left, right = U[:, :, 0] * np.sqrt(S[:, :1]), Vh[:, 0] * np.sqrt(S[:, :1])
     drive = _drive(identified)

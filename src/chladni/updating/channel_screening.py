@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..dynamics.modes import rigid_modes
-from ..ema.chain_checks import constants, level_checks, modal_gains
+from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
 from ..ema.finding import Check, Finding, Screening
 from ..ema.identification import Identified
 from ..ema.recording_screening import strong_modes
 from ..ema.shape_faults import LEAST_CHANNELS, LEAST_MODES, ModelShapes, shape_faults
+from ..ema.shapes import real_shapes
 from ..fem.assemble import Structure
 from ..fem.locate import rows_of
 from ..fem.measured_dofs import MeasuredDofs
@@ -68,7 +69,7 @@ def against_model(
         lambda i: _turned(outputs, int(keep[i]), built, near.shapes),
         lambda i: _elsewhere(outputs, int(keep[i]), built, near.shapes),
     )
-    psi = measured_shapes(strong)[keep]
+    psi = real_shapes(strong)[keep]
     kept = tuple(labels[k] for k in keep)
     faults = [] if outputs.sd.any() else shape_faults(kept, psi, strong.frequency, shapes)
     said = f"{len(kept)} channels, {strong.order} modes, {len(near.frequency)} of the model"
@@ -116,15 +117,6 @@ def _agreeing(
             mend = left_out(f.channels[1])
             out.append(Finding("duplicated channels", text, "fault", f.channels, mend, f.value))
     return replace(before, findings=tuple(out))
-
-
-def measured_shapes(found: Identified) -> np.ndarray:
-    """Real shapes (n_out, r) of unit norm, from the input that drives each mode most."""
-    A = constants(found)
-    best = np.linalg.norm(A, axis=1).argmax(axis=1)
-    psi = np.stack([a[:, j] for a, j in zip(A, best, strict=True)], axis=1)
-    psi = psi * np.exp(-0.5j * np.angle((psi**2).sum(axis=0)))
-    return np.asarray(psi.real / np.maximum(np.linalg.norm(psi.real, axis=0), 1e-300))
 
 
 _AXES = ("+X", "+Y", "+Z")

@@ -10,6 +10,7 @@ from ..dynamics.modes import rigid_modes
 from ..ema.correlation import mac
 from ..ema.identification import Identified
 from ..ema.mode_pairing import pair
+from ..ema.shapes import driven_shapes
 from ..errors import FileError
 from ..fem.modelled import Modelled
 from .identify import firm
@@ -54,16 +55,7 @@ def _fit(
     """(sum of MAC, pairs, mean MAC) with component k of every direction taken from order[k]."""
     near = model.modes.sel(~rigid_modes(model.modes))
     turned = replace(case.outputs, directions=case.outputs.directions[:, list(order)])
-    phi, psi = turned.rows(model.structure) @ near.shapes, measured_shapes(found)
+    phi, psi = turned.rows(model.structure) @ near.shapes, driven_shapes(found)
     paired = pair(near.frequency, found.frequency, mac(phi, psi))
     mean = float(paired.mac.mean()) if len(paired) else 0.0
     return float(paired.mac.sum()), len(paired), mean
-
-
-def measured_shapes(found: Identified) -> np.ndarray:
-    """Shapes of the test (n_out, r): the residues of the input that drives each mode most."""
-    if not found.order:
-        return np.zeros((len(found.outputs), 0))
-    size = np.linalg.norm(found.residues, axis=1)
-    best = size.argmax(axis=1)
-    return np.stack([R[:, j] for R, j in zip(found.residues, best, strict=True)], axis=1)

@@ -13,10 +13,11 @@ from ..ema.finding import Screening
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mode_pairing import ModePairs, pair
+from ..ema.shapes import driven_shapes
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
-from .axes_check import measured_shapes, refuse_turned_axes
+from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .output_only import with_natural_frequencies
@@ -86,7 +87,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & (found.frequency >= found.band[0]))
     refuse_turned_axes(case, found, model)
-    phi, psi = case.outputs.rows(model.structure) @ near.shapes, measured_shapes(found)
+    phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
     pairs = pair(near.frequency, found.frequency, M)
     by_dof = None
