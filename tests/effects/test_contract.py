@@ -42,6 +42,7 @@ CHANNELS = 4
 NAMES = ("family", 
     "E", "rho", "t", "scatter", "gain", "orthotropic-material", "point-mass", "extra-support",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
+    "joint-footprint",
     "freed", "local-resonator", "stiffness-patch", "mass-patch", "crack",
 )  # fmt: skip
 
@@ -71,7 +72,7 @@ def cases(reduced):
     line = LineFinder.of(reduced.structure.assembly).drawn(np.array([20]), (1.7,))[0]
     local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
     ortho = material_axes(where)[0]
-    over = mesh.mesh_error(solved(reduced.structure, 2 * TOP), TOP)
+    over = mesh.mesh_errors(solved(reduced.structure, 2 * TOP), TOP)[0]
     own = mesh.modal_discrepancy(solved(reduced.structure, 2 * TOP), TOP, over)
     waves = random_field(groups, "t", 0.03)
     n = len(waves.parameters)
@@ -100,6 +101,10 @@ def cases(reduced):
         "mass-patch": (MassPatch.on(groups, 0, 9), [0.4, *local[1:]], [-30, *local[1:]]),
         "crack": (crack(groups, line, 9), [0.5], [-40]),
         "mesh-error": (over, [1.0], [0]),
+        "joint-footprint": (
+            mesh.JointFootprint(over.parameters, over.text, rows=over.rows, change=over.change),
+            [1.0], [0],
+        ),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
     found["family"] = (model_families(reduced.structure)[0], [0.3], [0])
@@ -188,7 +193,8 @@ def full(assembly: Assembly) -> np.ndarray:
     return normal_modes(structure(assembly).system, band=2 * TOP).frequency[FLEXIBLE]
 
 
-IDLE = {"scatter", "gain", "mesh-error", "jitter", "family", "sensor-fault"}  # no deck holds them
+# no deck holds them
+IDLE = {"scatter", "gain", "mesh-error", "joint-footprint", "jitter", "family", "sensor-fault"}
 WRITTEN = [n for n in NAMES if n not in IDLE]
 
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.effects.discretisation import mesh_errors
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.effects.surroundings import Setup, Surroundings
+from chladni.fem.modelled import solved
 from chladni.updating.likelihood import Poles
 from chladni.updating.reduced_model import evaluate
 
@@ -57,6 +59,23 @@ def near(data, model, effects, x):
 
 def test_slopes_of_responses(reduced, responses, effects):
     check_slopes(near(responses, reduced.model, effects, X), reduced.model, effects, X)
+
+
+def test_slopes_where_a_finer_mesh_moves_sensors_and_shakers(reduced, responses, effects):
+    plain = mesh_errors(solved(reduced.structure, 400.0), 200.0)[0]
+    moved = np.cos(np.arange(6 * len(plain.change))).reshape(6, -1)
+    error = replace(plain, shapes=0.2 * moved)
+    still = replace(plain, shapes=np.zeros((0, 0)))
+    x = np.array([0.02, 0.7])
+    both, without = ([effects[0], e] for e in (error, still))
+    check_slopes(near(responses, reduced.model, both, x), reduced.model, both, x)
+    H, H_still = (responses.model(evaluate(reduced.model, e, x, False)) for e in (both, without))
+    assert np.abs(H / H_still - 1).max() > 0.01
+    nothing = np.array([0.02, 0.0])
+    assert_allclose(
+        responses.model(evaluate(reduced.model, both, nothing, False)),
+        responses.model(evaluate(reduced.model, effects[:1], nothing[:1], False)),
+    )
 
 
 @pytest.mark.parametrize("quantity", ["receptance", "mobility"])

@@ -1,6 +1,8 @@
 """What the mesh of the deck, and the formulation of its elements, hide."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,18 +11,27 @@ from scipy.optimize import linear_sum_assignment
 from ..dynamics.modes import ModalModel
 from ..fem.assemble import Structure
 from ..fem.modelled import Modelled, modelled
+from ..geometry.footprints import on_smaller_shells, regions_of_joints
 from ..geometry.refine import refined
-from .effect import Effect, Parameter, PointTerm
+from ..model.assembly import Assembly
+from .effect import Effect, Parameter, PointTerm, ShapeChange
 
 MOST = 60_000  # dofs of a structure that is still refined: four times as many take half a minute
 LARGE = 20_000  # dofs from which the refined modes are solved for no farther than they are compared
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
+MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
+FOOTPRINT = 0.5, 0.7  # the same of footprints: as the deck has them, half as wide, or a quarter
+REGIONS = 4  # of joints whose footprints differ by themselves; each is a refined structure solved
 
 
 @dataclass(frozen=True, eq=False)
 class MeshError(Effect):
-    """Modal stiffness moves by x times the change that a mesh twice as fine brings."""
+    """Modal stiffness moves by x times the change that a mesh twice as fine brings.
+
+    ``change`` (k,) [rad²/s²] is its diagonal over coordinates ``rows`` (k, n); ``shapes`` (p, k)
+    how much the motion of the places that were measured changes with each of these coordinates.
+    """
 
     name = "mesh-error"
     claim = "the mesh is not infinitely fine"
@@ -28,6 +39,13 @@ class MeshError(Effect):
 
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     change: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def seen(self, x: np.ndarray) -> ShapeChange | None:
+        """x times what the finer mesh changes of the shapes at sensors and shaker."""
+        if not len(self.shapes):
+            return None
+        return ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """x ΔK over the modes."""
@@ -51,35 +69,104 @@ class ModalDiscrepancy(Effect):
         return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam)),)
 
 
-def mesh_error(model: Modelled, f_max: float) -> MeshError | None:
-    """The mesh error of a structure up to somewhat above ``f_max``; None if it is too large.
+@dataclass(frozen=True, eq=False)
+class JointFootprint(MeshError):
+    """Modal stiffness moves by x times what joints on shells half as wide take away."""
 
+    name = "joint-footprint"
+    claim = "a joint holds as much of a sheet as a shell of the mesh is wide, not as it does"
+
+
+Places = Callable[[Structure], sp.csr_array]  # rows of what was measured, on any mesh
+
+
+def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> list[MeshError]:
+    """What the mesh of a structure hides up to somewhat above ``f_max``; nothing of a large one.
+
+    The error of its shells, and, where it has joints on whole shells, that of their footprints: of
+    all alike, and of each region by itself, for two meshers hang one joint on unlike shells.
     With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
     ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
     """
     built = model.structure
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
-        return None
+        return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
-    coarse = _flexible(model.up_to(above[0] * f_max), f_max)
-    finer = modelled(refined(built.assembly), above[1] * f_max)
-    fine = _flexible(finer.modes, f_max)
-    rows = _rows_of(finer.structure, built)
-    M_phi = built.system.M @ coarse.shapes
-    overlap = M_phi.T @ (rows @ fine.shapes)
-    own, partner = linear_sum_assignment(-(overlap**2))
-    M_phi = M_phi[:, own]
-    U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
-    B = U @ Vt
-    omega2 = (2 * np.pi * fine.frequency[partner]) ** 2
-    delta = (B * omega2) @ B.T - np.diag((2 * np.pi * coarse.frequency[own]) ** 2)
-    change, V = np.linalg.eigh((delta + delta.T) / 2)
-    unknown = Parameter("mesh", "-", LIMIT - 0.17, 0.3, kind="linear", step=0.5)
-    return MeshError((unknown,), "every mode", rows=sp.csr_array((M_phi @ V).T), change=change)
+    coarse = replace(model, modes=_flexible(model.up_to(above[0] * f_max), f_max))
+    places = places or _nowhere
+
+    def change(finer: Assembly) -> _ModalChange:
+        solved = modelled(finer, above[1] * f_max)
+        return _ModalChange.of(
+            coarse, replace(solved, modes=_flexible(solved.modes, f_max)), places
+        )
+
+    fine = refined(built.assembly)
+    of_shells = change(fine)
+    errors = [of_shells.error(MeshError, MESH)]
+    smaller = on_smaller_shells(built.assembly, fine)
+    moved = [k for k, (new, old) in enumerate(zip(smaller, fine.rigid, strict=True)) if new != old]
+
+    def footprints(bodies: Sequence[int], mean: float, sd: float) -> MeshError:
+        rigid = [smaller[k] if k in bodies else old for k, old in enumerate(fine.rigid)]
+        on_less = change(replace(fine, rigid=tuple(rigid)))
+        return (on_less - of_shells).error(JointFootprint, (mean, sd))
+
+    if moved:
+        errors.append(footprints(moved, *FOOTPRINT))
+        regions = regions_of_joints(built.assembly, moved, REGIONS)
+        if len(regions) > 1 and len(built.system.dofs) < LARGE:
+            errors += [footprints(at.tolist(), 0.0, FOOTPRINT[1] / np.sqrt(n)) for at, n in regions]
+    return errors
+
+
+def _nowhere(built: Structure) -> sp.csr_array:
+    return sp.csr_array((0, len(built.system.dofs)))
+
+
+@dataclass(frozen=True, eq=False)
+class _ModalChange:
+    """What another mesh changes over the modes of the deck MΦ (n, r).
+
+    ``stiffness`` (r, r) of the modal stiffness, ``seen`` (p, r) of the modes where it was measured.
+    """
+
+    M_phi: np.ndarray
+    stiffness: np.ndarray
+    seen: np.ndarray
+
+    @classmethod
+    def of(cls, coarse: Modelled, fine: Modelled, places: Places) -> Self:
+        """What a finer structure changes."""
+        phi, psi = coarse.modes.shapes, fine.modes.shapes
+        M_phi = coarse.structure.system.M @ phi
+        overlap = M_phi.T @ (_rows_of(fine.structure, coarse.structure) @ psi)
+        own, partner = linear_sum_assignment(-(overlap**2))
+        U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
+        B = U @ Vt
+        old, new = ((2 * np.pi * m.modes.frequency) ** 2 for m in (coarse, fine))
+        stiffness = np.zeros((len(old), len(old)))
+        stiffness[np.ix_(own, own)] = (B * new[partner]) @ B.T - np.diag(old[own])
+        seen = np.zeros((places(coarse.structure).shape[0], len(old)))
+        seen[:, own] = places(fine.structure) @ psi[:, partner] @ B.T
+        seen[:, own] -= places(coarse.structure) @ phi[:, own]
+        return cls(M_phi, (stiffness + stiffness.T) / 2, seen)
+
+    def __sub__(self, other: Self) -> Self:
+        """What is left without the change of another."""
+        left = self.stiffness - other.stiffness
+        return replace(self, stiffness=left, seen=self.seen - other.seen)
+
+    def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
+        """The nuisance of this change."""
+        change, V = np.linalg.eigh(self.stiffness)
+        unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
+        rows = sp.csr_array((self.M_phi @ V).T)
+        return kind((unknown,), "every mode", rows=rows, change=change, shapes=self.seen @ V)
 
 
 def modal_discrepancy(
-    model: Modelled, f_max: float, mesh: MeshError | None, sd: float = 0.0015
+    model: Modelled, f_max: float, mesh: MeshError | None = None, sd: float = 0.0015
 ) -> ModalDiscrepancy:
     """Independent scatter of each modal frequency up to ``f_max``.
 

@@ -1,6 +1,6 @@
 """What may differ between model and article, and how it enters the reduced model.
 
-An effect acts in four ways, and in no other:
+An effect acts in five ways, and in no other:
 
 - it multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
   stiffness) on groups of shells.  Multiplying calibrated operators, never subtracting nominal
@@ -8,7 +8,8 @@ An effect acts in four ways, and in no other:
 - it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass), and of
   degrees of freedom it brings along (a lump on a spring);
 - it adds *operators* c(p) A, A what a part other than a sheet has in K or M already, c > -1;
-- it changes *channels* of the test: gain, sign.
+- it changes *channels* of the test: gain, sign;
+- it changes *shapes* where they are measured, and only there (a mesh about a sensor).
 
 Parameters are unbounded numbers x with a Gaussian prior; :meth:`Parameter.value` gives the
 physical one.
@@ -111,6 +112,20 @@ class ChannelChange:
 
 
 @dataclass(frozen=True, eq=False)
+class ShapeChange:
+    """c S b added to the motion of the places that were measured: outputs first, then inputs.
+
+    b are coordinates ``rows`` (k, n) of the structure, S ``shapes`` (places, k), c and dc/dx
+    (n_parameters,). What is local at a sensor no change of K and M over a basis can bring.
+    """
+
+    rows: sp.csr_array
+    shapes: np.ndarray
+    coefficient: float
+    gradient: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Effect:
     """One kind of physics; subclasses say what it does, this one does nothing.
 
@@ -155,6 +170,10 @@ class Effect:
 
     def outputs(self, x: np.ndarray) -> ChannelChange | None:
         """What it does to the channels of the test."""
+        return None
+
+    def seen(self, x: np.ndarray) -> ShapeChange | None:
+        """What it does to the motion of the very places that were measured."""
         return None
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:

@@ -83,6 +83,12 @@ def _bent(
     return (a + b) / 2 - np.where(both, lift / 8, 0.0)
 
 
+def parents(shells: Shells) -> np.ndarray:
+    """The shell every one of the refined mesh is a quarter of (4 m,)."""
+    quad, tri = np.flatnonzero(~shells.triangle), np.flatnonzero(shells.triangle)
+    return np.concatenate([np.tile(quad, 4), np.tile(tri, 4)])
+
+
 def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
     """Four shells in place of each: corners, sides and centres as rows of the new points."""
     c, t = shells.nodes, shells.thickness
@@ -98,21 +104,21 @@ def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
         j = (k - 1) % 4
         nodes = np.stack([c[quad, k], side[quad, k], mid[quad], side[quad, j]], axis=1)
         thick = np.stack([t[quad, k], t_side[quad, k], t_mid[quad], t_side[quad, j]], axis=1)
-        pieces.append((quad, nodes, thick))
+        pieces.append((nodes, thick))
     for k in range(3):
         j = (k - 1) % 3
         nodes = np.stack([c[tri, k], side[tri, k], side[tri, j], side[tri, j]], axis=1)
         thick = np.stack([t[tri, k], t_side[tri, k], t_side[tri, j], t_side[tri, j]], axis=1)
-        pieces.append((tri, nodes, thick))
+        pieces.append((nodes, thick))
     nodes = np.stack([side[tri, 0], side[tri, 1], side[tri, 2], side[tri, 2]], axis=1)
     thick = np.stack([t_side[tri, 0], t_side[tri, 1], t_side[tri, 2], t_side[tri, 2]], axis=1)
-    pieces.append((tri, nodes, thick))
-    at = np.concatenate([p[0] for p in pieces])
+    pieces.append((nodes, thick))
+    at = parents(shells)
     return Shells(
         1 + np.arange(len(at)),
-        np.concatenate([p[1] for p in pieces]),
+        np.concatenate([nodes for nodes, _ in pieces]),
         shells.part[at],
-        np.concatenate([p[2] for p in pieces]),
+        np.concatenate([thick for _, thick in pieces]),
         shells.axis[at],
         shells.offset[at],
     )

@@ -84,8 +84,16 @@ class Responses:
         φ_i of a moving base is its load, which follows the mass of the state.
         """
         d = 1 / (state.lam + self.s[:, None] ** 2)
+        phi_o = self.a @ state.phi
         phi_i = self.b @ state.phi if state.drive is None else state.drive
-        return self.a @ state.phi, phi_i, d
+        if state.moved is None:
+            return phi_o, phi_i, d
+        moved_o, moved_i = self._of_test(state.moved)
+        return phi_o + moved_o, phi_i + moved_i if state.drive is None else phi_i, d
+
+    def _of_test(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What holds for all places, of the outputs and of the inputs."""
+        return places[: len(self.a)], places[len(self.a) :]
 
     def deviation(self, state: State) -> np.ndarray:
         """δ = log10(H_A / H_X), complex, phase wrapped (n_f, n_out, n_in)."""
@@ -140,7 +148,7 @@ class Responses:
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dφ_i is that of a moving base; a force drives as it does.
+        dφ_i is that of a moving base; dφ_o and dφ_i of shapes that change where they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
         n_p, r = len(state.dK), len(state.lam)
@@ -157,6 +165,11 @@ class Responses:
                 W = W - state.ddrive[:, j, :, None]
             W = W * d.T
             out[:, :, :, j] = -np.einsum("or,prf->pfo", phi_o, W, optimize=True)
+        for p, moved in state.dmoved.items():
+            moved_o, moved_i = self._of_test(moved)
+            out[p] += np.einsum("or,fr,ir->foi", moved_o, d, phi_i, optimize=True)
+            if state.drive is None:
+                out[p] += np.einsum("or,fr,ir->foi", phi_o, d, moved_i, optimize=True)
         out /= H * LN10
         if state.doffset is not None:
             out += state.doffset.T[:, None, :, None]

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..effects.discretisation import mesh_error, modal_discrepancy
+from ..effects.discretisation import Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
 from ..effects.model_families import model_families
@@ -22,6 +22,7 @@ from ..ema.identification import Identified, equalised, identify, noise_source
 from ..ema.level_shift import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
 from ..errors import FileError
+from ..fem.assemble import Structure
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
@@ -79,8 +80,8 @@ def _by_responses(question: Question) -> Prepared:
     nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    known = sp.csr_array(sp.vstack([rows_o, rows_i]))
-    reduced = reduced_problem(nominal, f_max, known, base=question.base)
+    measured = measured_on(question)
+    reduced = reduced_problem(nominal, f_max, measured(built), base=question.base)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -98,7 +99,7 @@ def _by_responses(question: Question) -> Prepared:
             direct=question.outputs.carried_by(question.inputs),
         )  # fmt: skip
         data.append(read.over(reduced.model))
-    nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
+    nuisance = nuisances(reduced, nominal, f_max, measured)
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
@@ -276,22 +277,31 @@ def _unscored(question: Question) -> list[str]:
     return [f"not used, for natural frequencies are compared: {names}"]
 
 
-def nuisances(
-    reduced: ReducedProblem, model: Modelled, f_max: float, with_discrepancy: bool = True
-) -> list[Effect]:
-    """Scatter within parts, mesh error, modal discrepancy: what calibration cannot remove.
+def measured_on(question: Question) -> Places:
+    """Rows of outputs and inputs on any mesh of the structure."""
 
-    Responses need no modal discrepancy: their likelihood allows any small error of modal stiffness
-    and mass. What is structured in that error stands beside it, joints and shear of the shells by
-    families.
+    def rows(built: Structure) -> sp.csr_array:
+        return sp.csr_array(sp.vstack([question.outputs.rows(built), question.inputs.rows(built)]))
+
+    return rows
+
+
+def nuisances(
+    reduced: ReducedProblem, model: Modelled, f_max: float, measured: Places | None = None
+) -> list[Effect]:
+    """Scatter within parts, mesh error, joints and shear: what calibration cannot remove.
+
+    Responses, which are ``measured`` somewhere, need no modal discrepancy: their likelihood allows
+    any small error of modal stiffness and mass. What is structured in that error stands beside it,
+    joints and shear of the shells by families.
     """
+    mesh = mesh_errors(model, f_max, measured)
     out: list[Effect] = [
-        random_field(reduced.groups, "t", SCATTER_T), random_field(reduced.groups, "E", SCATTER_E)
+        random_field(reduced.groups, "t", SCATTER_T), random_field(reduced.groups, "E", SCATTER_E),
+        *mesh,
     ]  # fmt: skip
-    if (mesh := mesh_error(model, f_max)) is not None:
-        out.append(mesh)
-    if with_discrepancy:
-        return [*out, modal_discrepancy(model, f_max, mesh)]
+    if measured is None:
+        return [*out, modal_discrepancy(model, f_max, mesh[0] if mesh else None)]
     return [*out, *model_families(model.structure)]
 
 

@@ -143,6 +143,8 @@ class State:
     weight, dweight        mass on the scales [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
+    moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
+                           or None, and its derivative by the parameters it hangs on
     """
 
     lam: np.ndarray
@@ -156,6 +158,8 @@ class State:
     doffset: np.ndarray | None
     drive: np.ndarray | None = None
     ddrive: np.ndarray | None = None
+    moved: np.ndarray | None = None
+    dmoved: Mapping[int, np.ndarray] = field(default_factory=dict)
 
     @property
     def vectors(self) -> np.ndarray:
@@ -218,8 +222,25 @@ def evaluate(
         dK, dM = phi.T @ dK @ phi, phi.T @ dM @ phi
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     return State(
-        lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive
+        lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
+        *_moved(model, effects, x, phi[:r]),
     )  # fmt: skip
+
+
+def _moved(
+    model: Reduced, effects: Sequence[Effect], x: np.ndarray, phi: np.ndarray
+) -> tuple[np.ndarray | None, dict[int, np.ndarray]]:
+    """What the effects change of the modes at the places that were measured; its derivatives."""
+    total: np.ndarray | None = None
+    slopes: dict[int, np.ndarray] = {}
+    for effect, at in slices(effects):
+        if (change := effect.seen(x[at])) is None:
+            continue
+        whole = change.shapes @ (model.rows(change.rows) @ phi)
+        value = change.coefficient * whole
+        total = value if total is None else total + value
+        slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
+    return total, slopes
 
 
 def _participating(

@@ -11,7 +11,7 @@ from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from .joint_fit import with_priors
 from .likelihood import Poles, Responses
-from .preparation import SOLVED, nuisances, updating_problem
+from .preparation import SOLVED, measured_on, nuisances, updating_problem
 from .question import Prepared, Question
 from .reduced_problem import reduced_problem
 
@@ -106,7 +106,7 @@ def _on_new_structure(
         changed,
         reduced,
         data.over(reduced.model),
-        [*nuisances(reduced, model, f_max, not rows), *of_test],
+        [*nuisances(reduced, model, f_max, measured_on(changed) if rows else None), *of_test],
         f_max,
     )
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))

@@ -213,7 +213,8 @@ def bending_slopes(
         for j, shells in enumerate(chunk):
             V = U[dofs[shells]]
             dK[j] = V.reshape(-1, r).T @ (groups.cubic[shells] @ V).reshape(-1, r)
-        still = replace(base.state, doffset=None, ddrive=None)  # stiffness moves no load of a base
+        # stiffness moves no load of a base and no shape beside those of the modes
+        still = replace(base.state, doffset=None, ddrive=None, dmoved={})
         state = replace(still, dK=dK, dM=np.zeros_like(dK))
         J = data.scaled(state, True)[1]
         rest = len(base.residual) - len(J)  # what the scales say does not change

@@ -1,0 +1,152 @@
+"""Where a refined mesh would hang its joints: on shells half as large.
+
+Spiders (RBE2) and weighted means (RBE3) carry a screw, a weld or a bead on whole shells of the
+mesh. How wide that is the mesh decides, not the nugget or the head of the screw; and how far a
+sheet gives where it is held hangs on it: halving the shells under the welds of a box moves its
+frequencies by 1 to 7 %, splitting all other shells by 0.2 to 2 %.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..model.assembly import Assembly, Average, Equation, RigidBody
+from .refine import parents
+from .sampling import farthest_point_sample
+
+FEWEST = 3  # grids that carry a joint: fewer hold a point, not an area
+
+Rigid = RigidBody | Average | Equation
+
+
+def on_smaller_shells(coarse: Assembly, fine: Assembly) -> tuple[Rigid, ...]:
+    """The rigid elements of a refined structure, joints on footprints half as wide.
+
+    A joint on the grids of one shell moves to that quarter of it that lies nearest to what hangs on
+    it; one on more shells to the grids nearest to half the way to their middle (the rim of a hole
+    stays as it is). What holds fewer than three grids of shells is as it was, the same object.
+
+    Parameters
+    ----------
+    coarse : Assembly   as the deck has it
+    fine : Assembly     ``refined(coarse)``
+    """
+    shrunk = _Footprints(coarse, fine)
+    taken = {row for body in coarse.rigid for row in _held(body)}
+    out: list[Rigid] = []
+    for body in coarse.rigid:
+        smaller = shrunk.of(body)
+        new = set(_held(smaller)) - set(_held(body))
+        out.append(body if new & taken else smaller)
+        taken |= set(_held(out[-1]))
+    return tuple(out)
+
+
+def regions_of_joints(
+    assembly: Assembly, bodies: Sequence[int], most: int
+) -> list[tuple[np.ndarray, int]]:
+    """Rigid elements (rows of ``assembly.rigid``) by region, and how many joints each region has.
+
+    Elements that bars, bushes, springs or solids connect are one joint. There are at most ``most``
+    regions, about joints that lie far from each other.
+    """
+    hung = np.array([_hung_on(assembly.rigid[k]) for k in bodies], dtype=int)
+    pairs = [assembly.beams.nodes, assembly.bushes.nodes, assembly.springs.nodes]
+    pairs += [np.stack([s.nodes, np.roll(s.nodes, 1, axis=1)], -1).reshape(-1, 2)
+              for s in assembly.solids]  # fmt: skip
+    edges = np.concatenate(pairs)
+    edges = edges[(edges >= 0).all(axis=1)]
+    n = len(assembly.points)
+    graph = coo_array((np.ones(len(edges)), edges.T), shape=(n, n))
+    joint = np.unique(connected_components(graph, directed=False)[1][hung], return_inverse=True)[1]
+    middle = np.array(
+        [assembly.points[hung[joint == j]].mean(axis=0) for j in range(joint.max() + 1)]
+    )
+    seeds = farthest_point_sample(middle, most)
+    region = np.linalg.norm(middle[:, None] - middle[seeds], axis=2).round(9).argmin(axis=1)
+    rows = np.asarray(bodies)
+    return [(rows[region[joint] == k], int((region == k).sum())) for k in range(len(seeds))]
+
+
+def _hung_on(body: Rigid) -> int:
+    """Row of what hangs on a spider or a mean, the dependent one of an equation."""
+    if isinstance(body, Equation):
+        return body.nodes[0]
+    return body.independent if isinstance(body, RigidBody) else body.reference
+
+
+def _held(body: Rigid) -> tuple[int, ...]:
+    """Rows whose dofs follow others."""
+    return body.dependent if isinstance(body, RigidBody) else ()
+
+
+class _Footprints:
+    """Shells about every grid, and their quarters on the refined mesh."""
+
+    def __init__(self, coarse: Assembly, fine: Assembly) -> None:
+        """Look both meshes over once."""
+        self.points, self.cells, self.pieces = fine.points, coarse.shells.nodes, fine.shells.nodes
+        self.parent = parents(coarse.shells)
+        order = np.argsort(self.cells, axis=None, kind="stable")
+        self._shell = order // 4
+        self._first = np.searchsorted(self.cells.ravel()[order], np.arange(len(coarse.points) + 1))
+        by_parent = np.argsort(self.parent, kind="stable")
+        self._piece = by_parent.reshape(len(self.cells), 4)  # every shell has four
+
+    def of(self, body: Rigid) -> Rigid:
+        """A rigid element on half its footprint."""
+        if isinstance(body, RigidBody) and self._is_area(body.dependent, body.independent):
+            if len(set(body.components)) == 1:
+                rows = self._smaller(body.dependent, body.independent)
+                return replace(body, dependent=rows, components=body.components[:1] * len(rows))
+        if isinstance(body, Average) and not body.moved:
+            rows = tuple(row for row, _, _ in body.terms)
+            if self._is_area(rows, body.reference) and len({c for _, c, _ in body.terms}) == 1:
+                weight = float(np.mean([w for _, _, w in body.terms]))
+                new = self._smaller(rows, self._hung(body))
+                terms = tuple((row, body.terms[0][1], weight) for row in new)
+                return replace(body, terms=terms)
+        return body
+
+    def _hung(self, body: Average) -> np.ndarray:
+        """Place of what hangs on a mean (3,): by its weights, its own where they are alike."""
+        weight = np.array([w for _, _, w in body.terms])
+        if np.ptp(weight) <= 1e-9 * np.abs(weight).max():
+            return np.asarray(self.points[body.reference])
+        at = self.points[[row for row, _, _ in body.terms]]
+        return np.asarray(weight @ at / weight.sum())
+
+    def _is_area(self, rows: Sequence[int], other: int) -> bool:
+        on_shells = [self._first[r + 1] > self._first[r] for r in rows]
+        return len(set(rows)) >= FEWEST and all(on_shells) and other not in rows
+
+    def _shells_of(self, rows: Sequence[int]) -> np.ndarray:
+        """Shells that hold any of the grids."""
+        found = [self._shell[self._first[r] : self._first[r + 1]] for r in rows]
+        return np.unique(np.concatenate(found))
+
+    def _smaller(self, rows: Sequence[int], hung: int | np.ndarray) -> tuple[int, ...]:
+        place = self.points[hung] if isinstance(hung, int | np.integer) else hung
+        near = self._shells_of(rows)
+        whole = near[self._holds(near, rows)]
+        if len(whole):
+            pieces = self._piece[whole[0]]
+            middle = self.points[self.pieces[pieces]].mean(axis=1)
+            away = np.linalg.norm(middle - place, axis=1)
+            chosen = self.pieces[pieces[np.round(away / away.max(), 6).argmin()]]
+            return tuple(dict.fromkeys(chosen.tolist()))
+        if not any(set(self.cells[s].tolist()) <= set(rows) for s in near):
+            return tuple(rows)  # the rim of a hole
+        grids = np.unique(self.pieces[self._piece[near]])
+        at = self.points[list(rows)]
+        aim = (at + at.mean(axis=0)) / 2
+        found = np.unique(grids[cKDTree(self.points[grids]).query(aim)[1]])
+        return tuple(found.tolist()) if len(found) >= FEWEST else tuple(rows)
+
+    def _holds(self, shells: np.ndarray, rows: Sequence[int]) -> np.ndarray:
+        """Which shells have all these grids (k,)."""
+        return np.array([set(rows) <= set(self.cells[s].tolist()) for s in shells], bool)
