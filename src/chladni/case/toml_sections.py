@@ -171,8 +171,11 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
         values = tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and numbers beyond any use
-        raise FileError(f"{path.name} is no TOML: {error}") from error
+    except RecursionError as error:
+        raise FileError(f"{path.name} is no TOML: its brackets are nested too deep") from error
+    except ValueError as error:  # TOMLDecodeError, and numbers beyond any use
+        why = "a number has thousands of digits" if "digits)" in str(error) else str(error)
+        raise FileError(f"{path.name} is no TOML: {why}") from error
     headers, lines = _places(text)
     tables = {}
     for name, value in values.items():

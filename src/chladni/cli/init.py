@@ -34,7 +34,7 @@ def run(
     if taken:
         raise FileError(f"{place / taken[0]} is there already and is not replaced; another --out")
     made = draft(source, recordings or (), units, quantity, sensors, mass, allow or ())
-    with started("init", source, place) as job:
+    with started("init", source, place, listed=False) as job:
         write_text(job.folder / "case.toml", case_text(made, place))
         if made.dofs:
             write_text(job.folder / "sensors.csv", sensors_text(made))

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Protocol
 import typer
 
 from ..case import Case, load_case
+from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..output import run_folder, write_json
 from ..progress import Progress, terminal, within
@@ -48,6 +49,7 @@ class Run:
     command: str
     source: Path
     folder: Path  # scratch; moved to its place if all goes well
+    place: Path
     progress: Progress
     lead: str = ""
     sections: list[Section] = field(default_factory=list)
@@ -96,12 +98,14 @@ class Run:
 
 
 @contextmanager
-def started(command: str, source: Path | str, out: Path | None) -> Iterator[Run]:
+def started(
+    command: str, source: Path | str, out: Path | None, listed: bool = True
+) -> Iterator[Run]:
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
     place = place_of(command, Path(source), out)
-    with run_folder(place) as folder:
+    with run_folder(place, command, files_of(Path(source)), listed) as folder:
         with terminal() as progress:
-            run = Run(command, Path(source), folder, progress)
+            run = Run(command, Path(source), folder, place, progress)
             yield run
         if run.sections:
             run.page()
@@ -151,7 +155,7 @@ def diagnosed(
         case = opened(source)
         found = workflow(case, within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
-        found = write_diagnosis(job.folder, case, found, command_line(), stage)
+        found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place)
         job.say(sentence(found))
     return found.trusted()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FileError
+from ..file_size import refuse_large
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
     if not path.is_file():
         near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
         raise FileError(f"no file {path}; beside it there are {near}")
+    refuse_large(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, skipinitialspace=True)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import FileError
+from ..file_size import refuse_large
 
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _LOOSE = re.compile(rb"(?m)^[ \t]*-1[ \t]*(?=\r?$)")
@@ -29,6 +30,7 @@ def readable(path: Path) -> Iterator[Path]:
     if not path.is_file():
         near = sorted(p.name for p in path.parent.glob("*.u*") if p.is_file())[:6]
         raise FileError(f"no file {path}; beside it there are {near}")
+    refuse_large(path)
     data = path.read_bytes()
     tidy = data if _BINARY.search(data) else _tidied(data)
     marks = len(_MARK.findall(tidy))
