@@ -12,6 +12,7 @@ from ..dofs import positions
 from ..errors import LabelError, ShapeError
 from ..sparse.dissection import analyse, pattern
 from ..sparse.factor import factorise
+from .massless import static_solver
 from .modes import ModalModel
 from .system import System
 
@@ -213,9 +214,9 @@ def residual_flexibility(
     """
     lam = (2 * np.pi * modal.frequency) ** 2
     sigma = -1e-2 * lam[-1] if shift is None else shift
-    factor = factorise(system.K.real - sigma * system.M, points, nodes=system.dofs[:, 0])
-    X = factor.solve(np.asarray(load, dtype=float))
-    Y = factor.solve(system.M @ X)
+    solve = static_solver(system, sigma, points)
+    X = solve(np.asarray(load, dtype=float))
+    Y = solve(system.M @ X)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     static = pick.T @ X - (phi_o / (lam - sigma)) @ phi_i.T
     slope = pick.T @ Y - (phi_o / (lam - sigma) ** 2) @ phi_i.T
