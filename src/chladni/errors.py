@@ -22,6 +22,11 @@ class FileError(ChladniError, ValueError):
     """A deck, recording or case file that cannot be used as it stands."""
 
 
+def not_text(error: UnicodeDecodeError) -> str:
+    """Where a file ceases to be UTF-8 text, in words."""
+    return f"not UTF-8 text: byte {error.start + 1} is {error.object[error.start]:#04x}"
+
+
 class ModelError(ChladniError, ValueError):
     """A model without physical sense: zero thickness, a part that hangs on nothing."""
 

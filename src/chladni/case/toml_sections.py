@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, not_text
 
 _LONGEST = 60  # characters of a value that a sentence repeats
 
@@ -170,7 +170,7 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
         text = path.read_text(encoding="utf-8-sig")
         values = tomllib.loads(text)
     except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
+        raise FileError(f"{path.name} is {not_text(error)}") from error
     except RecursionError as error:
         raise FileError(f"{path.name} is no TOML: its brackets are nested too deep") from error
     except ValueError as error:  # TOMLDecodeError, and numbers beyond any use

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..output import write_json, write_text
+from .console import say
 from .run import Out
 
 
@@ -26,13 +27,13 @@ def run(
 
     def told(row: Row) -> None:
         rows.append(row)
-        typer.echo(line(row))
+        say(line(row))
         write_json(place / "blind.json", rows)
 
     answered_rows(cases, workers, told)
     text = f"{confusion(rows)}\n\n{summary(rows)}"
     write_text(place / "confusion.txt", text + "\n")
-    typer.echo(text)
+    say(text)
 
 
 def _names(text: str) -> list[str]:

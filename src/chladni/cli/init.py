@@ -9,6 +9,7 @@ from ..case import load_case
 from ..errors import ChladniError, FileError
 from ..output import write_text
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
+from .console import say
 from .run import Allow, Out, Units, place_of, started
 
 
@@ -40,7 +41,7 @@ def run(
             write_text(job.folder / "sensors.csv", sensors_text(made))
         for sentence in _sentences(made):
             job.say(sentence)
-    typer.echo(_next(place))
+    say(_next(place))
 
 
 def _sentences(made: CaseDraft) -> list[str]:

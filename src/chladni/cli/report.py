@@ -8,6 +8,7 @@ import typer
 from ..report.blocks import Links, Section
 from ..report.diagnosis_json import read_diagnosis
 from ..report.page import write_page
+from .console import say
 
 
 def run(
@@ -22,4 +23,4 @@ def run(
     figures = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]
     page = write_page(out or folder, result, figures, result.notes, tables, title=title)
-    typer.echo(f"results in {page}")
+    say(f"results in {page}")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, not_text
 from ..file_size import refuse_large
 
 
@@ -71,7 +71,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
             reader = csv.reader(file, skipinitialspace=True)
             rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
+        raise FileError(f"{path.name} is {not_text(error)}") from error
     except csv.Error as error:
         raise FileError(f"{path.name} is no table: {error}") from error
     if not rows:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...ema.time_record import TimeRecord
-from ...errors import FileError
+from ...errors import FileError, not_text
 from ..file_size import refuse_large
 from ..tables.csv_table import read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
@@ -150,7 +150,9 @@ def read_time_csv(path: Path) -> Read:
         head = [cell.strip() for cell in file.readline().strip().split(",")]
     try:
         rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
-    except (ValueError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path.name} is {not_text(error)}") from error
+    except ValueError as error:
         raise FileError(f"{path.name}: a line after the first is not {len(head)} numbers "
                         f"({str(error).split(';')[0]})") from error  # fmt: skip
     if rows.size == 0 or rows.shape[1] != len(head):
