@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .errors import FileError
+from .errors import FileError, named
 
 try:
     import fcntl
@@ -61,7 +61,8 @@ def atomic(path: Path | str, write: Callable[[Path], object]) -> Path:
 
 def write_text(path: Path | str, text: str) -> Path:
     """Write UTF-8 text."""
-    return atomic(path, lambda part: part.write_text(text, encoding="utf-8"))
+    data = text.encode("utf-8", "replace")  # a name of bytes that are no UTF-8 is shown with ?
+    return atomic(path, lambda part: part.write_bytes(data))
 
 
 def write_json(path: Path | str, data: Any) -> Path:
@@ -73,7 +74,7 @@ def write_npz(path: Path | str, **arrays: np.ndarray) -> Path:
     """Write compressed arrays; texts become fixed-width unicode, so no pickle is needed."""
     held = {name: np.asarray(array) for name, array in arrays.items()}
     if objects := [name for name, array in held.items() if array.dtype.hasobject]:
-        raise FileError(f"{path}: {objects} hold Python objects, which would need a pickle")
+        raise FileError(f"{path}: {named(objects)} hold Python objects, which would need a pickle")
     return atomic(path, lambda part: np.savez_compressed(part, **held))  # type: ignore[arg-type]
 
 

@@ -7,6 +7,7 @@ nothing written (2). Everything else is a failure; its input is kept with the li
 import json
 import os
 import resource
+import runpy
 import shlex
 import shutil
 import signal
@@ -75,9 +76,7 @@ def _run(folder: Path, arguments: Iterable[str], patience: float) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (int(2 * MEMORY), int(2 * MEMORY)))
         signal.alarm(int(10 * patience))  # of the clock, for what sleeps
         sys.argv = ["chladni", *arguments, "--out", "out"]
-        from chladni.__main__ import main
-
-        main()
+        runpy.run_module("chladni", run_name="__main__")
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)

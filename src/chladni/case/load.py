@@ -14,7 +14,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, TestSetup
-from ..errors import FileError, LabelError
+from ..errors import FileError, LabelError, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.tables.read_tables import read_recordings
@@ -172,7 +172,9 @@ def _file(section: TomlSection, key: str, name: str) -> Path:
         there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
         near = difflib.get_close_matches(Path(name).name, there, 1, 0.5)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise FileError(f"{section.at(key)}: there is no file {name!r}; {hint}there are {there}")
+        raise FileError(
+            f"{section.at(key)}: there is no file {name!r}; {hint}there are {named(there, 8)}"
+        )
     return path
 
 
@@ -212,7 +214,7 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
             only = sorted(set(ours) ^ set(theirs))
             raise FileError(
                 f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: "
-                f"{only[:6]} in one of them only"
+                f"{named(only)} in one of them only"
             )
     if a.quantity != b.quantity:
         raise FileError(
@@ -317,7 +319,7 @@ def _held(
         for label in labels:
             if label not in outputs:
                 raise LabelError(
-                    f"{section.at('sensors')}: no output {label!r}; there are {list(outputs)[:8]}"
+                    f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
                 )
         if set(labels) >= set(outputs):
             raise FileError(f"{section.at('sensors')} names every output; none is left to fit")

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from click.exceptions import Abort, ClickException, Exit
 
 from ..errors import AccuracyError, ChladniError
 from .console import console, opened_console, say
@@ -96,7 +95,7 @@ def _run(command: Callable[[], Any]) -> int:
     """Exit code of a command; what went wrong is said in a sentence."""
     try:
         return command() or DONE
-    except (Exit, Abort, ClickException):
+    except (typer.Exit, typer.Abort, typer.BadParameter):
         raise
     except AccuracyError as error:
         return _said(error, NOT_TRUSTED)

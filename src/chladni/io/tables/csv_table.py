@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError, not_text
+from ...errors import FileError, named, not_text
 from ..file_size import refuse_large
 
 
@@ -64,7 +64,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
     """
     if not path.is_file():
         near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
-        raise FileError(f"no file {path}; beside it there are {near}")
+        raise FileError(f"no file {path}; beside it there are {named(near)}")
     refuse_large(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:

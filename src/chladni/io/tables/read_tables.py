@@ -12,7 +12,7 @@ import numpy as np
 from ...dynamics.frf import FRF, Quantity
 from ...ema.setup import PoleTable, Recording
 from ...ema.time_record import TimeRecord
-from ...errors import ChladniError, FileError
+from ...errors import ChladniError, FileError, named
 from ..file_size import refuse_large
 from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
 from ..time.time_channels import is_time, only_known
@@ -42,7 +42,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     if path.is_file():
         refuse_large(path)
     if ending in ENDINGS[:4] and not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
     if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
@@ -212,7 +212,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
     if not zipfile.is_zipfile(path):
         raise FileError(f"{path.name} cannot be read as NPZ: it is no archive of arrays")
     try:
@@ -232,7 +232,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     if timed:
         return _timed(path, read_time_npz(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
-        raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {list(arrays)}")
+        raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
     quantity = quantity or (str(arrays["quantity"]) if "quantity" in arrays else None)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
@@ -279,7 +279,8 @@ def _numbers(
 ) -> np.ndarray:
     """An array of numbers of these kinds."""
     if arrays[name].dtype.kind not in kinds:
-        raise FileError(f"{path.name}: {name} holds {arrays[name].dtype}, not numbers")
+        kind = "records" if arrays[name].dtype.names else str(arrays[name].dtype)
+        raise FileError(f"{path.name}: {name} holds {kind}, not numbers")
     return arrays[name]
 
 
