@@ -73,6 +73,13 @@ class TomlSection:
             raise FileError(f"{self.at(key)} = {_short(value)}; {hint}there are {', '.join(among)}")
         return value
 
+    def flag(self, key: str) -> bool:
+        """True or false; false where it is missing."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise FileError(f"{self.at(key)} = {_short(value)} is neither true nor false")
+        return value
+
     def number(
         self, key: str, due: bool = False, low: float = -1e300, high: float = 1e300
     ) -> float | None:

@@ -147,4 +147,4 @@ def _refuse_commands(deck: Deck) -> None:
 
 
 def _allowing(name: str) -> str:
-    return f"; take it out or allow it: --allow {name}"
+    return f'; take it out or allow it: [model] allow = ["{name}"] of a case, --allow {name}'
