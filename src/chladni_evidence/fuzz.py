@@ -4,8 +4,10 @@ Due is a result (exit 0), a result that says it is not to be trusted (3), or one
 nothing written (2). Everything else is a failure; its input is kept with the line that repeats it.
 """
 
+import importlib
 import json
 import os
+import re
 import resource
 import runpy
 import shlex
@@ -25,6 +27,13 @@ from .fuzz_inputs import FuzzInput
 
 PATIENCE = 60.0  # of the processor's time [s]
 MEMORY = 2e9  # resident at most [bytes]
+_MOST = 4_000_000_000  # that a process gets at all
+_STAGE = re.compile(r"\[\d+ s\] ")  # how a run that takes long says what it does
+_HEAVY = (  # what commands import when they need it: once here, not in every process
+    *("chladni.cli.app", "chladni.report.modes_page", "chladni.report.correlation_page"),
+    *("matplotlib.backends.backend_agg", "matplotlib.figure", "jinja2", "pyvista", "pyuff"),
+    *("scipy.io", "scipy.sparse.linalg", "scipy.optimize", "scipy.signal"),
+)
 DUE = ("answered", "not trusted", "refused")
 
 
@@ -72,8 +81,9 @@ def _run(folder: Path, arguments: Iterable[str], patience: float) -> None:
         os.chdir(folder)
         for number, name in ((1, "stdout.txt"), (2, "stderr.txt")):
             os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        sys.stdout, sys.stderr = (os.fdopen(k, "w", encoding="utf-8") for k in (1, 2))
         resource.setrlimit(resource.RLIMIT_CPU, (int(patience), int(patience) + 5))
-        resource.setrlimit(resource.RLIMIT_DATA, (int(2 * MEMORY), int(2 * MEMORY)))
+        resource.setrlimit(resource.RLIMIT_DATA, (_MOST, _MOST))
         signal.alarm(int(10 * patience))  # of the clock, for what sleeps
         sys.argv = ["chladni", *arguments, "--out", "out"]
         runpy.run_module("chladni", run_name="__main__")
@@ -99,7 +109,7 @@ def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
         return "traceback"
     if size > MEMORY:
         return "memory"
-    lines = said.strip().splitlines()
+    lines = [line for line in said.strip().splitlines() if not _STAGE.match(line)]
     if code == 0:
         return "noise" if lines else _whole(out)
     if len(lines) != 1 or not lines[0].startswith("chladni: "):
@@ -126,6 +136,8 @@ def fuzz(
     inputs: Iterable[FuzzInput], out: Path, say: Callable[[str], object]
 ) -> dict[str, Counter[str]]:
     """Try all; counts by kind, failures kept below ``out``."""
+    for name in _HEAVY:
+        importlib.import_module(name)
     counts: dict[str, Counter[str]] = {}
     slowest = largest = 0.0
     for k, one in enumerate(inputs):

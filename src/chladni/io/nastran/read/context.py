@@ -149,7 +149,9 @@ def _points(deck: Deck, scale: Scale, frames: Frames, cp: int, cd: int) -> Conte
     if np.any(bad := ids <= 0):
         raise grid.refuse(int(np.argmax(bad)), "a grid's id is a positive integer")
     if np.any(other := grid.integers(8, 0) != 0) and "SEID" not in deck.allowed:
-        why = "SEID puts it into a superelement, which is not supported; take it out, or --allow SEID"
+        why = (
+            "SEID puts it into a superelement, which is not supported; take it out, or --allow SEID"
+        )
         raise grid.refuse(int(np.argmax(other)), why)
     places = _places(grid, frames, grid.integers(2, cp))
     axes = _axes(grid, frames, grid.integers(6, cd), places)
