@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from errno import ENOSPC
 from importlib.metadata import PackageNotFoundError, version
 from itertools import count
 from pathlib import Path
@@ -108,6 +109,10 @@ def run_folder(
         try:
             yield part
             _move(part, out, before, command, {p.resolve() for p in inputs}, listed)
+        except OSError as error:
+            if error.errno != ENOSPC:
+                raise
+            raise FileError(f"{out}: {error.strerror}; nothing was written") from error
         finally:
             shutil.rmtree(part, ignore_errors=True)
 

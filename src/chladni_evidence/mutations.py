@@ -129,10 +129,10 @@ def _spoilt(a: np.ndarray, rng: random.Random) -> np.ndarray:
 _ARRAY: tuple[Injury, ...] = (
     _spoilt, _spoilt, _spoilt,
     lambda a, rng: None,
-    lambda a, rng: a[..., :0],
+    lambda a, rng: np.atleast_1d(a)[..., :0],
     lambda a, rng: np.concatenate([a.ravel(), a.ravel()[:1]]),
     lambda a, rng: a.ravel()[: a.size // 2],
-    lambda a, rng: np.broadcast_to(a.ravel()[:1], a.shape),
+    lambda a, rng: np.broadcast_to(a.ravel()[0], a.shape),
     lambda a, rng: a.ravel()[::-1].reshape(a.shape),
     lambda a, rng: a.astype(f"U{rng.choice((1, 40))}"),
     lambda a, rng: a.astype(object),

@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import os
 import signal
 import threading
 import traceback
@@ -49,6 +50,7 @@ _EVERY = {  # options that every command takes
 
 def application() -> typer.Typer:
     """The application with every command; a command's docstring is its help."""
+    os.environ.pop("MPLBACKEND", None)  # pictures go to files, whatever window is asked for
     app = typer.Typer(
         name="chladni",
         help="Find, name and repair the physics a finite element model left out.",

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import FileError
 from ..output import write_json, write_text
 from .console import say
 from .run import Out
@@ -23,6 +24,8 @@ def run(
     from chladni_evidence.score import Row, confusion, summary
 
     place, rows = out or Path("runs") / "blind", []
+    if place.exists() and not place.is_dir():
+        raise FileError(f"{place} is a file, --out needs a folder")
     cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:
