@@ -82,6 +82,22 @@ def test_a_run_replaces_what_an_earlier_one_wrote_and_nothing_else(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
+def test_a_command_that_adds_keeps_what_it_wrote(tmp_path):
+    """Two specimens in one folder; the second of the same name replaces the first."""
+    wrote(tmp_path, "plate.bdf", "report.html", adds=True)
+    wrote(tmp_path, "box.bdf", "report.html", adds=True)
+    wrote(tmp_path, "plate.bdf", "report.html", adds=True)
+    assert listed(tmp_path) == {"plate.bdf", "box.bdf", "report.html", "run.json"}
+
+
+@pytest.mark.parametrize(("mark", "by"), [("study_begun.json", "study"), ("blind.json", "blind")])
+def test_a_folder_that_fills_bit_by_bit_is_no_other_commands(tmp_path, mark, by):
+    (tmp_path / mark).write_text("{}")
+    with pytest.raises(FileError, match=f"holds the results of chladni {by}"):
+        wrote(tmp_path, "a.json")
+    wrote(tmp_path, "a.json", command=by)
+
+
 def test_a_folder_holds_the_results_of_one_command(tmp_path):
     wrote(tmp_path / "run", "a.json")
     with pytest.raises(FileError, match="holds the results of chladni modes; give another --out"):

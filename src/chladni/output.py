@@ -22,6 +22,7 @@ except ImportError:  # not on Windows, whose open files are their own lock
     fcntl = None  # type: ignore[assignment]
 
 LIST = "run.json"  # what a command wrote into a folder
+_MARKS = {"study_begun.json": "study", "blind.json": "blind"}  # of what is written bit by bit
 _SCRATCH = ".part-run-"
 
 
@@ -81,7 +82,12 @@ def write_npz(path: Path | str, **arrays: np.ndarray) -> Path:
 
 @contextmanager
 def run_folder(
-    out: Path | str, command: str, inputs: Iterable[Path] = (), listed: bool = True
+    out: Path | str,
+    command: str,
+    inputs: Iterable[Path] = (),
+    *,
+    listed: bool = True,
+    adds: bool = False,
 ) -> Iterator[Path]:
     """A scratch folder in ``out``; its files are moved into ``out`` only if the body succeeds.
 
@@ -93,6 +99,7 @@ def run_folder(
     ----------
     inputs : files the command reads, which are replaced by nothing
     listed : write what was written into ``run.json``, so that a later run may replace it
+    adds : what an earlier run of the command wrote under other names stays
 
     Raises
     ------
@@ -101,14 +108,15 @@ def run_folder(
         a file is in the way, in which case all results are kept in a folder of their own.
     """
     out = Path(out)
-    with _made(out), _locked(out):
+    with _made(out), locked(out):
         before = _earlier(out, command)
         for killed in out.glob(f"{_SCRATCH}*"):  # nobody else is at work here
             shutil.rmtree(killed, ignore_errors=True)
         part = _scratch(out)
         try:
             yield part
-            _move(part, out, before, command, {p.resolve() for p in inputs}, listed)
+            stays = _list(part, command, before if adds else set()) if listed else set()
+            _move(part, out, before - stays, {p.resolve() for p in inputs})
         except OSError as error:
             if error.errno != ENOSPC:
                 raise
@@ -136,8 +144,14 @@ def _made(out: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _locked(out: Path) -> Iterator[None]:
-    """The folder's lock, which the kernel frees when this process ends however it ends."""
+def locked(out: Path) -> Iterator[None]:
+    """The folder's lock, which the kernel frees when this process ends however it ends.
+
+    Raises
+    ------
+    FileError
+        If another process holds it.
+    """
     if fcntl is None:
         yield
         return
@@ -168,6 +182,9 @@ def _scratch(out: Path) -> Path:
 def _earlier(out: Path, command: str) -> set[str]:
     """Names of the files an earlier run of this command wrote into the folder."""
     path = out / LIST
+    for name, by in _MARKS.items():
+        if by != command and (out / name).exists():
+            raise FileError(f"{out} holds the results of chladni {by}; give another --out")
     if not path.exists():
         return set()
     try:
@@ -180,15 +197,17 @@ def _earlier(out: Path, command: str) -> set[str]:
     return {name for name in names if not (Path(name).is_absolute() or ".." in Path(name).parts)}
 
 
-def _move(
-    part: Path, out: Path, before: set[str], command: str, inputs: set[Path], listed: bool
-) -> None:
+def _list(part: Path, command: str, stays: set[str]) -> set[str]:
+    """Write which files are the command's; those of earlier runs that stay."""
+    files = {p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file()}
+    listed = sorted({*files, *stays, LIST})
+    write_json(part / LIST, {"command": command, "version": own_version(), "files": listed})
+    return stays - files
+
+
+def _move(part: Path, out: Path, before: set[str], inputs: set[Path]) -> None:
     """Files of a finished run into their folder: all of them or none."""
     names = sorted(p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file())
-    if listed:
-        said = {"command": command, "version": own_version(), "files": [*names, LIST]}
-        write_json(part / LIST, said)
-        names.append(LIST)
     mine = {name for name in {*before, LIST} if (out / name).is_file()}
     mine = {name for name in mine if (out / name).resolve() not in inputs}
     try:

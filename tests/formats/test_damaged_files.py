@@ -34,6 +34,11 @@ GOOD = {
         ("frequency_hz", np.append(F[:-1], np.inf), "negative or not a number"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
+        (
+            "values",
+            np.where(F[:, None, None] == F[2], np.nan, np.ones((6, 2, 1))),
+            "1:.Z is not a number at 14 Hz",
+        ),
     ],
 )
 def test_npz(tmp_path: Path, name: str, value: np.ndarray, said: str) -> None:

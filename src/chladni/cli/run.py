@@ -102,11 +102,11 @@ class Run:
 
 @contextmanager
 def started(
-    command: str, source: Path | str, out: Path | None, listed: bool = True
+    command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False
 ) -> Iterator[Run]:
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
     place = place_of(command, Path(source), out)
-    with run_folder(place, command, files_of(Path(source)), listed) as folder:
+    with run_folder(place, command, files_of(Path(source)), listed=listed, adds=adds) as folder:
         with watched() as progress:
             run = Run(command, Path(source), folder, place, progress)
             yield run
