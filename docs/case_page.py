@@ -39,6 +39,16 @@ are named in its notes. Numbers are SI whatever the deck is in. `chladni init DE
 a case, `chladni check CASE` says how it is understood. This page is written from
 `chladni/case/schema.py`.
 
+Its files lie in its folder: a path that leads out of it is refused unless `[model] outside = true`
+says that this is meant, so that a case from somebody else opens nothing of yours. `chladni init`
+points to deck and recordings where they are and writes that word if they are elsewhere; copied into
+the folder, they make a case that can be handed on. What a deck includes is the deck's own affair.
+
+Files above 1 GB (an archive: unpacked) are refused before they are read; `CHLADNI_LARGEST_GB=8` in
+the environment lets larger ones in. Results go to a folder of their own (`--out`), which holds
+those of one command: a second run of it replaces what the first wrote, as `run.json` lists it, and
+no other file. What is in the way is left alone and the results are kept beside it.
+
 ```toml
 [model]
 deck = "panel.bdf"

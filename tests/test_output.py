@@ -1,6 +1,9 @@
 """Files appear whole or not at all."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,36 +47,153 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
 
 
 def test_a_failed_run_leaves_nothing(tmp_path):
-    def run():
-        with run_folder(tmp_path / "runs" / "a") as part:
+    def run(out):
+        with run_folder(out, "modes") as part:
             write_text(part / "half.txt", "half")
             raise RuntimeError("no")
 
-    with pytest.raises(RuntimeError):
-        run()
-    assert list((tmp_path / "runs").iterdir()) == []
+    (tmp_path / "there").mkdir()
+    for name in ("new", "there"):
+        with pytest.raises(RuntimeError):
+            run(tmp_path / name)
+    assert [p.name for p in tmp_path.rglob("*")] == ["there"]
 
 
-def test_a_run_replaces_its_files_and_keeps_others(tmp_path):
+def wrote(out, *names, command="modes", **more):
+    with run_folder(out, command, **more) as part:
+        for name in names:
+            write_text(part / name, f"new {name}")
+
+
+def listed(out):
+    return {p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file()}
+
+
+def test_a_run_replaces_what_an_earlier_one_wrote_and_nothing_else(tmp_path):
     out = tmp_path / "run"
     out.mkdir()
-    for name in ("mine.txt", "result.json"):
-        (out / name).write_text("old")
-    with run_folder(out) as part:
-        write_json(part / "result.json", {"n": 1})
-        write_text(part / "sub" / "b.txt", "b")
-        assert (out / "result.json").read_text() == "old"
-    assert json.loads((out / "result.json").read_text()) == {"n": 1}
-    assert (out / "mine.txt").read_text() == "old"
-    assert (out / "sub" / "b.txt").read_text() == "b"
+    (out / "mine.txt").write_text("mine")
+    wrote(out, "a.json", "where.png", "sub/b.txt")
+    assert listed(out) == {"mine.txt", "run.json", "a.json", "where.png", "sub/b.txt"}
+    wrote(out, "a.json")  # the picture of the first run would be shown as one of the second
+    assert listed(out) == {"mine.txt", "run.json", "a.json"}
+    assert not (out / "sub").exists()
+    assert (out / "mine.txt").read_text() == "mine"
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_command_that_adds_keeps_what_it_wrote(tmp_path):
+    """Two specimens in one folder; the second of the same name replaces the first."""
+    wrote(tmp_path, "plate.bdf", "report.html", adds=True)
+    wrote(tmp_path, "box.bdf", "report.html", adds=True)
+    wrote(tmp_path, "plate.bdf", "report.html", adds=True)
+    assert listed(tmp_path) == {"plate.bdf", "box.bdf", "report.html", "run.json"}
+
+
+@pytest.mark.parametrize(("mark", "by"), [("study_begun.json", "study"), ("blind.json", "blind")])
+def test_a_folder_that_fills_bit_by_bit_is_no_other_commands(tmp_path, mark, by):
+    (tmp_path / mark).write_text("{}")
+    with pytest.raises(FileError, match=f"holds the results of chladni {by}"):
+        wrote(tmp_path, "a.json")
+    wrote(tmp_path, "a.json", command=by)
+
+
+def test_a_folder_holds_the_results_of_one_command(tmp_path):
+    wrote(tmp_path / "run", "a.json")
+    with pytest.raises(FileError, match="holds the results of chladni modes; give another --out"):
+        wrote(tmp_path / "run", "a.json", command="frf")
+    assert (tmp_path / "run" / "a.json").read_text() == "new a.json"
+
+
+@pytest.mark.parametrize("blocked", ["c.txt", "c.txt/inside", "c.txt as a link"])
+def test_what_is_in_the_way_stays_and_nothing_is_lost(tmp_path, blocked):
+    """A foreign file, a folder or a link of a result's name: no file of the run is put in place."""
+    out = tmp_path / "run"
+    wrote(out, "a.json", "b.json")
+    if "link" in blocked:
+        (out / "c.txt").symlink_to("nowhere")
+    else:
+        write_text(out / blocked, "mine")
+    before = {name: (out / name).read_text() for name in listed(out)}
+    with pytest.raises(FileError, match=r"c\.txt is there already.*results are in .*results-1"):
+        wrote(out, "a.json", "c.txt", "d.txt")
+    kept = out / "results-1"
+    assert {"a.json", "c.txt", "d.txt"} <= {p.name for p in kept.iterdir()}
+    assert {n: (out / n).read_text() for n in listed(out) if "results-1" not in n} == before
+
+
+def test_a_file_the_run_reads_is_never_replaced(tmp_path):
+    """Not even where an earlier run of the command wrote it."""
+    wrote(tmp_path, "updated.bdf")
+    with pytest.raises(FileError, match=r"updated\.bdf is a file this run reads"):
+        wrote(tmp_path, "updated.bdf", "b.json", inputs=[tmp_path / "updated.bdf"])
+    assert (tmp_path / "results-1" / "b.json").exists()
+
+
+def test_a_move_that_fails_half_way_is_taken_back(tmp_path, monkeypatch):
+    wrote(tmp_path, "a.json", "b.json")
+    (tmp_path / "a.json").write_text("of the first run")
+    move = Path.rename
+
+    def fails(self, target):
+        if self.name == "b.json" and target.parent == tmp_path and ".old" not in self.parts:
+            raise OSError(28, "No space left on device")
+        return move(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", fails)
+        with pytest.raises(FileError, match="No space left on device; nothing was replaced"):
+            wrote(tmp_path, "a.json", "b.json")
+    assert (tmp_path / "a.json").read_text() == "of the first run"
+    assert (tmp_path / "b.json").exists()
+
+
+def test_a_second_process_is_refused(tmp_path):
+    """The lock is the kernel's: it goes with the process, however that ends."""
+    code = "import sys, time; from chladni.output import run_folder\n"
+    code += "with run_folder(sys.argv[1], 'modes') as part:\n print(part, flush=True)\n"
+    code += " time.sleep(60)"
+    other = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    )
+    assert other.stdout is not None
+    left = Path(other.stdout.readline().strip())
+    try:
+        with pytest.raises(FileError, match="in use by another process"):
+            wrote(tmp_path, "a.json")
+    finally:
+        other.kill()
+        other.communicate()
+    assert left.is_dir()  # the killed one could not clear up
+    wrote(tmp_path, "a.json")
+    assert listed(tmp_path) == {"a.json", "run.json"}
+    assert not left.exists()
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"command": 1}', '{"command": "modes", "files": 3}'])
+def test_a_damaged_list_is_said(tmp_path, text):
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(FileError, match=r"run\.json is no list of results"):
+        wrote(tmp_path, "a.json")
+
+
+def test_a_list_does_not_lead_out_of_its_folder(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    out = tmp_path / "run"
+    names = ["../mine.txt", str(tmp_path / "mine.txt"), ""]
+    write_json(out / "run.json", {"command": "modes", "files": names})
+    wrote(out, "a.json")
+    assert (tmp_path / "mine.txt").read_text() == "mine"
 
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "f").write_text("")
-    with pytest.raises(FileError, match="is a file"), run_folder(tmp_path / "f"):
+    with pytest.raises(FileError, match="is a file"), run_folder(tmp_path / "f", "modes"):
         pass
-    with pytest.raises(FileError, match="no folder can be made"), run_folder(tmp_path / "f" / "g"):
+    with (
+        pytest.raises(FileError, match="no folder can be made"),
+        run_folder(tmp_path / "f" / "g", "modes"),
+    ):
         pass
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .errors import LabelError
+from .errors import LabelError, named
 
 COMPONENTS = ("X", "Y", "Z", "RX", "RY", "RZ")
 _LABEL = re.compile(r"^\s*(\d+)\s*:\s*([+-]?)\s*(R?[XYZ])\s*$", re.IGNORECASE)
@@ -50,7 +50,7 @@ def positions(wanted: Sequence[str], available: Sequence[str]) -> np.ndarray:
     """
     where = {text: k for k, text in enumerate(available)}
     if missing := [text for text in wanted if text not in where]:
-        raise LabelError(f"no degree of freedom {missing}; there are {list(available)[:6]} ...")
+        raise LabelError(f"no degree of freedom {named(missing)}; there are {named(available)}")
     return np.array([where[text] for text in wanted], dtype=int)
 
 

@@ -5,6 +5,8 @@ alternatives. The command line prints it and exits with 2 (:class:`ChladniError`
 (:class:`AccuracyError`: ran, but the result is not to be trusted).
 """
 
+from collections.abc import Iterable
+
 
 class ChladniError(Exception):
     """Root of every exception raised on purpose by this package."""
@@ -20,6 +22,22 @@ class LabelError(ChladniError, LookupError):
 
 class FileError(ChladniError, ValueError):
     """A deck, recording or case file that cannot be used as it stands."""
+
+
+def named(items: Iterable[object], most: int = 6) -> str:
+    """The first of some things for a sentence, and how many more there are.
+
+    >>> named(["a", 2, 0.25]), named(range(9), 3), named([])
+    ('a, 2, 0.25', '0, 1, 2 and 6 more', 'none')
+    """
+    every = [f"{x:.6g}" if isinstance(x, float) else str(x) for x in items]
+    more = f" and {len(every) - most} more" if len(every) > most else ""
+    return (", ".join(every[:most]) or "none") + more
+
+
+def not_text(error: UnicodeDecodeError) -> str:
+    """Where a file ceases to be UTF-8 text, in words."""
+    return f"not UTF-8 text: byte {error.start + 1} is {error.object[error.start]:#04x}"
 
 
 class ModelError(ChladniError, ValueError):

@@ -8,6 +8,8 @@ from chladni.errors import ChladniError, LabelError
 
 from .evidence_run import run
 from .evidence_sets import SETS, orders, purpose, seed_range
+from .fuzz import DUE, fuzz
+from .fuzz_inputs import KINDS, fuzz_inputs
 from .screening_faults import FAULTS, tally
 
 
@@ -16,6 +18,8 @@ def main(words: list[str] | None = None) -> int:
     asked = _parser().parse_args(words)
     if asked.command == "screen":
         return _screened(asked)
+    if asked.command == "fuzz":
+        return _fuzzed(asked)
     try:
         seeds = seed_range(asked.seeds)
         _say(purpose(seeds))
@@ -47,12 +51,28 @@ def _screened(asked: argparse.Namespace) -> int:
     return 0
 
 
+def _fuzzed(asked: argparse.Namespace) -> int:
+    """Injured inputs; 1 where any did not end as it is due."""
+    kinds = asked.kinds.split(",") if asked.kinds else KINDS
+    if unknown := [k for k in kinds if k not in KINDS]:
+        sys.stderr.write(f"chladni_evidence: no kind {unknown[0]}; there are {', '.join(KINDS)}\n")
+        return 2
+    found = fuzz(fuzz_inputs(asked.inputs, asked.seed, kinds, asked.decks), asked.out, _say)
+    return int(any(name not in DUE for count in found.values() for name in count))
+
+
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
     commands = top.add_subparsers(required=True, dest="command")
     screen = commands.add_parser("screen", help="how often faults are named, sound recordings not")
     screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
     screen.add_argument("--faults", default="", help="only these, with commas")
+    fuzzed = commands.add_parser("fuzz", help="injured inputs: a sentence or a result, always")
+    fuzzed.add_argument("--inputs", type=int, default=10_000)
+    fuzzed.add_argument("--seed", type=int, default=1)
+    fuzzed.add_argument("--kinds", default="", help="only these, with commas")
+    fuzzed.add_argument("--decks", type=Path, help="a folder of more decks to injure")
+    fuzzed.add_argument("--out", type=Path, required=True)
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

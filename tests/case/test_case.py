@@ -220,7 +220,7 @@ def test_a_place_in_millimetres_is_noticed(folder: Path) -> None:
 def test_recordings_that_disagree_on_labels(folder: Path) -> None:
     write_csv(folder / "b.csv", a_frf(("12:+Z", "15:+Z")))
     change(folder, '"a.npz"]', '"a.npz", "b.csv"]\nquantity = "accelerance"')
-    with pytest.raises(ChladniError, match=r"a.npz and b.csv disagree on outputs: .*'15:.Z'"):
+    with pytest.raises(ChladniError, match=r"a.npz and b.csv disagree on outputs: .*15:.Z"):
         load_case(folder)
 
 

@@ -31,6 +31,8 @@ CASE = """\
 deck = "plate.bdf"
 units = "mm-t-s"
 damping = 0.01
+allow = ["CWELD"]
+outside = false
 [test]
 recordings = ["a.npz", "b.npz"]
 use = "a.npz"
@@ -74,6 +76,8 @@ OTHER = {  # another accepted value of every word
     ("model", "deck"): '"thicker.bdf"',
     ("model", "units"): '"mm-kg-ms"',
     ("model", "damping"): "0.02",
+    ("model", "allow"): '["CGAP"]',
+    ("model", "outside"): "true",
     ("test", "recordings"): '["b.npz"]',
     ("test", "use"): '"b.npz"',
     ("test", "quantity"): '"mobility"',
@@ -115,6 +119,20 @@ CELLS = {  # column: (a row as it stands, the same row with another accepted cel
     "position_sd": ("0.004,0.001", "0.004,0.002"),
     "gain": ("0.003,,1.1", "0.003,,1.2"),
     "use": (",,,,yes", ",,,,no"),
+}
+
+
+DRIVE = "8:+Z,8,,,,+Z,,,,input,,,,"
+DRIVEN = {  # column: the row of the shaker with another cell
+    "label": "9:+Z,8,,,,+Z,,,,input,,,,",
+    "grid": "8:+Z,9,,,,+Z,,,,input,,,,",
+    "place": "8:+Z,,0.31,0.07,0.0,+Z,,,,input,,,,",
+    "direction": "8:+Z,8,,,,-Z,,,,input,,,,",
+    "vector": "8:+Z,8,,,,,0,0.1,1,input,,,,",
+    "mass": "8:+Z,8,,,,+Z,,,,input,0.02,,,",
+    "position_sd": "8:+Z,8,,,,+Z,,,,input,,0.002,,",
+    "gain": "8:+Z,8,,,,+Z,,,,input,,,1.1,",
+    "use": "8:+Z,8,,,,+Z,,,,input,,,,no",
 }
 
 
@@ -220,6 +238,12 @@ def test_no_column_is_dropped(folder: Path, as_it_stands: str, column: str) -> N
     old, new = CELLS[column]
     assert old in SENSORS
     assert asked(folder, CASE, SENSORS.replace(old, new)) != as_it_stands
+
+
+@pytest.mark.parametrize("column", DRIVEN)
+def test_no_cell_of_the_drive_is_dropped(folder: Path, as_it_stands: str, column: str) -> None:
+    assert DRIVE in SENSORS
+    assert asked(folder, CASE, SENSORS.replace(DRIVE, DRIVEN[column])) != as_it_stands
 
 
 def test_sections_know_their_words() -> None:

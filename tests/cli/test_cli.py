@@ -80,7 +80,9 @@ def test_modes(tmp_path):
     (share,) = (part["strain_energy"] for part in result["parts"].values())
     np.testing.assert_allclose(share[6:], 1, rtol=1e-6)
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == {"modes.json", "modes.unv", "modes.vtu", "modes.png", "report.html"}
+    due = {"modes.json", "modes.unv", "modes.vtu", "modes.png", "report.html", "run.json"}
+    assert names == due
+    assert "\n   7  " in done.output  # the table of modes, on the terminal too
 
 
 def test_frf_peaks_at_its_modes(deck, tmp_path):
@@ -88,8 +90,8 @@ def test_frf_peaks_at_its_modes(deck, tmp_path):
     ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
     done = call("frf", deck, *ends, "--band", "20:60", "--units", "SI", "--out", out)
     assert done.exit_code == 0, done.output
-    call("modes", deck, "--count", 7, "--units", "SI", "--out", out)
-    first = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    call("modes", deck, "--count", 7, "--units", "SI", "--out", tmp_path / "modes")
+    first = json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"][6]
     with np.load(out / "frf.npz", allow_pickle=False) as held:
         assert held["outputs"].tolist() == ["1:+Z", "49:n"]
         assert str(held["quantity"]) == "accelerance"
@@ -157,7 +159,7 @@ def test_render(deck, tmp_path):
     done = call("render", deck, *options, "--units", "SI", "--out", out)
     assert done.exit_code == 0, done.output
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
-    assert {p.name for p in out.iterdir()} == due | {"report.html"}
+    assert {p.name for p in out.iterdir()} == due | {"report.html", "run.json"}
     assert "6 rigid motions are not counted" in (out / "report.html").read_text()
 
 
@@ -249,9 +251,9 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     out = tmp_path / "out"
     done = call("identify", case, "--out", out)
     assert done.exit_code == 0, done.output
-    assert call("modes", case, "--count", 12, "--out", out).exit_code == 0
+    assert call("modes", case, "--count", 12, "--out", tmp_path / "modes").exit_code == 0
     (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
-    f = np.array(json.loads((out / "modes.json").read_text())["frequency_hz"])
+    f = np.array(json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"])
     f = f[(f > 25) & (f < 180)]
     found = np.array(entry["frequency_hz"])[entry["firm"]]
     near = np.abs(found[:, None] / f - 1).min(axis=1)
@@ -293,6 +295,11 @@ def calibrated(case, out, factor=1.21):
     return json.loads((out / "diagnosis.json").read_text())
 
 
+def first_elastic(deck, folder):
+    assert call("modes", deck, "--units", "SI", "--count", 8, "--out", folder / "m").exit_code == 0
+    return json.loads((folder / "m" / "modes.json").read_text())["frequency_hz"][6]
+
+
 def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
     """Stiffness over mass of the plies moves by what was concealed; the deck is read again."""
     out = tmp_path / "answer"
@@ -300,10 +307,9 @@ def test_calibrated_laminate_is_written_into_its_layers(case, tmp_path):
     assert d["files"]["deck"] == "updated.bdf"
     assert any("of 5 starts, 4 of them random, ended within 1" in note for note in d["notes"])
     assert "missing physics was not looked for" in (out / "report.html").read_text()
-    assert call("modes", out / "updated.bdf", "--units", "SI", "--count", 8, "--out", out).output
-    f = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
-    assert call("modes", case / "plate.bdf", "--units", "SI", "--count", 8, "--out", out).output
-    before = json.loads((out / "modes.json").read_text())["frequency_hz"][6]
+    f, before = (
+        first_elastic(deck, tmp_path) for deck in (out / "updated.bdf", case / "plate.bdf")
+    )
     assert f / before == pytest.approx(1.1, rel=0.01)
 
 
@@ -328,9 +334,10 @@ def test_specimen_comes_back_as_a_deck(tmp_path):
     out = tmp_path / "out"
     sides = ["--set", "length=0.4", "--set", "width=0.2", "--set", "t=0.002"]
     assert call("specimen", "plate", "--size", 50, *sides, "--out", out).exit_code == 0
-    done = call("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", out)
+    modes = tmp_path / "modes"
+    done = call("modes", out / "plate.bdf", "--count", 7, "--units", "mm-t-s", "--out", modes)
     assert done.exit_code == 0, done.output
-    mass = json.loads((out / "modes.json").read_text())["mass_kg"]
+    mass = json.loads((modes / "modes.json").read_text())["mass_kg"]
     assert mass == pytest.approx(7850 * 0.002 * 0.08, rel=1e-5)
 
 

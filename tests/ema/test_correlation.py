@@ -106,7 +106,7 @@ def test_what_cannot_be_compared_is_refused() -> None:
     H = frf(shapes(5, 30, 3)[:, :, None])
     dead = H.values.copy()
     dead[:, 1] = 0
-    with pytest.raises(LabelError, match=r"leave out \['1:.Z'\]"):
+    with pytest.raises(LabelError, match=r"leave out 1:.Z"):
         deviation(H, frf(dead))
     with pytest.raises(ShapeError, match=r"FRF.sel and FRF.to"):
         deviation(H, H.to("mobility"))

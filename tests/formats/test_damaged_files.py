@@ -34,6 +34,11 @@ GOOD = {
         ("frequency_hz", np.append(F[:-1], np.inf), "negative or not a number"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
+        (
+            "values",
+            np.where(F[:, None, None] == F[2], np.nan, np.ones((6, 2, 1))),
+            "1:.Z is not a number at 14 Hz",
+        ),
     ],
 )
 def test_npz(tmp_path: Path, name: str, value: np.ndarray, said: str) -> None:
@@ -109,6 +114,82 @@ def test_universal_files(tmp_path: Path, old: str, new: str, said: str) -> None:
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(ChladniError, match=rf"a\.uff, dataset \d+ \(type 58\).*{said}"):
         read_uff(path, "mobility")
+
+
+def written(path: Path, coherence: np.ndarray | None = None, lines: int = 61) -> list[str]:
+    """The lines of a universal file of three channels."""
+    f = np.linspace(10.0, 70.0, lines)
+    values = np.linspace(1, 2, 3 * lines).reshape(lines, 3, 1) * (1 + 0.5j)
+    labels = ("1:+Z", "2:+Z", "3:+Z")
+    write_uff(path, FRF(values, f, labels, ("1:+Z",), "accelerance", coherence=coherence))
+    return path.read_text().split("\n")
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [("EU", "unit 'EU' is not known"), ("m/s^2/Nm", "unit 'm/s.2/Nm' is not known"),
+     ("furlong/s", "is not known"), ("mV", "no calibration")],
+)  # fmt: skip
+@pytest.mark.parametrize("axis", ["m/s^2               ", "N                   "])
+def test_units_nobody_knows_are_refused(tmp_path: Path, unit: str, said: str, axis: str) -> None:
+    """Not read as if they were m/s² or N, unless the user says what they are; then it is noted."""
+    path = tmp_path / "a.uff"
+    text = "\n".join(written(path))
+    assert axis in text
+    path.write_text(text.replace(axis, unit.ljust(20)))
+    with pytest.raises(ChladniError, match=rf"a\.uff, dataset \d+.*{said}"):
+        read_uff(path)
+    if "known" in said:
+        found = read_uff(path, "accelerance")
+        assert any("is not known: read as accelerance" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("unit", "newton"), [("daN", 10.0), ("kip", 4448.2216), ("kN", 1e3)])
+def test_units_of_force_count(tmp_path: Path, unit: str, newton: float) -> None:
+    path = tmp_path / "a.uff"
+    text = "\n".join(written(path))
+    SI = read_uff(path).frf
+    path.write_text(text.replace("N                   ", unit.ljust(20)))
+    found = read_uff(path).frf
+    assert SI is not None
+    assert found is not None
+    np.testing.assert_allclose(found.values * newton, SI.values, rtol=1e-6)
+
+
+def test_a_doubled_or_lost_line_is_refused(tmp_path: Path) -> None:
+    """Its values would move all later ones along the frequency axis."""
+    path = tmp_path / "a.uff"
+    lines = written(path)
+    start = [k for k, line in enumerate(lines) if line.strip() == "58"][1]
+    for new, said in (
+        ([*lines[: start + 20], lines[start + 19], *lines[start + 20 :]], "a line is doubled"),
+        ([*lines[: start + 20], *lines[start + 21 :]], "values are there"),
+        ([*lines[:start], *lines[start + 1 :]], "not with its type"),
+    ):
+        path.write_text("\n".join(new))
+        with pytest.raises(ChladniError, match=rf"a\.uff.*{said}"):
+            read_uff(path)
+
+
+def test_coherence_in_percent_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    for factor, good in ((1.0, True), (1.005, True), (100.0, False), (-1.0, False)):
+        np.savez(path, **{**GOOD, "coherence": factor * np.full((6, 2, 1), 0.999)})
+        if good:
+            frf = read_npz(path).frf
+            assert frf is not None
+            assert frf.coherence is not None
+            assert frf.coherence.max() <= 1
+        else:
+            with pytest.raises(ChladniError, match=r"a\.npz: a coherence lies between 0 and 1.*"):
+                read_npz(path)
+
+
+def test_text_that_is_none_says_where(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"frequency_hz,output,input,real,imag\n1,1:+Z,\xe9,1,1\n")
+    with pytest.raises(ChladniError, match=r"a\.csv is not UTF-8 text: byte 44 is 0xe9"):
+        read_csv(path, "mobility")
 
 
 def test_a_number_no_structure_has(tmp_path: Path) -> None:

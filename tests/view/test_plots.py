@@ -123,3 +123,18 @@ def test_no_global_state():
     code = "import sys, chladni.view.plots as p; print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_a_name_is_no_formula(tmp_path):
+    """Dollars in a label of a recording are dollars; powers of ten at an axis stay powers."""
+    from matplotlib.figure import Figure
+
+    from chladni.view.paper import save
+
+    figure = Figure()
+    ax = figure.add_subplot()
+    ax.loglog([1, 10], [1, 100], label="$_$")
+    ax.set_xlabel("$\\frac{$")
+    ax.legend()
+    assert save(figure, tmp_path / "a.png").stat().st_size > 1000
+    assert "mathdefault" in ax.get_xticklabels()[0].get_text()

@@ -162,3 +162,15 @@ def test_sensors_declared_as_they_are_pass(along_x, tmp_path):
     (place / "sensors.csv").write_text((along_x / "sensors.csv").read_text().replace("+X", "+Z"))
     assert not chladni.check(chladni.load_case(place)).faults
     assert len(chladni.correlate(chladni.load_case(place)).pairs) > 3
+
+
+def test_a_dead_channel_is_named(copied):
+    """It is left out, so nothing downstream stumbles over it; that is said, and where to look."""
+    held = dict(np.load(copied / "frf.npz", allow_pickle=False))
+    held["values"][:, 2] = 0.0
+    np.savez(copied / "frf.npz", **held)
+    dead = str(held["outputs"][2])
+    found = chladni.check(chladni.load_case(copied))
+    (said,) = (f for f in found.findings if dead in f.text)
+    assert "zero throughout and left out" in said.text
+    assert dead not in [d.label for d in found.dofs if d.role == "output"]

@@ -5,6 +5,7 @@ shell, bands are held against the data. What does not fit is refused in one sent
 """
 
 import difflib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,9 +15,10 @@ import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, TestSetup
-from ..errors import FileError, LabelError
+from ..errors import FileError, LabelError, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
+from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
@@ -127,12 +129,20 @@ def load_case(path: str | Path) -> Case:
         keys.section("test", known("test")),
     )
     units = UNITS[model.text("units", due=True, among=key("model", "units").choices) or "SI"]
-    deck = read_deck(_file(model, "deck", str(model.text("deck", due=True))))
+    outside = model.flag("outside")
+    allow = model.list("allow", str) or []
+    deck = read_deck(_file(model, "deck", str(model.text("deck", due=True)), outside), allow)
     made = assembly(deck, units)
-    setup = _setup(test, made)
+    setup = _setup(test, made, outside)
     sensors = (*setup.outputs, *setup.inputs)
-    recordings = _recordings(test, keys.sections("recording", known("recording")), sensors)
+    more = keys.sections("recording", known("recording"))
+    recordings = _recordings(test, more, sensors, outside)
     notes = notes_of(recordings, "use" in test)
+    notes += left_out(deck, STRUCTURAL)
+    if allow:
+        notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
+    if outside:
+        notes.append("[model] outside: files of the case may lie outside of its folder")
     band, exclude = _bands(keys, recordings, notes)
     held_sensors, held_band = _held(keys, recordings, notes)
     outputs, inputs = (
@@ -165,19 +175,29 @@ def load_case(path: str | Path) -> Case:
     )
 
 
-def _file(section: TomlSection, key: str, name: str) -> Path:
-    """A file the case names, beside it."""
+def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
+    """A file the case names, in its folder unless others are allowed."""
+    if "\0" in name:
+        raise FileError(f"{section.at(key)} = {name[:60]!r} is no name of a file")
     path = section.file.parent / name
+    way = Path(os.path.normpath(name))
+    if not outside and (way.is_absolute() or ".." in way.parts):
+        raise FileError(
+            f"{section.at(key)} = {name!r} leads out of the folder of the case; copy the file "
+            "into it, or write outside = true under [model]"
+        )
     if not path.is_file():
         there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
         near = difflib.get_close_matches(Path(name).name, there, 1, 0.5)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise FileError(f"{section.at(key)}: there is no file {name!r}; {hint}there are {there}")
+        raise FileError(
+            f"{section.at(key)}: there is no file {name!r}; {hint}there are {named(there, 8)}"
+        )
     return path
 
 
 def _recordings(
-    test: TomlSection, more: Sequence[TomlSection], sensors: Sequence[Sensor]
+    test: TomlSection, more: Sequence[TomlSection], sensors: Sequence[Sensor], outside: bool
 ) -> tuple[Recording, ...]:
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
@@ -193,7 +213,7 @@ def _recordings(
             listed.append((section, "file", name))
     read: list[Recording] = []
     for section, word, name in listed:
-        found = read_recordings(_file(section, word, name), quantity)
+        found = read_recordings(_file(section, word, name, outside), quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
             alive = without_dead_channels(r)
             read.append(mended(alive, 1.0 if factor is None else factor, delay or 0.0, sensors))
@@ -212,7 +232,7 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
             only = sorted(set(ours) ^ set(theirs))
             raise FileError(
                 f"{test.at('recordings')}: {first.name} and {other.name} disagree on {word}: "
-                f"{only[:6]} in one of them only"
+                f"{named(only)} in one of them only"
             )
     if a.quantity != b.quantity:
         raise FileError(
@@ -221,10 +241,10 @@ def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:
     return replace(other, frf=b.sel(a.outputs, a.inputs))
 
 
-def _setup(test: TomlSection, made: Assembly) -> TestSetup:
+def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
     """Sensors, hangers and weighing as the user gives them."""
     name = test.text("sensors")
-    sensors = read_sensors(_file(test, "sensors", name)) if name else ()
+    sensors = read_sensors(_file(test, "sensors", name, outside)) if name else ()
     mass = test.number("mass", low=1e-9)
     mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0))
     if mass is None and mass_sd is not None:
@@ -317,7 +337,7 @@ def _held(
         for label in labels:
             if label not in outputs:
                 raise LabelError(
-                    f"{section.at('sensors')}: no output {label!r}; there are {list(outputs)[:8]}"
+                    f"{section.at('sensors')}: no output {label!r}; there are {named(outputs, 8)}"
                 )
         if set(labels) >= set(outputs):
             raise FileError(f"{section.at('sensors')} names every output; none is left to fit")

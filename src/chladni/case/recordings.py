@@ -12,6 +12,8 @@ from ..errors import FileError
 from .recording_groups import relation, states
 from .toml_sections import TomlSection
 
+DEAD = "is zero throughout and left out"  # so ends what is said of a dead channel
+
 
 def compared_first(test: TomlSection, read: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings with the one that is compared in front.
@@ -44,7 +46,7 @@ def without_dead_channels(r: Recording) -> Recording:
     if all(lives for _, lives in pairs):
         return r
     dead = ", ".join(o for o, lives in pairs if not lives)
-    note = f"{r.name}: {dead} is zero throughout and left out"
+    note = f"{r.name}: {dead} {DEAD}"
     return replace(r, frf=r.frf.sel(outputs=[o for o, lives in pairs if lives]),
                    notes=(*r.notes, note))  # fmt: skip
 

@@ -62,6 +62,12 @@ SCHEMA = (
         tuple(UNITS)),
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
         "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
+    Key("model", "allow", "list of cards", "", "none",
+        "Cards and case control commands that are passed over although they are not understood.",
+        '["CWELD"]', COMMANDS),
+    Key("model", "outside", "true or false", "", "false",
+        "Whether files of the case may lie outside of its folder (`../`, or a whole path); of a "
+        "case from somebody else it stays false.", "true", COMMANDS),
     Key("test", "recordings", "list of files", "", "none",
         "Universal files, .npz, .csv, .mat or .wav: FRFs, poles or time data, whose FRFs are "
         "estimated as `chladni test` does. One file may hold several articles or levels. The "

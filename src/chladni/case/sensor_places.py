@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..ema.setup import Recording, Role, Sensor, TestSetup
-from ..errors import LabelError
+from ..errors import LabelError, named
 from ..fem.locate import shares_of
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.grid_normals import grid_normals
@@ -113,11 +113,11 @@ def _nodes_said(
     out = []
     if free := [n for n in ids if n not in row and n in nodes]:
         out.append(
-            f"nodes {free[:6]} of the recording are no grids of the deck: they sit where the "
+            f"nodes {named(free)} of the recording are no grids of the deck: they sit where the "
             "recording has them, read in the deck's basic frame"
         )
     if turned := [n for n in ids if n in axes]:
-        out.append(f"directions at nodes {turned[:6]} are along the recording's own axes there")
+        out.append(f"directions at nodes {named(turned)} are along the recording's own axes there")
     size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
     both = [n for n in ids if n in row and n in nodes]
     away = {n: float(np.linalg.norm(made.points[row[n]] - nodes[n])) for n in both}
@@ -198,8 +198,8 @@ def _free(made: Assembly, sensor: Sensor, where: str) -> tuple[int, np.ndarray, 
         away, normal, grid = float(found.distance[0]), found.normal[0], 0
     if away > _FAR * size:
         raise LabelError(
-            f"{where}: its place {place.tolist()} m is {away:.3g} m away from the structure, which "
-            f"is {size:.3g} m across; places are in metres, basic frame"
+            f"{where}: its place ({named(place.tolist())}) m is {away:.3g} m away from the "
+            f"structure, which is {size:.3g} m across; places are in metres, basic frame"
         )
     way = sensor.direction if sensor.direction is not None else normal
     if way is None:
@@ -217,11 +217,12 @@ def _normal(made: Assembly, row: int, where: str) -> np.ndarray:
 
 def grid_row(made: Assembly, grid: int, where: str) -> int:
     """Row of a grid; the sentence names the nearest ids."""
+    grid = min(grid, 2**62)  # what a deck may number, and far beyond
     row = int(np.searchsorted(made.ids, grid))
     if row < len(made.ids) and made.ids[row] == grid:
         return row
     near = made.ids[np.argsort(np.abs(made.ids - grid), kind="stable")[:3]].tolist()
     raise LabelError(
-        f"{where}: the deck has no grid {grid}, the nearest ids are {near}; "
+        f"{where}: the deck has no grid {grid}, the nearest ids are {named(near)}; "
         "a place that is no grid goes into sensors.csv"
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, not_text
 
 _LONGEST = 60  # characters of a value that a sentence repeats
 
@@ -71,6 +71,13 @@ class TomlSection:
             near = difflib.get_close_matches(value, among, 1, 0.5)
             hint = f"did you mean {near[0]!r}? " if near else ""
             raise FileError(f"{self.at(key)} = {_short(value)}; {hint}there are {', '.join(among)}")
+        return value
+
+    def flag(self, key: str) -> bool:
+        """True or false; false where it is missing."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise FileError(f"{self.at(key)} = {_short(value)} is neither true nor false")
         return value
 
     def number(
@@ -170,9 +177,12 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
         text = path.read_text(encoding="utf-8-sig")
         values = tomllib.loads(text)
     except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and numbers beyond any use
-        raise FileError(f"{path.name} is no TOML: {error}") from error
+        raise FileError(f"{path.name} is {not_text(error)}") from error
+    except RecursionError as error:
+        raise FileError(f"{path.name} is no TOML: its brackets are nested too deep") from error
+    except ValueError as error:  # TOMLDecodeError, and numbers beyond any use
+        why = "a number has thousands of digits" if "digits)" in str(error) else str(error)
+        raise FileError(f"{path.name} is no TOML: {why}") from error
     headers, lines = _places(text)
     tables = {}
     for name, value in values.items():

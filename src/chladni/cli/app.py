@@ -1,13 +1,21 @@
 """All commands, and what becomes of an error: one sentence and an exit code, never a traceback."""
 
 import functools
-from collections.abc import Callable
+import inspect
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..errors import AccuracyError, ChladniError
+from .console import console, opened_console, say
 
 COMMANDS = (  # each a module here with a function ``run``
     "diagnose",
@@ -27,11 +35,22 @@ COMMANDS = (  # each a module here with a function ``run``
     "blind",
     "report",
 )
-DONE, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 2, 3, 130
+DONE, FAILED, AT_FAULT, NOT_TRUSTED, INTERRUPTED = 0, 1, 2, 3, 130
+_EVERY = {  # options that every command takes
+    "verbose": (
+        bool, typer.Option("--verbose", help="Say every stage on standard error."), False
+    ),
+    "log": (
+        Path | None,
+        typer.Option("--log", help="Append all that is said and done to a file.", metavar="FILE"),
+        None,
+    ),
+}  # fmt: skip
 
 
 def application() -> typer.Typer:
     """The application with every command; a command's docstring is its help."""
+    os.environ.pop("MPLBACKEND", None)  # pictures go to files, whatever window is asked for
     app = typer.Typer(
         name="chladni",
         help="Find, name and repair the physics a finite element model left out.",
@@ -50,26 +69,77 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
     """A command whose errors end in one sentence on standard error and an exit code."""
 
     @functools.wraps(command)
-    def inner(*args: object, **options: object) -> None:
+    def inner(
+        *args: object, verbose: bool = False, log: Path | None = None, **options: object
+    ) -> None:
+        code = DONE
         try:
-            code = command(*args, **options)
-        except AccuracyError as error:
-            code = _said(error, NOT_TRUSTED)
-        except ChladniError as error:
+            with opened_console(verbose, log), _ending():
+                code = _run(lambda: command(*args, **options))
+        except ChladniError as error:  # the log itself
             code = _said(error, AT_FAULT)
-        except OSError as error:
-            name = f"{error.filename}: " if error.filename else ""
-            code = _said(f"{name}{error.strerror or error}", AT_FAULT)
-        except KeyboardInterrupt as error:
-            said = str(error) or "interrupted; nothing was written"
-            code = _said(said, INTERRUPTED)
-        raise typer.Exit(code or DONE)
+        raise typer.Exit(code)
 
+    own = inspect.signature(command)
+    kind = inspect.Parameter.KEYWORD_ONLY
+    more = {name: Annotated[hint, option] for name, (hint, option, _) in _EVERY.items()}
+    inner.__signature__ = own.replace(  # type: ignore[attr-defined]
+        parameters=[
+            *own.parameters.values(),
+            *(inspect.Parameter(n, kind, default=_EVERY[n][2], annotation=more[n]) for n in more),
+        ]
+    )
+    inner.__annotations__ = {**command.__annotations__, **more}
     return inner
 
 
+def _run(command: Callable[[], Any]) -> int:
+    """Exit code of a command; what went wrong is said in a sentence."""
+    try:
+        return command() or DONE
+    except (typer.Exit, typer.Abort, typer.BadParameter):
+        raise
+    except AccuracyError as error:
+        return _said(error, NOT_TRUSTED)
+    except ChladniError as error:
+        return _said(error, AT_FAULT)
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        return _said(f"{name}{error.strerror or error}", AT_FAULT)
+    except MemoryError:
+        return _said("the memory is not enough for it", AT_FAULT)
+    except KeyboardInterrupt as error:
+        return _said(str(error) or "interrupted; nothing was written", INTERRUPTED)
+    except Exception as error:  # noqa: BLE001  a fault of ours is said as one, too
+        for line in traceback.format_exception(error):
+            console().aside(line.rstrip())
+        at = traceback.extract_tb(error.__traceback__)[-1]
+        return _said(
+            f"a fault of chladni, not of its input: {type(error).__name__}: {error} "
+            f"({Path(at.filename).name}, line {at.lineno}); --verbose shows the whole of it",
+            FAILED,
+        )
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does, so that it clears up and says what is kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ended(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, ended)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def _said(error: object, code: int) -> int:
-    typer.echo(f"chladni: {' '.join(str(error).split())}", err=True)
+    say(f"chladni: {' '.join(str(error).split())}", error=True)
     return code
 
 

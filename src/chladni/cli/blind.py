@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-from ..output import write_json, write_text
+from ..errors import FileError
+from ..output import locked, write_json, write_text
+from .console import say
 from .run import Out
 
 
@@ -22,17 +24,21 @@ def run(
     from chladni_evidence.score import Row, confusion, summary
 
     place, rows = out or Path("runs") / "blind", []
+    if place.exists() and not place.is_dir():
+        raise FileError(f"{place} is a file, --out needs a folder")
+    place.mkdir(parents=True, exist_ok=True)
     cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:
         rows.append(row)
-        typer.echo(line(row))
+        say(line(row))
         write_json(place / "blind.json", rows)
 
-    answered_rows(cases, workers, told)
+    with locked(place):
+        answered_rows(cases, workers, told)
     text = f"{confusion(rows)}\n\n{summary(rows)}"
     write_text(place / "confusion.txt", text + "\n")
-    typer.echo(text)
+    say(text)
 
 
 def _names(text: str) -> list[str]:

@@ -4,12 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import typer
-
 from ..io.package_files import mesh_path
 from ..updating.result import NamedEffect
 from ..workflows.diagnose import diagnose
 from ..workflows.diagnosis_result import DiagnosisResult
+from .console import say
 from .run import Out, diagnosed
 
 
@@ -18,9 +17,9 @@ def run(out: Out = None) -> None:
     source = mesh_path("demo/case.toml").parent
     found = diagnosed("diagnose", source, out or Path("runs") / "demo", diagnose)
     truth = json.loads(mesh_path("demo.truth.json").read_text(encoding="utf-8"))
-    typer.echo("The answer is on disk; now the seal is opened.")
+    say("The answer is on disk; now the seal is opened.")
     for line in compared(found, truth):
-        typer.echo(line)
+        say(line)
 
 
 def compared(found: DiagnosisResult, truth: dict[str, Any]) -> list[str]:

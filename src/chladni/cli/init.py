@@ -9,6 +9,7 @@ from ..case import load_case
 from ..errors import ChladniError, FileError
 from ..output import write_text
 from ..workflows.case_draft import CaseDraft, case_text, draft, said_of, sensors_text
+from .console import say
 from .run import Allow, Out, Units, place_of, started
 
 
@@ -34,13 +35,13 @@ def run(
     if taken:
         raise FileError(f"{place / taken[0]} is there already and is not replaced; another --out")
     made = draft(source, recordings or (), units, quantity, sensors, mass, allow or ())
-    with started("init", source, place) as job:
+    with started("init", source, place, listed=False) as job:
         write_text(job.folder / "case.toml", case_text(made, place))
         if made.dofs:
             write_text(job.folder / "sensors.csv", sensors_text(made))
         for sentence in _sentences(made):
             job.say(sentence)
-    typer.echo(_next(place))
+    say(_next(place))
 
 
 def _sentences(made: CaseDraft) -> list[str]:

@@ -5,9 +5,11 @@ from typing import Annotated
 
 import typer
 
+from ..output import run_folder
 from ..report.blocks import Links, Section
 from ..report.diagnosis_json import read_diagnosis
 from ..report.page import write_page
+from .console import say
 
 
 def run(
@@ -21,5 +23,10 @@ def run(
     result = read_diagnosis(folder)
     figures = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]
-    page = write_page(out or folder, result, figures, result.notes, tables, title=title)
-    typer.echo(f"results in {page}")
+    if out is None or out.resolve() == folder.resolve():
+        page = write_page(folder, result, figures, result.notes, tables, title=title)
+    else:
+        with run_folder(out, "report", [folder / "diagnosis.json"]) as part:
+            write_page(part, result, figures, result.notes, tables, title=title)
+        page = out / "report.html"
+    say(f"results in {page}")

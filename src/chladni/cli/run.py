@@ -11,13 +11,15 @@ from typing import Annotated, Any, Protocol
 import typer
 
 from ..case import Case, load_case
+from ..case.files_of_source import files_of
 from ..errors import FileError
 from ..output import run_folder, write_json
-from ..progress import Progress, terminal, within
-from ..report.blocks import Block, Code, Items, Links, PageParts, Section
+from ..progress import Progress, within
+from ..report.blocks import Block, Code, Items, Links, PageParts, Section, Table
 from ..report.page import write_sections
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.loaded_model import is_case
+from .console import console, say, say_table, watched
 
 Out = Annotated[
     Path | None,
@@ -48,6 +50,7 @@ class Run:
     command: str
     source: Path
     folder: Path  # scratch; moved to its place if all goes well
+    place: Path
     progress: Progress
     lead: str = ""
     sections: list[Section] = field(default_factory=list)
@@ -74,11 +77,13 @@ class Run:
         self.notes += parts.notes
         self.files += parts.files
         self.lead = parts.lead
-        self.say(parts.lead)
+        say_sections(parts.lead, parts.sections)
+        for note in parts.notes:
+            self.say(f"note: {note}")
 
     def say(self, text: str) -> None:
         """One line on standard output."""
-        typer.echo(text)
+        say(text)
 
     def page(self) -> Path:
         """Write ``report.html`` of what was gathered."""
@@ -96,17 +101,29 @@ class Run:
 
 
 @contextmanager
-def started(command: str, source: Path | str, out: Path | None) -> Iterator[Run]:
+def started(
+    command: str, source: Path | str, out: Path | None, *, listed: bool = True, adds: bool = False
+) -> Iterator[Run]:
     """A run whose files appear in ``out`` only if nothing failed; by default in ./runs."""
     place = place_of(command, Path(source), out)
-    with run_folder(place) as folder:
-        with terminal() as progress:
-            run = Run(command, Path(source), folder, progress)
+    with run_folder(place, command, files_of(Path(source)), listed=listed, adds=adds) as folder:
+        with watched() as progress:
+            run = Run(command, Path(source), folder, place, progress)
             yield run
         if run.sections:
             run.page()
     page = place / "report.html"
-    typer.echo(f"results in {page if page.exists() else place}")
+    say(f"results in {page if page.exists() else place}")
+
+
+def say_sections(lead: str, sections: Sequence[Section]) -> None:
+    """A result in one sentence, and its tables under their titles."""
+    say(lead)
+    for section in sections:
+        for block in section.blocks:
+            if isinstance(block, Table) and block.rows:
+                say(f"\n{section.title}" + (f": {block.caption}" if block.caption else ""))
+                say_table(block)
 
 
 def place_of(command: str, source: Path, out: Path | None) -> Path:
@@ -145,14 +162,16 @@ def diagnosed(
         After all is written, if the result is not to be trusted.
     """
     from ..report.diagnosis_folder import write_diagnosis
-    from ..report.verdict import sentence
+    from ..report.verdict import sections, sentence
 
     with started(command, source, out) as job:
         case = opened(source)
         found = workflow(case, within(job.progress, 0.0, 0.85))
         stage = within(job.progress, 0.85, 1.0)
-        found = write_diagnosis(job.folder, case, found, command_line(), stage)
-        job.say(sentence(found))
+        found = write_diagnosis(job.folder, case, found, command_line(), stage, job.place)
+        say_sections(sentence(found), sections(found, {}, (), (), ""))
+        for note in found.notes:
+            console().aside(f"note: {note}")
     return found.trusted()
 
 

@@ -49,7 +49,7 @@ def run(
 
     system = unit_system(units)
     build = _builder(name)
-    with started("specimen", Path(name), out) as job:
+    with started("specimen", Path(name), out, adds=True) as job:
         job.progress("meshing", 0.0)
         values = dict(_setting(text) for text in settings or [])
         specimen = build(size, values)

@@ -13,6 +13,7 @@ from ..report.result_json import to_json
 from ..studies.parameter_study import ParameterStudy, study
 from ..studies.study_settings import StudySettings
 from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
+from .console import say
 from .run import Allow, Answering, Damping, Driven, Kind, Out, Units, limits, place_of, started
 
 
@@ -109,6 +110,6 @@ def _tenths() -> Progress:
         tenth = int(10 * share)
         if tenth not in said and 0 < share <= 1:
             said.add(tenth)
-            typer.echo(what)
+            say(what)
 
     return told

@@ -14,6 +14,7 @@ from ..sparse.dissection import Fronts, analyse, pattern
 from ..sparse.factor import Backend, Factor, factorise, inertia
 from ..sparse.lanczos import Ritz, block_lanczos
 from ..sparse.multifrontal import NotDefinite
+from .massless import stiffened
 from .modes import ModalModel
 from .system import System
 
@@ -29,7 +30,6 @@ _TOLD = 1e-13  # of it: θ below this are rounding
 _FIRM = 1e-6  # of the median K_ii/M_ii: first shift of small systems
 _ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ that rounding of K makes of a rigid motion
 _EXTREME = 1e-2  # of the median K_ii/M_ii: a motion so light that rounding exceeds it is massless
-_STIFFENED = 1e-13  # of K_ii, added where a motion has neither stiffness nor mass
 Modes = tuple[np.ndarray, np.ndarray]  # λ (k,), Φ (n, k)
 _JUST_ABOVE = 1 + 1e-6  # a band that ends at a mode includes it, whatever the rounding
 
@@ -115,7 +115,7 @@ class _Problem:
     def below(self, s: float) -> int:
         """How many eigenvalues are below s: the negative ones of K - s M (Sylvester)."""
         for firm, nudge in product((False, True), (0.0, 1e-7, -1e-7)):
-            K = _stiffened(self.K) if firm else self.K
+            K = stiffened(self.K) if firm else self.K
             try:
                 return inertia(K - s * (1 + nudge) * self.M, fronts=self.fronts)[0]
             except AccuracyError:
@@ -161,15 +161,6 @@ def _scale(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> _Scale:
     return _Scale(typical, min(rounding, _EXTREME * typical))
 
 
-def _stiffened(K: sp.csr_array) -> sp.csr_array:
-    """K + ε diag K: a motion without stiffness and mass is held, all others keep their digits.
-
-    Nastran's MECHFIX holds such massless mechanisms as well: a bar that turns about itself
-    between two points without inertia.
-    """
-    return sp.csr_array(K + _STIFFENED * sp.diags_array(K.diagonal()))
-
-
 def _dense(
     K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None, limit: float
 ) -> Modes:
@@ -185,7 +176,7 @@ def _small(
 ) -> Modes:
     """The same with the scale known."""
     count = K.shape[0] if count is None else count
-    for A in (K, _stiffened(K)):
+    for A in (K, stiffened(K)):
         try:
             lam, phi = _by_shifts(A.toarray(), M.toarray(), -scale.first_shift, count, limit)
             break
@@ -211,7 +202,7 @@ def _condensed(
     try:
         factor = factorise(K_ss, nodes=dofs[~massive, 0])
     except ModelError:
-        factor = factorise(_stiffened(K_ss), nodes=dofs[~massive, 0])
+        factor = factorise(stiffened(K_ss), nodes=dofs[~massive, 0])
     follow = -factor.solve(K_sm.toarray())
     k = K[massive][:, massive].toarray() + K_sm.T @ follow
     k, m = sp.csr_array((k + k.T) / 2), M[massive][:, massive]
@@ -255,7 +246,7 @@ def _held(solved: Callable[[_Problem], Modes], problem: _Problem) -> Modes:
         return solved(problem)
     except (ModelError, LinAlgError) as fault:
         try:
-            return solved(replace(problem, K=_stiffened(problem.K)))
+            return solved(replace(problem, K=stiffened(problem.K)))
         except LinAlgError as error:
             raise AccuracyError(f"Lanczos broke down: {error}") from error
         except ModelError:

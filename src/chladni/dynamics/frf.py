@@ -9,15 +9,30 @@ import numpy as np
 from ..arrays import readonly
 from ..dofs import label as text_of
 from ..dofs import positions
-from ..errors import LabelError, ShapeError
+from ..errors import LabelError, ShapeError, named
 from ..sparse.dissection import analyse, pattern
 from ..sparse.factor import factorise
+from .massless import static_solver
 from .modes import ModalModel
 from .system import System
 
 Quantity = Literal["receptance", "mobility", "accelerance", "transmissibility"]
 UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N", "transmissibility": "-"}
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
+
+
+_LOOSELY = 0.01  # beyond 0 and 1: rounding of who wrote a coherence
+
+
+def _coherence(gamma: np.ndarray) -> np.ndarray:
+    """Within 0 and 1; refused where it is in percent, or no coherence at all."""
+    low, high = float(np.min(gamma)), float(np.max(gamma))
+    if not (low >= -_LOOSELY and high <= 1 + _LOOSELY):
+        raise ShapeError(
+            f"a coherence lies between 0 and 1, here it runs from {low:g} to {high:g}; is it in "
+            "percent?"
+        )
+    return np.clip(gamma, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +64,9 @@ class FRF:
 
     def __post_init__(self) -> None:
         if self.quantity not in get_args(Quantity):
-            raise LabelError(f"no quantity {self.quantity!r}; there are {get_args(Quantity)}")
+            raise LabelError(
+                f"no quantity {self.quantity!r}; there are {named(get_args(Quantity))}"
+            )
         if np.any(np.diff(self.frequency) <= 0):
             k = int(np.argmax(np.diff(self.frequency) <= 0))
             f = self.frequency[k : k + 2]
@@ -61,6 +78,8 @@ class FRF:
                 raise ShapeError(f"{name} are {np.shape(array)}, labels and frequencies say {due}")
             if array is not None:
                 object.__setattr__(self, name, readonly(array))
+        if self.coherence is not None:
+            object.__setattr__(self, "coherence", readonly(_coherence(self.coherence)))
         object.__setattr__(self, "frequency", readonly(self.frequency))
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "inputs", tuple(self.inputs))
@@ -100,7 +119,9 @@ class FRF:
         if quantity == self.quantity:
             return self
         if quantity not in _ORDER or self.quantity not in _ORDER:
-            raise LabelError(f"no way from {self.quantity} to {quantity!r}; only among {[*_ORDER]}")
+            raise LabelError(
+                f"no way from {self.quantity} to {quantity!r}; only among {named(_ORDER)}"
+            )
         n = _ORDER[quantity] - _ORDER[self.quantity]
         omega = 2 * np.pi * self.frequency[:, None, None]
         factor = 1j**n * (omega if n > 0 else np.where(omega > 0, omega, np.nan)) ** n
@@ -213,9 +234,9 @@ def residual_flexibility(
     """
     lam = (2 * np.pi * modal.frequency) ** 2
     sigma = -1e-2 * lam[-1] if shift is None else shift
-    factor = factorise(system.K.real - sigma * system.M, points, nodes=system.dofs[:, 0])
-    X = factor.solve(np.asarray(load, dtype=float))
-    Y = factor.solve(system.M @ X)
+    solve = static_solver(system, sigma, points)
+    X = solve(np.asarray(load, dtype=float))
+    Y = solve(system.M @ X)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     static = pick.T @ X - (phi_o / (lam - sigma)) @ phi_i.T
     slope = pick.T @ Y - (phi_o / (lam - sigma) ** 2) @ phi_i.T

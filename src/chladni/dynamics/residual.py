@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import eigh
 
-from ..sparse.factor import factorise
+from .massless import static_solver
 from .modes import ModalModel
 from .system import System
 
@@ -29,8 +29,8 @@ def with_residual_vectors(
     """
     phi, K, M = modal.shapes, system.K.real, system.M
     top = float((2 * np.pi * modal.frequency[-1]) ** 2) or 1.0
-    factor = factorise(K + _NEAR_STATIC * top * M, points, nodes=system.dofs[:, 0])
-    R = factor.solve(load - M @ (phi @ (phi.T @ load)))
+    solve = static_solver(system, -_NEAR_STATIC * top, points)
+    R = solve(load - M @ (phi @ (phi.T @ load)))
     R = R - phi @ (phi.T @ (M @ R))
     lam = (2 * np.pi * modal.frequency) ** 2
     carried = ((phi.T @ load) ** 2 / (lam + _NEAR_STATIC * top)[:, None]).sum(axis=0)

@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 
 from ..arrays import readonly
 from ..dofs import parse
-from ..errors import AccuracyError, LabelError, ShapeError
+from ..errors import AccuracyError, LabelError, ShapeError, named
 from .frf import FRF, Quantity
 from .modes import ModalModel
 
@@ -102,7 +102,7 @@ def modal_model(system: StateSpace) -> ModalModel:
     if not drive:
         raise LabelError(
             f"no label is both output and input, so the shapes' scale is unknown; outputs are "
-            f"{list(system.outputs[:6])}, inputs {list(system.inputs[:6])}"
+            f"{named(system.outputs)}, inputs {named(system.inputs)}"
         )
     p, X = np.linalg.eig(system.A)
     left, right = system.C @ X, np.linalg.solve(X, system.B.astype(complex))

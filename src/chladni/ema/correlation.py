@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from ..dynamics.frf import FRF
-from ..errors import LabelError, ShapeError
+from ..errors import LabelError, ShapeError, named
 
 _LN10 = np.log(10.0)
 
@@ -132,7 +132,7 @@ def deviation(model: FRF, test: FRF) -> np.ndarray:
     if not (test.values.all() and model.values.all()):
         alive = np.asarray(test.values.all(axis=(0, 2)) & model.values.all(axis=(0, 2)))
         zero = [test.outputs[k] for k in np.flatnonzero(~alive)]
-        raise LabelError(f"a response of exactly zero has no logarithm: leave out {zero[:6]}")
+        raise LabelError(f"a response of exactly zero has no logarithm: leave out {named(zero)}")
     return wrapped(np.log(model.values / test.values) / _LN10)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import readonly
 from ..dynamics.frf import FRF
-from ..errors import LabelError, ShapeError
+from ..errors import LabelError, ShapeError, named
 from .time_record import TimeRecord
 
 Role = Literal["output", "input"]
@@ -179,4 +179,4 @@ class TestSetup:
         for sensor in among:
             if sensor.label == label:
                 return sensor
-        raise LabelError(f"no {role} {label!r}; there are {[s.label for s in among][:6]} ...")
+        raise LabelError(f"no {role} {label!r}; there are {named(s.label for s in among)}")

@@ -9,7 +9,7 @@ Matrix Structural Analysis (1968), ch. 5 and 11; masses as in the NASTRAN Theore
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import BeamSection, Isotropic
 
@@ -55,14 +55,14 @@ def frames(ends: np.ndarray, up: np.ndarray, ids: np.ndarray) -> tuple[np.ndarra
     x = ends[:, 1] - ends[:, 0]
     L = np.linalg.norm(x, axis=1)
     if np.any(L == 0):
-        raise ModelError(f"beam {ids[L == 0][:3].tolist()} has no length")
+        raise ModelError(f"beam {named(ids[L == 0], 3)} has no length")
     x = x / L[:, None]
     free = ~np.any(up, axis=1)
     up = np.where(free[:, None], np.eye(3)[np.argmin(np.abs(x), axis=1)], up)
     z = np.cross(x, up)
     size = np.linalg.norm(z, axis=1)
     if np.any(bad := size <= 1e-9 * np.linalg.norm(up, axis=1)):
-        raise ModelError(f"beam {ids[bad][:3].tolist()} lies along its orientation vector")
+        raise ModelError(f"beam {named(ids[bad], 3)} lies along its orientation vector")
     z = z / size[:, None]
     return np.stack([x, np.cross(z, x), z], axis=1), L
 

@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, named
 from ..model.assembly import Shells
 from .shell_membrane import corner_slopes
 
@@ -158,6 +158,6 @@ def _check(ids: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> None:
     bad = ~(turn > 0).all(axis=1)
     if bad.any():
         raise ModelError(
-            f"shells {ids[bad][:5].tolist()} ({bad.sum()} in all) have no area or an inner angle "
+            f"shells {named(ids[bad])} ({bad.sum()} in all) have no area or an inner angle "
             "beyond 180 degrees; check the order and place of their grids"
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Material, Orthotropic, ShellSection
 from .shell import ShellGeometry, geometry, turned
@@ -200,7 +200,7 @@ def _check(assembly: Assembly) -> None:
         if not isinstance(assembly.parts[k].section, ShellSection):
             raise ModelError(f"part {assembly.parts[k].name!r} has shells but no shell section")
     if (thin := (shells.thickness <= 0).any(axis=1)).any():
-        raise ModelError(f"shells {shells.ids[thin][:5].tolist()} have no thickness")
+        raise ModelError(f"shells {named(shells.ids[thin])} have no thickness")
 
 
 def _constants(section: object) -> tuple:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, named
 from ..model.assembly import Assembly, Solids
 from ..model.properties import Isotropic, SolidSection
 from .solid_shapes import FAMILIES, SolidFamily
@@ -96,7 +96,7 @@ def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
     bad = (np.abs(dV).max(axis=0) == 0) | (dV.min(axis=0) < 0) & (dV.max(axis=0) > 0)
     if np.any(bad):
         raise ModelError(
-            f"solid {solids.ids[bad][:3].tolist()} has no volume or turns inside out; "
+            f"solid {named(solids.ids[bad], 3)} has no volume or turns inside out; "
             f"its first grid is {assembly.ids[solids.nodes[bad][0, 0]]}"
         )
 

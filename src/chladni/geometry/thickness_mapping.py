@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, named
 from ..model.assembly import Assembly
 from ..model.properties import ShellSection
 from .cells import components
@@ -129,8 +129,8 @@ def map_thickness(
     sources = _sources(assembly, formed, pairs, reach, facing)
     if not sources:
         raise ModelError(
-            f"none of the formed parts {sorted(set(formed.part.tolist()))} lies on a part of the "
-            f"assembly within {1e3 * reach:.1f} mm; align the meshes or name the pairs"
+            f"none of the formed parts {named(sorted(set(formed.part.tolist())))} lies on a part "
+            f"of the assembly within {1e3 * reach:.1f} mm; align the meshes or name the pairs"
         )
     t = assembly.shells.thickness.copy()
     report = []

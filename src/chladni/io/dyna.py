@@ -17,6 +17,7 @@ from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named
+from .file_size import refuse_large
 
 _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
 _NODE_IDS = ("node", "nid", "id", "grid")
@@ -40,6 +41,7 @@ class _Block:
 def _blocks(path: Path) -> Iterator[_Block]:
     """The keyword blocks of a file and of those it includes."""
     try:
+        refuse_large(path)
         text = path.read_text(encoding="latin-1")
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}") from error
@@ -262,6 +264,8 @@ def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     """
     path = Path(path)
     unit = units_named(units) if isinstance(units, str) else units
+    if path.is_file():
+        refuse_large(path)
     if path.suffix.lower() == ".csv":
         return _read_csv(path, unit)
     if path.suffix.lower() in (".vtu", ".vtk", ".msh", ".xdmf", ".ply"):

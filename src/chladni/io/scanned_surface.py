@@ -9,6 +9,7 @@ from ..errors import FileError
 from ..geometry.cells import edges_of
 from ..geometry.facets import cell_areas
 from ..geometry.mesh_quality import edge_faults, free_edges
+from .file_size import refuse_large
 
 SUFFIXES = (".stl", ".ply", ".obj")
 
@@ -45,6 +46,7 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
         raise FileError(f"{path}: a scan is one of {', '.join(SUFFIXES)}, not {path.suffix or '?'}")
     if not path.is_file():
         raise FileError(f"no file {path}")
+    refuse_large(path)
     try:
         mesh = load_mesh(path)
     except (ValueError, KeyError, IndexError, NotImplementedError) as error:

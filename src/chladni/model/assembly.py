@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import LabelError, ModelError
+from ..errors import LabelError, ModelError, named
 from .properties import Part
 
 
@@ -238,7 +238,7 @@ class Assembly:
         at = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
         if np.any(missing := self.ids[at] != ids):
             raise LabelError(
-                f"no grid {ids[missing][:3].tolist()}; the deck has {len(self.ids)} grids, "
+                f"no grid {named(ids[missing].tolist(), 3)}; the deck has {len(self.ids)} grids, "
                 f"{self.ids[0]} to {self.ids[-1]}"
             )
         return at

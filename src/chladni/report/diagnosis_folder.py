@@ -1,10 +1,13 @@
 """The folder of a diagnosis: the updated deck, ``diagnosis.json``, pictures, the page."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 from ..case import Case
 from ..io.nastran import write_deck
+from ..io.nastran.edit.changes import Change
 from ..output import write_json
 from ..progress import Progress, silent
 from ..view.surface import surface
@@ -22,16 +25,19 @@ def write_diagnosis(
     result: DiagnosisResult,
     command: str = "",
     progress: Progress = silent,
+    home: Path | None = None,
 ) -> DiagnosisResult:
     """Write all of it; the result with the names of the files.
 
     Parameters
     ----------
     command : the line that makes this run again
+    home : where the folder is moved to afterwards, if it is
     """
     folder.mkdir(parents=True, exist_ok=True)
-    result = _with_states(folder, case, result, progress)
-    files = _decks(folder, case, result)
+    home = home or folder
+    result = _with_states(folder, case, result, progress, home)
+    files = _decks(folder, case, result, home)
     files |= {"report": "report.html", "diagnosis": "diagnosis.json"}
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
@@ -43,20 +49,19 @@ def write_diagnosis(
 
 
 def _with_states(
-    folder: Path, case: Case, result: DiagnosisResult, progress: Progress
+    folder: Path, case: Case, result: DiagnosisResult, progress: Progress, home: Path
 ) -> DiagnosisResult:
     """Every state but the first into a folder of its own; the first is the run itself."""
     done = list(result.states)
     for k, state in enumerate(result.states):
         if k:
-            place = folder / state_folder(result, k)
-            done[k] = replace(
-                state, result=write_diagnosis(place, case, state.result, "", progress)
-            )
+            name = state_folder(result, k)
+            written = write_diagnosis(folder / name, case, state.result, "", progress, home / name)
+            done[k] = replace(state, result=written)
     return replace(result, states=tuple(done))
 
 
-def _decks(folder: Path, case: Case, result: DiagnosisResult) -> dict[str, str | None]:
+def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dict[str, str | None]:
     """Names of the updated deck and, where an effect is named, of the one without it.
 
     None where no card can hold the change.
@@ -64,11 +69,17 @@ def _decks(folder: Path, case: Case, result: DiagnosisResult) -> dict[str, str |
     found: dict[str, str | None] = {"deck": None}
     if (models := result.models) is None:
         return found
+    read = {s.path.resolve() for s in case.deck.sources}
+
+    def written(stem: str, changes: Sequence[Change]) -> str:
+        names = (f"{stem}{k or ''}.bdf" for k in count())
+        name = next(n for n in names if (home / n).resolve() not in read)
+        return write_deck(case.deck, folder / name, changes, home).name
+
     if models.final.changes is not None:
-        found["deck"] = write_deck(case.deck, folder / "updated.bdf", models.final.changes).name
+        found["deck"] = written("updated", models.final.changes)
     if models.calibrated is not models.final and models.calibrated.changes is not None:
-        path = folder / "calibrated.bdf"
-        found["calibrated"] = write_deck(case.deck, path, models.calibrated.changes).name
+        found["calibrated"] = written("calibrated", models.calibrated.changes)
     return found
 
 

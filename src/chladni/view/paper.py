@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ..output import atomic
 
@@ -24,13 +25,23 @@ LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
 def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
     """Write a PNG (or SVG, PDF by the suffix), by way of a temporary name."""
     FigureCanvasAgg(figure)
+    _no_formulas(figure)
     with matplotlib.rc_context({"svg.fonttype": "path"}):
         look: dict[str, Any] = {"facecolor": "white", "bbox_inches": "tight", "pad_inches": 0.08}
         return atomic(path, lambda part: figure.savefig(part, dpi=dpi, **look))
 
 
+def _no_formulas(figure: Figure) -> None:
+    """A name with two dollars in it is no formula; those of the axes' own numbers are."""
+    for text in figure.findobj(Text):
+        said = text.get_text()
+        if "$" in said and r"\$" not in said and r"\mathdefault" not in said:
+            text.set_parse_math(False)
+
+
 def pixels(figure: Figure, dpi: int = 100) -> np.ndarray:
     """(height, width, 3) bytes of a figure."""
+    _no_formulas(figure)
     figure.set_facecolor("white")
     figure.set_dpi(dpi)
     canvas = FigureCanvasAgg(figure)

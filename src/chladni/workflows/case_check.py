@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case import Case
+from ..case.recordings import DEAD
 from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
@@ -81,6 +82,7 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     dofs = (*_dofs(case, case.outputs, "output"), *_dofs(case, case.inputs, "input"))
     findings = [
         *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
+        *_dead(case),
     ]  # fmt: skip
     if not any(f.fault for f in findings):
         progress("the recording beside the model", 0.8)
@@ -142,6 +144,12 @@ def _units(case: Case) -> list[CaseFinding]:
     except FileError as error:
         return [CaseFinding(str(error).partition(": ")[2], "look at E and rho of the materials")]
     return []
+
+
+def _dead(case: Case) -> list[CaseFinding]:
+    """Channels that said nothing, which were left out."""
+    said = [n for r in case.recordings for n in r.notes if n.endswith(DEAD)]
+    return [CaseFinding(n, "look at its cable; use = no in sensors.csv says so") for n in said]
 
 
 def _mass(case: Case) -> list[CaseFinding]:

@@ -50,6 +50,7 @@ class CaseDraft:
     assembly : SI
     mass : of the deck [kg]
     quantity : the user's word, "" where the files say it
+    allow : cards of the deck that are passed over
     read : recordings as read, the compared one first
     dofs : where its outputs and inputs are
     notes : what was assumed
@@ -64,6 +65,7 @@ class CaseDraft:
     mass: float
     quantity: str
     weighed: float | None
+    allow: tuple[str, ...]
     read: tuple[Recording, ...]
     dofs: tuple[MatchedDof, ...]
     notes: tuple[str, ...]
@@ -108,8 +110,8 @@ def draft(
     notes += [note for r in read for note in r.notes]
     notes += _far(dofs)
     return CaseDraft(
-        deck, tuple(recordings), system, why, made, mass, quantity or "", weighed, tuple(read),
-        tuple(dofs), tuple(notes), tuple(_missing(read, dofs, mass, weighed)),
+        deck, tuple(recordings), system, why, made, mass, quantity or "", weighed, tuple(allow),
+        tuple(read), tuple(dofs), tuple(notes), tuple(_missing(read, dofs, mass, weighed)),
     )  # fmt: skip
 
 
@@ -187,6 +189,8 @@ def case_text(made: CaseDraft, folder: Path) -> str:
         "",
         "[model]",
         f"deck = {name(made.deck)}",
+        *_of_outside(made, folder),
+        *([f"allow = {json.dumps(list(made.allow))}"] if made.allow else []),
         *_comment(made.units_why),
         f'units = "{made.units.name}"',
         "# damping = 0.01  # of critical, where responses are drawn or scored",
@@ -208,6 +212,14 @@ def case_text(made: CaseDraft, folder: Path) -> str:
     missing = [line for text in made.missing for line in _comment(f"MISSING {text}")]
     notes = [line for text in made.notes for line in _comment(f"NOTE {text}")]
     return "\n".join([*lines, *([""] if missing or notes else []), *missing, *notes, ""])
+
+
+def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
+    """The word that lets in what lies elsewhere, where something does."""
+    ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
+    if not any(way.is_absolute() or ".." in way.parts for way in ways):
+        return []
+    return ["outside = true  # files lie outside of this folder: they are not part of the case"]
 
 
 def _of_mass(made: CaseDraft) -> str:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ..ema.setup import Recording, Role, Sensor
+from ..errors import named
 from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
@@ -81,6 +82,9 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
+    idle = [s.label for s in table if (s.label, s.role) not in {(d.label, d.role) for d in found}]
+    if idle:
+        notes.append(f"rows of the table given that are not in {recording.name}: {named(idle)}")
     return found, notes
 
 

@@ -222,3 +222,23 @@ def test_ten_times_the_thicknesses_are_ten_times_the_work(tmp_path, work):
         return steps
 
     assert changed(2000) <= 10 * changed(200)
+
+
+def test_a_folder_the_deck_is_moved_to_decides_names_and_ways(tmp_path):
+    """Written elsewhere and moved home, where the original is: nothing original is replaced."""
+    home, scratch = tmp_path / "case", tmp_path / "case" / ".scratch"
+    scratch.mkdir(parents=True)
+    (home / "grids.inc").write_text("GRID,1,,0.,0.,0.\n")
+    (home / "rest.inc").write_text("GRID,2,,1.,0.,0.\n")
+    (home / "d.bdf").write_text("BEGIN BULK\nINCLUDE 'grids.inc'\nINCLUDE 'rest.inc'\nENDDATA\n")
+    deck = read_deck(home / "d.bdf")
+    write_deck(deck, scratch / "updated.bdf", [SetField("GRID", 1, "X1", 5.0)], home)
+    names = {p.name for p in scratch.iterdir()}
+    assert not names & {"d.bdf", "grids.inc", "rest.inc"}
+    for name in names:
+        (scratch / name).rename(home / name)
+    moved = read_deck(home / "updated.bdf")
+    assert moved["GRID"].block(3, 1)[:, 0].tolist() == [5.0, 1.0]
+    assert read_deck(home / "d.bdf")["GRID"].block(3, 1)[:, 0].tolist() == [0.0, 1.0]
+    with pytest.raises(FileError, match="is a file the deck was read from"):
+        write_deck(deck, scratch / "d.bdf", [SetField("GRID", 1, "X1", 5.0)], home)

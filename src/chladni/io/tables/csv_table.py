@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, named, not_text
+from ..file_size import refuse_large
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,14 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
     """
     if not path.is_file():
         near = difflib.get_close_matches(path.name, beside_it(path), 3, 0.4) or beside_it(path)[:6]
-        raise FileError(f"no file {path}; beside it there are {near}")
+        raise FileError(f"no file {path}; beside it there are {named(near)}")
+    refuse_large(path)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file, skipinitialspace=True)
             rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     except UnicodeDecodeError as error:
-        raise FileError(f"{path.name} is not UTF-8 text ({error})") from error
+        raise FileError(f"{path.name} is {not_text(error)}") from error
     except csv.Error as error:
         raise FileError(f"{path.name} is no table: {error}") from error
     if not rows:

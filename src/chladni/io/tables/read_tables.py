@@ -12,11 +12,13 @@ import numpy as np
 from ...dynamics.frf import FRF, Quantity
 from ...ema.setup import PoleTable, Recording
 from ...ema.time_record import TimeRecord
-from ...errors import ChladniError, FileError
+from ...errors import ChladniError, FileError, named
+from ..file_size import refuse_large
 from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
 from ..time.time_channels import is_time, only_known
 from .csv_table import CsvTable, beside_it, read_table
 
+ENDINGS = (".npz", ".csv", ".wav", ".mat", ".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
 _FRF = ("frequency_hz", "output", "input", "real", "imag")
 _FRF_OPTIONAL = ("coherence", "variance", "level", "article")
 _POLES = ("mode", "frequency_hz")
@@ -37,15 +39,17 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     """
     path = Path(path)
     ending = path.suffix.lower()
-    if ending in (".npz", ".csv", ".wav", ".mat") and not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+    if path.is_file():
+        refuse_large(path)
+    if ending in ENDINGS[:4] and not path.is_file():
+        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
     if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
     if ending == ".npz":
         return (read_npz(path, quantity),)
     if ending == ".csv":
         return read_csv(path, quantity)
-    if ending in (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv"):
+    if ending in ENDINGS:
         from ..uff.read_uff import read_uff
 
         found = read_uff(path, quantity)
@@ -208,15 +212,18 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileError(f"no file {path}; beside it there are {beside_it(path)[:6]}")
+        raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
     if not zipfile.is_zipfile(path):
         raise FileError(f"{path.name} cannot be read as NPZ: it is no archive of arrays")
     try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(held.file_size for held in archive.infolist())
         with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
             if timed := not {"frequency_hz", "values"} & set(file.files) and is_time(file.files):
                 only_known(path.name, file.files)
             else:
                 _only_known(path, file.files)
+            refuse_large(path, size, "unpacks to")
             arrays = {name: file[name] for name in file.files}
     except FileError:
         raise
@@ -225,7 +232,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     if timed:
         return _timed(path, read_time_npz(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
-        raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {list(arrays)}")
+        raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
     quantity = quantity or (str(arrays["quantity"]) if "quantity" in arrays else None)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
@@ -272,7 +279,8 @@ def _numbers(
 ) -> np.ndarray:
     """An array of numbers of these kinds."""
     if arrays[name].dtype.kind not in kinds:
-        raise FileError(f"{path.name}: {name} holds {arrays[name].dtype}, not numbers")
+        kind = "records" if arrays[name].dtype.names else str(arrays[name].dtype)
+        raise FileError(f"{path.name}: {name} holds {kind}, not numbers")
     return arrays[name]
 
 

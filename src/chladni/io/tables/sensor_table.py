@@ -7,7 +7,7 @@ import numpy as np
 
 from ...dofs import COMPONENTS
 from ...ema.setup import Role, Sensor
-from ...errors import FileError
+from ...errors import FileError, named
 from .csv_table import CsvTable, read_table
 
 _OPTIONAL = (
@@ -104,7 +104,7 @@ def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
     if isinstance(text, np.ndarray):
         length = float(np.linalg.norm(text))
         if not np.isfinite(length) or length == 0:
-            raise FileError(f"{where}: nx, ny, nz = {text.tolist()} is no direction")
+            raise FileError(f"{where}: nx, ny, nz = {named(text.tolist())} is no direction")
         return np.asarray(text / length)
     way = text.rpartition(":")[2].strip().upper()
     if way == "N":

@@ -6,13 +6,15 @@ output) and ``scale`` (unit per number of the file; of WAV, per full scale).
 """
 
 import re
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...ema.time_record import TimeRecord
-from ...errors import FileError
+from ...errors import FileError, not_text
+from ..file_size import refuse_large
 from ..tables.csv_table import read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
 
@@ -56,7 +58,7 @@ def read_mat(path: Path) -> Read:
     FileError
         If it is of version 7.3, is damaged, or does not say rate and channels.
     """
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
     from scipy.io.matlab import MatReadError
 
     with path.open("rb") as file:
@@ -64,6 +66,7 @@ def read_mat(path: Path) -> Read:
     if b"MATLAB 7.3" in head or head[:4] == b"\x89HDF":
         raise FileError(f"{path.name} is of MATLAB 7.3 (HDF5), which is not read; save it with -v7")
     try:
+        refuse_large(path, sum(8 * prod(shape) for _, shape, _ in whosmat(str(path))), "unpacks to")
         held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except (*_DAMAGED, MatReadError) as error:
         raise FileError(f"{path.name} cannot be read as MAT: {error}") from error
@@ -147,7 +150,9 @@ def read_time_csv(path: Path) -> Read:
         head = [cell.strip() for cell in file.readline().strip().split(",")]
     try:
         rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
-    except (ValueError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path.name} is {not_text(error)}") from error
+    except ValueError as error:
         raise FileError(f"{path.name}: a line after the first is not {len(head)} numbers "
                         f"({str(error).split(';')[0]})") from error  # fmt: skip
     if rows.size == 0 or rows.shape[1] != len(head):

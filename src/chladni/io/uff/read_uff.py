@@ -187,6 +187,11 @@ def _complete(record: FunctionSet, where: str) -> FunctionSet:
         raise FileError(f"{where}: it says it holds {due} values")
     if len(y) < due or len(x) < due:
         raise FileError(f"{where}: {len(y)} of {due} values are there; the file is truncated")
+    if np.any(y[due:] != 0):  # some writers fill up their last line
+        raise FileError(
+            f"{where}: {len(y)} values are there, it says it holds {due}; a line is doubled, or "
+            "the number is wrong"
+        )
     x, y = x[:due], y[:due]
     if due == 0:
         raise FileError(f"{where}: the record is empty (0 values)")
@@ -208,10 +213,13 @@ def _take_frf(pile: Pile, record: FunctionSet, dofs: Pair, quantity: str | None)
     check_calibrated(record, where)
     try:
         said = meaning(record, pile.units, where)
-    except FileError:
+    except FileError as error:
         if quantity is None:
             raise
         said = Meaning(quantity, pile.units.length / pile.units.force)
+        why = str(error).partition(";")[0]
+        if not any(why.partition(": ")[2] in note for note in pile.notes):
+            pile.notes.append(f"{why}: read as {quantity} in the units of the file, as asked")
     if quantity is None and said.quantity is None:
         raise FileError(
             f"{where}: neither data type nor unit label says what was measured; "

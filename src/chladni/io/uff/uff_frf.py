@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...dynamics.frf import FRF
-from ...errors import ChladniError, FileError
+from ...errors import ChladniError, FileError, named
 from .uff_pile import Channel, Pair, Pile
 
 _SAME_LINE = 1e-5  # single precision abscissas: relative
@@ -72,11 +72,13 @@ def _rectangle(pile: Pile, pairs: list[Pair]) -> tuple[tuple[str, ...], tuple[st
     outputs = tuple(i for i in everyone if all((i, j) in pairs for j in inputs))
     if not outputs:
         raise FileError(
-            f"{pile.path.name}: no output was measured for all of the inputs {list(inputs)}; "
+            f"{pile.path.name}: no output was measured for all of the inputs {named(inputs)}; "
             "put each reference into a file of its own"
         )
     if left := [i for i in everyone if i not in outputs]:
-        pile.notes.append(f"{len(left)} outputs not measured for every input left out: {left[:6]}")
+        pile.notes.append(
+            f"{len(left)} outputs not measured for every input left out: {named(left)}"
+        )
     return outputs, inputs
 
 
@@ -115,7 +117,7 @@ def _coherence(
     inputs: tuple[str, ...],
     n_lines: int,
 ) -> np.ndarray | None:
-    """(n_f, n_out, n_in) in [0, 1], or None unless every channel has it."""
+    """(n_f, n_out, n_in), or None unless every channel has it."""
     if not pile.coherence:
         return None
     gamma = np.empty((n_lines, len(outputs), len(inputs)))
@@ -127,4 +129,4 @@ def _coherence(
                 pile.notes.append(f"no coherence for {output} / {input}: none is used")
                 return None
             gamma[:, i, j] = found
-    return np.clip(gamma, 0.0, 1.0)
+    return gamma

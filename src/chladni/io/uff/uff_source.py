@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...errors import FileError
+from ...errors import FileError, named
+from ..file_size import refuse_large
 
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _LOOSE = re.compile(rb"(?m)^[ \t]*-1[ \t]*(?=\r?$)")
@@ -28,7 +29,8 @@ def readable(path: Path) -> Iterator[Path]:
     """
     if not path.is_file():
         near = sorted(p.name for p in path.parent.glob("*.u*") if p.is_file())[:6]
-        raise FileError(f"no file {path}; beside it there are {near}")
+        raise FileError(f"no file {path}; beside it there are {named(near)}")
+    refuse_large(path)
     data = path.read_bytes()
     tidy = data if _BINARY.search(data) else _tidied(data)
     marks = len(_MARK.findall(tidy))
@@ -36,6 +38,8 @@ def readable(path: Path) -> Iterator[Path]:
         raise FileError(f"{path.name} is no universal file: no line '    -1' in {len(data)} bytes")
     if marks % 2:
         raise FileError(f"{path.name} is truncated: dataset {marks // 2 + 1} has no closing '-1'")
+    if not _BINARY.search(data):
+        _refuse_untyped(path, tidy)
     if tidy is data:
         yield path
         return
@@ -43,6 +47,15 @@ def readable(path: Path) -> Iterator[Path]:
         copy = Path(folder) / path.name
         copy.write_bytes(tidy)
         yield copy
+
+
+def _refuse_untyped(path: Path, data: bytes) -> None:
+    """Refuse a dataset whose first line is no type: a reader would pass over all of it."""
+    for k, part in enumerate(_MARK.split(data)[1::2], start=1):
+        first = part.strip().split(b"\n", 1)[0].strip()
+        if not first.isdigit():
+            said = first[:30].decode("latin-1")
+            raise FileError(f"{path.name}: dataset {k} begins with {said!r}, not with its type")
 
 
 def _tidied(data: bytes) -> bytes:

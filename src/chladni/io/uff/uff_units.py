@@ -21,7 +21,17 @@ _SYSTEMS = {
     8: (1e-3, _KILOGRAM_FORCE),
 }
 _LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "ft": 0.3048}
-_FORCE = {"n": 1.0, "mn": 1e-3, "kn": 1e3, "lbf": _POUND, "lb": _POUND, "kgf": _KILOGRAM_FORCE}
+_FORCE = {
+    "n": 1.0,
+    "mn": 1e-3,
+    "kn": 1e3,
+    "dan": 10.0,
+    "kip": 1e3 * _POUND,
+    "kp": _KILOGRAM_FORCE,
+    "lbf": _POUND,
+    "lb": _POUND,
+    "kgf": _KILOGRAM_FORCE,
+}
 _RESPONSE = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _GRAVITY = 9.80665
 _HERTZ = {
@@ -74,7 +84,7 @@ def numerator(label: str) -> tuple[str | None, float]:
     ('accelerance', 9.80665)
     """
     text = _bare(label)
-    if text in ("g", "gn"):
+    if text in ("g", "gn", "gs", "g's"):
         return "accelerance", _GRAVITY
     for tail, quantity in (("/s2", "accelerance"), ("/s/s", "accelerance"), ("/s", "mobility")):
         if text.endswith(tail) and text[: -len(tail)] in _LENGTH:
@@ -128,6 +138,14 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
     if record.function == 5 or (typed and motion_below):
         return Meaning("transmissibility", 1.0)
     said, length, force = ratio(record.ordinate.unit)
+    for axis, known in ((record.ordinate, said), (record.denominator, None)):
+        if _bare(axis.unit) and not known and _bare(axis.unit) not in {*_FORCE, *_LENGTH}:
+            known = numerator(axis.unit)[0]
+            if not known:
+                raise FileError(
+                    f"{where}: the unit {axis.unit!r} is not known; known are m, mm, in, g, N, lbf "
+                    "and their like; if the numbers are SI, state the quantity in the case"
+                )
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
             f"{where}: the data type says {typed}, the unit label "

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from ...arrays import readonly
-from ...errors import LabelError, ShapeError
+from ...errors import LabelError, ShapeError, named
 
 Criterion = Literal["D", "A", "E"]
 
@@ -171,7 +171,7 @@ def positions_of(kept: np.ndarray, n: int) -> np.ndarray:
         return np.flatnonzero(kept)
     kept = kept.astype(np.int64).ravel()
     if len(wrong := kept[(kept < 0) | (kept >= n)]):
-        raise LabelError(f"no candidate {wrong[:3].tolist()}; they are numbered 0 to {n - 1}")
+        raise LabelError(f"no candidate {named(wrong, 3)}; they are numbered 0 to {n - 1}")
     return kept
 
 

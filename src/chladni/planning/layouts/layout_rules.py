@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...errors import LabelError, ShapeError
+from ...errors import LabelError, ShapeError, named
 from .information import positions_of
 
 
@@ -61,7 +61,7 @@ class Rules:
         """
         fixed, forbidden = self.masks(n)
         if np.any(both := fixed & forbidden):
-            raise LabelError(f"candidates {np.flatnonzero(both)[:3].tolist()} are fixed, forbidden")
+            raise LabelError(f"candidates {named(np.flatnonzero(both), 3)} are fixed, forbidden")
         if not fixed.sum() <= n_sensors <= n - forbidden.sum():
             raise ShapeError(
                 f"{n_sensors} sensors were asked for; {fixed.sum()} are fixed and "
@@ -91,7 +91,7 @@ class Rules:
             raise ShapeError(f"regions are {self.region.shape}, there are {n} candidates")
         known = np.unique(self.region)
         if unknown := [r for r in (*self.most, *self.least) if r not in known]:
-            raise LabelError(f"no candidate is in region {unknown[0]}; there are {known.tolist()}")
+            raise LabelError(f"no candidate is in region {unknown[0]}; there are {named(known)}")
         room = 0
         for r in known.tolist():
             here = self.region == r
@@ -136,11 +136,11 @@ class Rules:
         if np.any(wrong := (self.fixed & ~kept) | (self.forbidden & kept)):
             raise ShapeError(
                 f"the layout disagrees with the fixed and forbidden candidates at "
-                f"{np.flatnonzero(wrong)[:3].tolist()}"
+                f"{named(np.flatnonzero(wrong), 3)}"
             )
         if self.near is not None and self.near[np.ix_(layout, layout)].any():
             i = layout[self.near[np.ix_(layout, layout)].any(axis=1)]
-            raise ShapeError(f"the layout has sensors nearer than allowed: {i[:3].tolist()}")
+            raise ShapeError(f"the layout has sensors nearer than allowed: {named(i, 3)}")
         if self.region is not None and (self._excess(kept) or self._lack(kept)):
             raise ShapeError(f"the layout has {self._count(kept)} sensors by region")
 

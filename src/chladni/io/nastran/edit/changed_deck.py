@@ -17,11 +17,17 @@ from .rewrite_card import raw_lines, rewritten
 Lines = dict[int, list[str]]  # new lines in place of a line (from 1)
 
 
-def write_deck(deck: Deck, path: Path | str, changes: Sequence[Change]) -> Path:
+def write_deck(
+    deck: Deck, path: Path | str, changes: Sequence[Change], home: Path | str | None = None
+) -> Path:
     """Write the deck with changes; included files that change are written beside it.
 
     An included file keeps its relative name where it can; INCLUDE statements are adapted where
     they would no longer find their file. The files that were read are never written to.
+
+    Parameters
+    ----------
+    home : folder the files are moved to afterwards, where that is not the one of ``path``
 
     Raises
     ------
@@ -31,15 +37,17 @@ def write_deck(deck: Deck, path: Path | str, changes: Sequence[Change]) -> Path:
         If a change names a card or field that does not exist.
     """
     path = Path(path)
-    if path.resolve() in {s.path.resolve() for s in deck.sources}:
-        raise FileError(f"{path} is a file the deck was read from; choose another name")
+    final = Path(home or path.parent) / path.name
+    if final.resolve() in {s.path.resolve() for s in deck.sources}:
+        raise FileError(f"{final} is a file the deck was read from; choose another name")
     edits = _edits(deck, changes)
-    places = _places(deck, path, set(edits))
+    places = _places(deck, final, set(edits))
     for k in sorted(places, reverse=True):
         source = deck.sources[k]
         new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
         text = _text(source, new, _footer(deck, changes) if k == 0 else [])
-        atomic(places[k], lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
+        target = path.parent / places[k].relative_to(final.parent)
+        atomic(target, lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
     return path
 
 

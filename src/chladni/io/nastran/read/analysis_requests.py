@@ -15,6 +15,8 @@ _LEFT_OUT = {
     "TEMPD": "temperatures",
     "TLOAD1": "loads in time", "TLOAD2": "loads in time", "ACCEL": "acceleration fields",
     "ACCEL1": "acceleration fields", "FORCE2": "forces along a cross product",
+    "MOMENT2": "moments along a cross product", "DEFORM": "deformations", "SUPORT": "rigid motions",
+    "SUPORT1": "rigid motions", "MDLPRM": "choices of element formulations",
     "OMIT": "static reduction", "OMIT1": "static reduction", "ASET": "static reduction",
     "ASET1": "static reduction", "TABLED4": "power-series tables",
     "PBUSHT": "stiffness and damping that follow the frequency",
@@ -29,7 +31,7 @@ _OUTPUT = frozenset(  # what is printed, plotted or written
     SPCGEN OUNIT1 OUNIT2 PDRMSG PDRG OIBULK""".split()
 )
 STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the frequency
-    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT",
+    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT", "MDLPRM",
 )  # fmt: skip
 
 

@@ -127,6 +127,9 @@ def _ptube(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSecti
     wall = float(card.reals(4, 0.0)[0]) or outer
     if not 0 < wall <= outer:
         raise card.refuse(0, f"a wall of {wall:g} does not fit a tube of radius {outer:g}")
+    second = float(card.reals(6, 0.0)[0])
+    if second not in (0.0, 2 * outer):
+        raise card.refuse(0, f"a tapered tube (OD2 = {second:g}) is not supported")
     p = tube(outer, outer - wall)
     nsm = float(card.reals(5, 0.0)[0])
     return _section(ctx, materials, card, (p.area, 0.0, 0.0, 0.0, p.J), (0.0, 0.0), nsm, "rod")

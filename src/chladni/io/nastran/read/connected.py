@@ -56,6 +56,7 @@ def refuse_loose(model: Assembly, source: str) -> None:
         Naming the loose component's parts and one of its grids.
     """
     label = components(model)
+    _refuse_loose_masses(model, label, source)
     stiff = _with_elements(model, label)
     if len(stiff) < 2:
         return
@@ -67,6 +68,24 @@ def refuse_loose(model: Assembly, source: str) -> None:
                 f"{source}: {_names(model, points)} hangs on nothing: {len(points)} points, "
                 f"grid {model.ids[points[0]]} among them, are joined to neither "
                 f"{_names(model, np.flatnonzero(label == stiff[0]))} nor a support"
+            )
+
+
+def _refuse_loose_masses(model: Assembly, label: np.ndarray, source: str) -> None:
+    """Refuse a mass on a grid that nothing joins to anything: it would weigh and not vibrate."""
+    count = np.bincount(label, minlength=label.max(initial=0) + 1)
+    grounded = {row for row, c in model.supports.tolist() if c <= 3} | {
+        int(row)
+        for joints in (model.springs, model.bushes, model.scalar_masses)
+        for row in joints.nodes[(joints.nodes < 0).any(axis=1)].max(axis=1, initial=-1)
+    }
+    if len(count) < 2:
+        return
+    for id, row in zip(model.masses.ids.tolist(), model.masses.node.tolist(), strict=True):
+        if count[label[row]] == 1 and row not in grounded:
+            raise ModelError(
+                f"{source}: mass {id} is on grid {model.ids[row]}, which nothing joins to the "
+                "rest; take it out or tie it"
             )
 
 

@@ -148,6 +148,11 @@ def _points(deck: Deck, scale: Scale, frames: Frames, cp: int, cd: int) -> Conte
     ids = grid.unique()
     if np.any(bad := ids <= 0):
         raise grid.refuse(int(np.argmax(bad)), "a grid's id is a positive integer")
+    if np.any(other := grid.integers(8, 0) != 0) and "SEID" not in deck.allowed:
+        why = (
+            "SEID puts it into a superelement, which is not supported; take it out, or --allow SEID"
+        )
+        raise grid.refuse(int(np.argmax(other)), why)
     places = _places(grid, frames, grid.integers(2, cp))
     axes = _axes(grid, frames, grid.integers(6, cd), places)
     spoints = _spoints(deck, ids)
@@ -204,8 +209,16 @@ def _spoints(deck: Deck, grids: np.ndarray) -> np.ndarray:
     return ids
 
 
-def id_list(cards: Cards, i: int, first: int) -> list[int]:
-    """Ids in fields ``first``... of card i: THRU, BY and EXCEPT spelled out."""
+_LONGEST = 1_000_000  # ids that a THRU may stand for
+
+
+def id_list(cards: Cards, i: int, first: int, among: np.ndarray | None = None) -> list[int]:
+    """Ids in fields ``first``... of card i: THRU, BY and EXCEPT spelled out.
+
+    Parameters
+    ----------
+    among : (n,) increasing ids; of a THRU those alone count
+    """
     words = [w for w in cards.fields(i)[first - 1 :] if w]
     out: list[int] = []
     last = k = 0  # where the latest THRU ends, while EXCEPT is at work
@@ -215,9 +228,7 @@ def id_list(cards: Cards, i: int, first: int) -> list[int]:
             if k + 3 < len(words) and words[k + 2] == "BY":
                 step = max(_whole(cards, i, words[k + 3]), 1)
                 k += 2
-            if last - out[-1] > 50_000_000:
-                raise cards.refuse(i, f"the range {out[-1]} THRU {last} is too long")
-            out.extend(range(out[-1] + step, last + 1, step))
+            out += _run(cards, i, range(out[-1] + step, last + 1, step), among)
             k += 2
         elif words[k] == "EXCEPT" and last:
             k += 1
@@ -229,6 +240,17 @@ def id_list(cards: Cards, i: int, first: int) -> list[int]:
             out.append(_whole(cards, i, words[k]))
             k += 1
     return out
+
+
+def _run(cards: Cards, i: int, ids: range, among: np.ndarray | None) -> list[int]:
+    """The ids of a THRU."""
+    if among is not None and ids:
+        low, high = np.searchsorted(among, [ids[0], ids[-1] + 1])
+        return [id for id in among[low:high].tolist() if id in ids]
+    if len(ids) > _LONGEST:
+        said = f"the range {ids[0]} THRU {ids[-1]} stands for {len(ids)} ids"
+        raise cards.refuse(i, f"{said}, more than {_LONGEST}")
+    return list(ids)
 
 
 def _whole(cards: Cards, i: int, word: str) -> int:

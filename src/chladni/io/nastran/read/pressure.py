@@ -121,7 +121,7 @@ def _pload2(
 ) -> Iterator[Nodal]:
     """PLOAD2: SID P EID1 EID2... or THRU: along the normals of shells."""
     p = cards.real(i, 2) * unit
-    ids = id_list(cards, i, 3)
+    ids = id_list(cards, i, 3, np.array(sorted(elements)))
     if "THRU" in cards.fields(i):
         ids = [e for e in ids if e in elements]
     for id in ids:
@@ -138,7 +138,8 @@ def _pload4(
     sid, first = cards.integer(i, 1), cards.integer(i, 2)
     card, ids, marks = cards.single(i), [first], (0, 0)
     if cards.word(i, 7) == "THRU":
-        ids = [e for e in range(first, cards.integer(i, 8) + 1) if e in elements or e == first]
+        past = cards.integer(i, 8) + 1
+        ids = [first, *sorted(e for e in elements if first < e < past)]
     else:
         marks = (cards.integer(i, 7, 0), cards.integer(i, 8, 0))
     p = card.block(3, 4, np.nan)[0] * unit

@@ -90,8 +90,8 @@ def _terms(
         k += 2
         while k < len(words) and not _is_real(words[k]):
             if words[k] == "THRU" and k + 1 < len(words):
-                first, last = int(words[k - 1]), int(words[k + 1])
-                for g in range(first + 1, min(last, first + 10_000_000) + 1):
+                first, last = (_integer(cards, i, words[j]) for j in (k - 1, k + 1))
+                for g in range(first + 1, last + 1):  # the first that is no grid is refused
                     yield ctx.row(cards, i, g), comps, weight
                 k += 2
                 continue

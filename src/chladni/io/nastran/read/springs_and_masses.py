@@ -115,7 +115,13 @@ def scalar_masses(ctx: Context) -> Scalars:
     """CMASS1 to CMASS4."""
     s = ctx.scale
     names = ("CMASS1", "CMASS2", "CMASS3", "CMASS4")
-    return _joined(_pairs(ctx, names, s.inertia * s.length**2, damped=False))
+    made = _joined(_pairs(ctx, names, s.inertia * s.length**2, damped=False))
+    if np.any(negative := made.value < 0):
+        id = made.ids[negative][0]
+        cards = next(c for c in ctx.deck.present(*names) if id in c.integers(1))
+        i = int(np.argmax(cards.integers(1) == id))
+        raise cards.refuse(i, "its mass is negative, which no structure has")
+    return made
 
 
 def masses(ctx: Context) -> Masses:
@@ -217,6 +223,8 @@ def _pbush(ctx: Context) -> dict[int, dict[str, np.ndarray]]:
                 key = words[k - 1]
                 if key not in ("K", "B", "GE", "RCV", "M", "T", "", "ALPHA", "TREF", "COINL"):
                     raise card.refuse(0, f"{key!r} is not one of K, B, GE, RCV, M")
+                if key == "M" and card.block(k + 1, 1, 0.0).any():
+                    raise card.refuse(0, "a mass M is not supported; write it as a CONM2")
                 if key in ("K", "B", "GE"):
                     rows[key] = _stiffest(card, k)
             if "GE" in rows and np.count_nonzero(rows["GE"]) == 1 and rows["GE"][0]:

@@ -124,7 +124,7 @@ def _spc1(ctx: Context, sets: tuple[int, ...]) -> Iterator[np.ndarray]:
     """SPC1: SID C G1 G2..., or G1 THRU G2, which passes over grids that do not exist."""
     for cards in ctx.deck.present("SPC1"):
         for i in np.flatnonzero(np.isin(cards.integers(1), sets)).tolist():
-            ids = np.unique(np.array(id_list(cards, i, 3), np.int64))
+            ids = np.unique(np.array(id_list(cards, i, 3, ctx.ids), np.int64))
             if b"THRU" in cards.text[cards.start[i] : cards.start[i + 1]]:
                 ids = ids[np.isin(ids, ctx.ids)]
             rows = np.array([ctx.row(cards, i, g) for g in ids.tolist()], np.int64)

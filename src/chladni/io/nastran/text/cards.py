@@ -1,4 +1,4 @@
-"""What the fields of a card are called, which cards are understood, which may be ignored."""
+"""What the fields of a card are called: the cards that are understood."""
 
 from typing import Final
 
@@ -102,29 +102,6 @@ _NAMES: Final = {
 }
 
 FIELDS: Final = {name: tuple(text.split()) for name, text in _NAMES.items()}
-
-# Names that begin as elements do but hold neither stiffness nor mass.
-_HARMLESS_C: Final = frozenset(
-    """CORD1R CORD1C CORD1S CORD2R CORD2C CORD2S CORD3G CORD3R CREEP CSET CSET1 CSUPEXT CYAX CYJOIN
-    CYSUP CYSYM CHBDYE CHBDYG CHBDYP CONV CONVM CLOAD CBARAO CMSMETH CSSCHD CAERO1 CAERO2 CAERO3
-    CAERO4 CAERO5 CAMPBLL CNTCTPR CNGRNT CHECKEL CPLSTN CMETHOD CONTRLT CSCHD""".split()
-)
-# Others that stiffen, weigh or tie.
-_CARRIERS: Final = frozenset(
-    "GENEL RSPLINE RTRPLT1 RJOINT RSSCON RBE2GS RBE2F BLSEG BCTABLE BGSET BCTSET BGADD".split()
-)
-
-
-def carries(name: str) -> bool:
-    """True for a card nothing here understands that would change stiffness, mass or ties.
-
-    >>> carries("CWELD"), carries("CQUAD4"), carries("CORD2R"), carries("MDLPRM")
-    (True, False, False, False)
-    """
-    if name in FIELDS or name in _HARMLESS_C or name in LEGACY:
-        return False
-    return name in _CARRIERS or (name[:1] == "C" and name.isalnum() and len(name) > 2)
-
 
 # Cards of the public-domain COSMIC release, read as their present-day kin.
 LEGACY: Final = frozenset(

@@ -13,7 +13,7 @@ _SOLUTIONS: Final = {
     "SEDCEIG": 107, "SEMCEIG": 110, "SEDTRAN": 109, "SEMTRAN": 112,
 }  # fmt: skip
 _COSMIC: Final = {1: 101, 3: 103, 8: 108, 11: 111}
-_SELECTS: Final = {
+SELECTS: Final = {
     "SPC": "SPC", "MPC": "MPC", "LOAD": "LOAD", "METHOD": "METHOD", "METH": "METHOD",
     "FREQ": "FREQ", "FREQUENCY": "FREQ", "FREQUENC": "FREQ", "DLOAD": "DLOAD",
     "SDAMP": "SDAMP", "SDAMPING": "SDAMP", "SUPORT1": "SUPORT", "SUPORT": "SUPORT",
@@ -68,6 +68,8 @@ def case_control(lines: Iterable[str], sections: bool) -> CaseControl:
         elif found := _PARAM.match(text):
             parameters[found[1].upper()] = found[2].upper()
         elif found := _COMMAND.match(text.upper()):
+            if found[1] == "AUTOSPC":
+                parameters["AUTOSPC"] = found[2]
             (current or common).add(found[1], found[2], sets)
     made = [case.over(common) for case in cases] or [common.over(_Case(0))]
     return CaseControl(sol, tuple(made) if sections else (), sections, parameters)
@@ -85,7 +87,7 @@ class _Case:
 
     def add(self, command: str, value: str, sets: dict[int, tuple[tuple[int, int], ...]]) -> None:
         """Keep a selection, a request for motion; anything else is other output."""
-        name = _SELECTS.get(command)
+        name = SELECTS.get(command)
         if command == "RESVEC":
             self.residual = value not in ("NO", "NOSYSTEM")
         elif command[:4] in _OUTPUTS:

@@ -1,5 +1,6 @@
 """Nastran decks, read whole and without loss: small, large and free fields, includes, comments."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -7,11 +8,15 @@ from pathlib import Path
 
 from ....errors import FileError
 from .card_layout import BOM, tables
-from .cards import carries
-from .case_control import CaseControl, case_control
+from .case_control import SELECTS, CaseControl, case_control
+from .known_cards import refusal
+from .known_commands import unknown
+from .numbers import parse_real
 from .part_names import part_names
 from .source_files import Source, sources
 from .table import Cards, empty, joined
+
+SCALED = frozenset("CB1 CB2 CK1 CK2 CK3 CM1 CM2".split())  # PARAM that scale whole matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +48,13 @@ def read_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
     Parameters
     ----------
     path : the deck, or a file of bulk data alone
-    allow : names of cards to pass over although they carry stiffness or mass ("CWELD", ...)
+    allow : names of cards and commands to pass over whatever they carry ("CWELD", ...)
 
     Raises
     ------
     FileError
-        Naming file, line and offender: missing files, broken continuations, cards that carry
-        stiffness or mass and are not understood.
+        Naming file, line and offender: missing files, broken continuations, cards and commands of
+        the case control that are not known to leave the structure as it is.
     """
     path = Path(path)
     files = sources(path)
@@ -58,6 +63,7 @@ def read_deck(path: Path | str, allow: Sequence[str] = ()) -> Deck:
         raise FileError(f"{path} holds no bulk data")
     deck = Deck(path, files, cards, _case(files), _names(files), tuple(a.upper() for a in allow))
     _refuse_unknown(deck)
+    _refuse_commands(deck)
     return deck
 
 
@@ -79,12 +85,17 @@ def _case(files: tuple[Source, ...]) -> CaseControl:
     """Case control of the main file, its own includes read in place."""
     main = files[0]
     first, _ = main.bulk
-    text = [line.removeprefix(BOM).decode("latin-1") for line in main.lines[: max(first, 0)]]
+    text = _above_bulk(main)
     for include in reversed(main.includes):
         target = main.path.parent / include.name
         if include.past <= first and target.is_file():
             text[include.first : include.past] = target.read_text("latin-1").splitlines()
     return case_control(text, sections=first > 0)
+
+
+def _above_bulk(main: Source) -> list[str]:
+    """Executive and case control."""
+    return [t.removeprefix(BOM).decode("latin-1") for t in main.lines[: max(main.bulk[0], 0)]]
 
 
 def _names(files: tuple[Source, ...]) -> dict[int, str]:
@@ -93,17 +104,23 @@ def _names(files: tuple[Source, ...]) -> dict[int, str]:
         lines = islice(source.lines, *source.bulk)
         wanted = (t for t in lines if t[:1] in (b"$", b"P", b"p"))
         found.update(part_names(t.decode("utf-8", "replace").rstrip() for t in wanted))
-    return found
+    count = Counter(found.values())
+    return {id: name if count[name] == 1 else f"{name} ({id})" for id, name in found.items()}
 
 
 def _refuse_unknown(deck: Deck) -> None:
     """Refuse what would be left out of stiffness, mass or ties without anybody noticing."""
     for name, table in deck.cards.items():
-        if carries(name) and name not in deck.allowed:
-            raise FileError(
-                f"{table.where(0)}: {name} (of which there are {len(table)}) carries stiffness, "
-                f"mass or a tie and is not understood; take it out or allow it: --allow {name}"
-            )
+        if name not in deck.allowed and (why := refusal(name, len(table))):
+            raise FileError(f"{table.where(0)}: {why}{_allowing(name)}")
+    parameters = deck["PARAM"]
+    for i, word in enumerate(parameters.words(1).tolist()):
+        name, value = word.decode("latin-1"), parse_real(parameters.word(i, 2))
+        if name in SCALED and value != 1.0 and name not in deck.allowed:
+            raise parameters.refuse(i, f"{name} scales a matrix{_allowing(name)}")
+    for name in sorted(SCALED & deck.case.parameters.keys() - {*deck.allowed}):
+        if parse_real(deck.case.parameters[name]) != 1.0:
+            raise FileError(f"{deck.path}: PARAM,{name} scales a matrix{_allowing(name)}")
     chosen = {m for case in deck.case.subcases for m in case.matrices.items()}
     if chosen and "DMIG" not in deck.allowed:
         name, matrix = sorted(chosen)[0]
@@ -111,3 +128,23 @@ def _refuse_unknown(deck: Deck) -> None:
             f"{deck.path}: the case control selects {name} = {matrix}; direct input "
             "matrices (DMIG) are not understood; allow it: --allow DMIG"
         )
+
+
+def _refuse_commands(deck: Deck) -> None:
+    """Refuse what of the case control might choose other supports, masses or joints."""
+    main = deck.sources[0]
+    text = [line.split("$")[0] for line in _above_bulk(main)]
+    for include in main.includes:
+        if include.past <= main.bulk[0]:
+            text[include.first : include.past] = [""] * (include.past - include.first)
+    for k, name, near in unknown(text, SELECTS):
+        if name not in deck.allowed:
+            meant = f"; is {near} meant?" if near else ""
+            raise FileError(
+                f"{main.path}:{k + 1}: the command {name} of the case control is not understood "
+                f"and may change the structure{meant}{_allowing(name)}"
+            )
+
+
+def _allowing(name: str) -> str:
+    return f'; take it out or allow it: [model] allow = ["{name}"] of a case, --allow {name}'

@@ -7,11 +7,15 @@ from itertools import accumulate
 from pathlib import Path
 
 from ....errors import FileError
+from ...file_size import refuse_large
 
 _INCLUDE = re.compile(rb"^[ \t]*include(?=[ \t'\"]|$)", re.IGNORECASE | re.MULTILINE)
 _BEGIN = re.compile(rb"^[ \t]*BEGIN\b[ \t,]*(BULK|SUPER|AUXMODEL)?[^\r\n$]*", re.I | re.M)
 _CEND = re.compile(rb"^[ \t]*CEND\b", re.I | re.M)
 _ENDDATA = re.compile(rb"^[ \t]*ENDDATA", re.I | re.M)
+
+
+_DEEPEST = 100  # files that include one another
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,10 @@ def _read(path: Path, asked: str) -> bytes:
     """The bytes of a text file, or one sentence about why not."""
     if path.is_dir():
         raise FileError(f"{asked}{path} is a folder, not a deck")
+    if path.exists() and not path.is_file():
+        raise FileError(f"{asked}{path} is a device or a pipe, not a file")
     try:
+        refuse_large(path)
         data = path.read_bytes()
     except OSError as error:
         raise FileError(f"{asked}{path} cannot be read: {error.strerror}") from None
@@ -57,11 +64,16 @@ def _read(path: Path, asked: str) -> bytes:
 
 def _load(path: Path, above: tuple[Path, ...], found: list[Source | None], asked: str) -> int:
     """Read one file and its includes into ``found``; its position there."""
-    here = path.resolve()
+    try:
+        here = path.resolve()
+    except (OSError, RuntimeError):  # links that lead round in a circle
+        raise FileError(f"{asked}{path} cannot be read: too many links") from None
     if here in above:
         raise FileError(f"{asked}{path} includes itself, by way of {above[-1].name}")
     if len(found) > 5000:
         raise FileError(f"{asked}more than 5000 included files")
+    if len(above) > _DEEPEST:
+        raise FileError(f"{asked}includes are nested more than {_DEEPEST} deep")
     data = _read(path, asked)
     lines = data.splitlines(keepends=True)
     starts = [0, *accumulate(map(len, lines))]

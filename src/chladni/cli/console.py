@@ -1,0 +1,174 @@
+"""What a command says, to the terminal and if asked to a log; a reader may leave at any time."""
+
+import os
+import sys
+import threading
+import time
+import unicodedata
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import IO
+
+import typer
+
+from ..errors import FileError
+from ..progress import Progress, terminal
+from ..report.blocks import Table
+
+QUIET = 10.0  # seconds after which a run without a terminal says what it does
+AGAIN = 60.0  # and how often from then on
+ROWS = 24  # of a table on the terminal; the page has them all
+_CELL = 40  # characters
+
+
+@dataclass
+class Console:
+    """Where lines go beside standard output.
+
+    Attributes
+    ----------
+    verbose : every stage, note and warning on standard error
+    log : the same and all that was said, with the time, in a file
+    """
+
+    verbose: bool = False
+    log: IO[str] | None = None
+    begun: float = field(default_factory=time.monotonic)
+
+    def aside(self, text: str) -> None:
+        """A line for who wants to know more."""
+        if self.verbose:
+            _echo(f"[{time.monotonic() - self.begun:.1f} s] {text}", True)
+        self.logged(text)
+
+    def logged(self, text: str) -> None:
+        """A line of the log."""
+        if self.log is not None:
+            self.log.write(f"{datetime.now().isoformat(timespec='seconds')} {plain_line(text)}\n")
+            self.log.flush()
+
+
+_used: list[Console] = [Console()]  # the last one speaks
+
+
+@contextmanager
+def opened_console(verbose: bool = False, log: Path | None = None) -> Iterator[Console]:
+    """The console of a command; warnings of libraries go aside.
+
+    Raises
+    ------
+    FileError
+        If the log cannot be written.
+    """
+    try:
+        file = None if log is None else log.open("a", encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise FileError(f"--log {log} cannot be written: {error.strerror}") from error
+    one = Console(verbose, file)
+    _used.append(one)
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, category, *_, **__: one.aside(
+                f"{category.__name__}: {message}"
+            )
+            yield one
+    finally:
+        _used.pop()
+        if file is not None:
+            file.close()
+
+
+def console() -> Console:
+    """The one that speaks."""
+    return _used[-1]
+
+
+def say(text: str, error: bool = False) -> None:
+    """A line on standard output or standard error, and in the log."""
+    console().logged(text)
+    _echo(plain_line(text), error)
+
+
+def _echo(text: str, error: bool) -> None:
+    try:
+        typer.echo(text, err=error)
+    except BrokenPipeError:  # as of `| head`: who reads has gone, the work goes on
+        stream = sys.stderr if error else sys.stdout
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def plain_line(text: str) -> str:
+    """Text without what would steer a terminal: names in files may hold anything.
+
+    >>> plain_line("a" + chr(27) + "[31mb")
+    'a?[31mb'
+    """
+    return "".join("?" if _steers(c) else c for c in text)
+
+
+def _steers(c: str) -> bool:
+    return c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cf", "Cs")
+
+
+def say_table(table: Table) -> None:
+    """A table in columns, its first rows where it is long."""
+    for line in table_lines(table):
+        say(line)
+
+
+def table_lines(table: Table, most: int = ROWS) -> list[str]:
+    """The lines of a table: words to the left, numbers to the right.
+
+    >>> table_lines(Table(("mode", "Hz"), [("1", "5.2"), ("2", "11.4")]))
+    ['mode    Hz', '   1   5.2', '   2  11.4']
+    """
+    shown = [tuple(table.columns), *(tuple(row) for row in table.rows[:most])]
+    cells = [[_cell(text) for text in row] for row in shown]
+    width = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    left = [name in table.words for name in table.columns]
+    lines = ["  ".join(_aligned(row, width, left)).rstrip() for row in cells]
+    if (more := len(table.rows) - most) > 0:
+        lines.append(f"... {more} more rows in report.html")
+    return lines
+
+
+def _cell(text: object) -> str:
+    said = " ".join(str(text).split())
+    return said if len(said) <= _CELL else f"{said[: _CELL - 3]}..."
+
+
+def _aligned(row: Sequence[str], width: Sequence[int], left: Sequence[bool]) -> Iterator[str]:
+    for text, n, is_word in zip(row, width, left, strict=True):
+        yield text.ljust(n) if is_word else text.rjust(n)
+
+
+@contextmanager
+def watched() -> Iterator[Progress]:
+    """Progress: a bar on a terminal; elsewhere a line now and then once it takes long."""
+    stage = [("at work", 0.0)]
+    one, done = console(), threading.Event()
+
+    def told(what: str, fraction: float) -> None:
+        if what != stage[0][0]:
+            one.aside(what)
+        stage[0] = (what, fraction)
+        bar(what, fraction)
+
+    def speak() -> None:
+        wait = QUIET
+        while not done.wait(wait):
+            spent, wait = time.monotonic() - one.begun, AGAIN
+            what, fraction = stage[0]
+            _echo(f"[{spent:.0f} s] {what}, {100 * fraction:.0f} %", True)
+
+    with terminal() as bar:
+        if not sys.stderr.isatty() and not one.verbose:
+            threading.Thread(target=speak, daemon=True).start()
+        try:
+            yield told
+        finally:
+            done.set()

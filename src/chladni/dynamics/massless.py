@@ -1,0 +1,54 @@
+"""Static solutions of structures a part of which can move without stiffness and without mass."""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import ModelError
+from ..sparse.factor import factorise
+from ..sparse.multifrontal import NotDefinite
+from .system import System
+
+_STIFFENED = 1e-13  # of K_ii, added where a motion has neither stiffness nor mass
+_DRIVEN = 1e-3  # of the work of a load, done on that addition: the load drives such a motion
+
+
+def stiffened(K: sp.csr_array) -> sp.csr_array:
+    """K + ε diag K: a motion without stiffness and mass is held, all others keep their digits.
+
+    Nastran's MECHFIX holds such massless mechanisms as well: a bar that turns about itself
+    between two points without inertia.
+    """
+    return sp.csr_array(K + _STIFFENED * sp.diags_array(K.diagonal()))
+
+
+def static_solver(
+    system: System, sigma: float, points: np.ndarray | None = None
+) -> Callable[[np.ndarray], np.ndarray]:
+    """X = (K - σM)⁻¹ B for columns B (n, k), σ < 0; massless mechanisms are held.
+
+    Raises
+    ------
+    ModelError
+        If something hangs on nothing, or a column of B drives a motion that nothing resists.
+    """
+    K, M, nodes = sp.csr_array(system.K.real), system.M, system.dofs[:, 0]
+    try:
+        return factorise(K - sigma * M, points, nodes=nodes).solve
+    except NotDefinite:
+        held = stiffened(K)
+        factor = factorise(held - sigma * M, points, nodes=nodes)
+
+    def solve(B: np.ndarray) -> np.ndarray:
+        X = factor.solve(B)
+        extra = np.einsum("nk,nk->k", X, (held - K) @ X)
+        work = np.abs(np.einsum("nk,nk->k", X, B))
+        if np.any(extra > _DRIVEN * work):
+            raise ModelError(
+                "a load drives a motion that has neither stiffness nor mass, as a bar without "
+                "inertia about its axis can turn; hold it, give it inertia, or drive another way"
+            )
+        return X
+
+    return solve

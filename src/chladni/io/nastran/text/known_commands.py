@@ -1,0 +1,56 @@
+"""Commands of the case control that may be passed over; any other may choose another structure.
+
+MSC Nastran Quick Reference Guide, section 5. A command is known by its first four letters.
+"""
+
+import difflib
+import re
+from collections.abc import Collection, Iterable, Iterator
+from typing import Final
+
+_ACTED_UPON: Final = "SET PARAM SUBCASE SUBCOM SUBSEQ SYM SYMCOM REPCASE AUTOSPC RESVEC".split()
+_EXECUTIVE: Final = """ID SOL TIME APP DIAG CEND ENDALTER ALTER COMPILE LINK MALTER ECHO INCLUDE
+    INIT ASSIGN NASTRAN UNIT CHKPNT RESTART BEGIN GEOMCHECK MODEL_CHECK ENDJOB FMSINSERT ACQUIRE
+    DBLOCATE DBKEYS EXPAND MEMLIST PROJ RFINCLUDE CONNECT DEFINE DBLOAD DBUNLOAD
+    ATTACH DATABASE""".split()
+_TITLES: Final = """TITLE SUBTITLE LABEL PLOTID TCURVE XTITLE YTITLE YTTITLE YBTITLE""".split()
+_REQUESTS: Final = """ACCELERATION DISPLACEMENT VELOCITY VECTOR SVECTOR SDISPLACEMENT SVELOCITY
+    SACCELERATION NLLOAD OLOAD SPCFORCES MPCFORCES GPFORCE GPKE GPSTRESS GPSTRAIN GPSDCON STRESS
+    STRAIN STRFIELD STRN ELSTRESS ELSTRAIN ELFORCE ELSDCON ELSUM FORCE NLSTRESS NOUTPUT ESE EKE EDE
+    EQUILIBRIUM GROUNDCHECK WEIGHTCHECK MEFFMASS MCFRACTION MODALKE MODALSE MAXLINES MAXMIN LINE
+    PAGE ECHO ECHOON ECHOOFF SKIP SKIPON SKIPOFF OUTPUT OFREQUENCY OMODES OTIME OUTRCV DATAREC
+    EXTSEOUT POST PRESSURE FLUX THERMAL ENTHALPY HDOT HOUTPUT VOLUME SURFACE VUGRID BOUTPUT
+    CSCALE XYPLOT XYPRINT XYPUNCH XYPEAK XGRID YGRID XAXIS YAXIS CAMERA PLOTTER FIND PLOT""".split()
+_OTHER_ANALYSES: Final = """ANALYSIS CMETHOD FMETHOD SMETHOD RANDOM TSTEP TSTEPNL NLPARM NLSTEP IC
+    NONLINEAR TRIM DIVERG GUST AUXCASE DESOBJ DESSUB DESGLB DESVAR DSAPRT SENSITY TEMPERATURE BC
+    MODES RIGID TERM SUPER SEALL SEDR SEDV SEEXCLUDE SEFINAL SEKREDUCE SELGENERATE SELREDUCE
+    SEMGENERATE SEMREDUCE SERESP AESYMXY AESYMXZ AECONFIG ADAPT ENDCASE MASTER END""".split()
+_FIRST_FOUR: Final = frozenset(
+    name[:4]
+    for name in (*_ACTED_UPON, *_EXECUTIVE, *_TITLES, *_REQUESTS, *_OTHER_ANALYSES)
+)  # fmt: skip
+_WORD = re.compile(r"^\s*([A-Z]\w*)", re.I)
+_PLOTS = re.compile(r"^\s*OUTPUT\s*\(\s*(XY|PLOT|POST|CARDS)", re.I)
+
+
+def unknown(lines: Iterable[str], selects: Collection[str]) -> Iterator[tuple[int, str, str]]:
+    """(line from 0, command, the one it resembles or '') of what stands below CEND.
+
+    Parameters
+    ----------
+    lines : of the file above BEGIN BULK, without comments
+    selects : commands that select what is in the bulk data
+    """
+    texts = list(lines)
+    heads = [(_WORD.match(text) or [""])[0].strip().upper() for text in texts]
+    below = heads.index("CEND") + 1 if "CEND" in heads else 0
+    goes_on = False
+    for k in range(below, len(texts)):
+        if _PLOTS.match(texts[k]):
+            return  # the language of plots, to the end
+        word, inside = heads[k], goes_on
+        goes_on = texts[k].rstrip().endswith(",")
+        if inside or not word or word in selects or word[:4] in _FIRST_FOUR:
+            continue
+        near = difflib.get_close_matches(word, sorted(selects), 1, 0.6)
+        yield k, word, near[0] if near else ""

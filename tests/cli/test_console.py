@@ -1,0 +1,166 @@
+"""What a command says, where to; how it ends when it is ended, and what it leaves."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from chladni.cli import console
+from chladni.cli.app import application, guarded
+from chladni.cli.console import opened_console, plain_line, say, table_lines, watched
+from chladni.errors import FileError, Interrupted
+from chladni.output import run_folder, write_text
+from chladni.report.blocks import Table
+
+from .test_cli import OSCILLATOR
+
+
+@pytest.fixture
+def deck(tmp_path):
+    path = tmp_path / "one.bdf"
+    path.write_text(OSCILLATOR)
+    return path
+
+
+def call(*words):
+    return CliRunner().invoke(application(), [str(w) for w in words])
+
+
+def code_of(command):
+    with pytest.raises(typer.Exit) as caught:
+        guarded(command)()
+    return caught.value.exit_code
+
+
+def test_tables_are_said_with_all_their_numbers():
+    table = Table(("part", "Hz"), [("a", "1.5"), ("longer", "22")], words=("part",))
+    assert table_lines(table) == ["part     Hz", "a       1.5", "longer   22"]
+    rows = [(str(k), "1") for k in range(60)]
+    lines = table_lines(Table(("mode", "Hz"), rows), most=10)
+    assert len(lines) == 12
+    assert lines[-1] == "... 50 more rows in report.html"
+
+
+def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
+    log, out = tmp_path / "run.log", tmp_path / "out"
+    plain = call("modes", deck, "--out", out)
+    done = call("modes", deck, "--verbose", "--log", log, "--out", out)
+    assert done.exit_code == plain.exit_code == 0
+    assert plain.stderr == ""
+    assert "reading the model" in done.stderr
+    assert done.stdout == plain.stdout
+    text = log.read_text()
+    assert all(line in text for line in plain.stdout.splitlines() if line)
+    assert "reading the model" in text
+    refused = call("modes", tmp_path / "none.bdf", "--log", log)
+    assert refused.stderr.strip() in log.read_text()  # the log goes on, and holds the sentence
+
+
+def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
+    done = call("modes", deck, "--log", tmp_path / "no" / "folder.log", "--out", tmp_path / "o")
+    assert done.exit_code == 2
+    assert done.stderr.startswith("chladni: --log ")
+    assert not (tmp_path / "o").exists()
+
+
+def test_warnings_of_libraries_go_aside(capsys, tmp_path):
+    with opened_console(log=tmp_path / "log"), warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.warn("divide by zero", RuntimeWarning, stacklevel=1)
+    assert capsys.readouterr() == ("", "")
+    assert "RuntimeWarning: divide by zero" in (tmp_path / "log").read_text()
+
+
+def test_a_long_run_without_a_terminal_says_what_it_does(monkeypatch, capfd):
+    monkeypatch.setattr(console, "QUIET", 0.05)
+    monkeypatch.setattr(console, "AGAIN", 60.0)
+    with opened_console(), watched() as progress:
+        progress("modes of 12 dofs", 0.25)
+        time.sleep(0.5)
+    said = capfd.readouterr().err
+    assert "modes of 12 dofs, 25 %" in said
+    assert said.count("\n") == 1
+
+
+def test_nothing_in_a_file_steers_the_terminal(capsys):
+    say("\x1b[31mred\x07 \u202eright to left\tkept")
+    assert capsys.readouterr().out == "?[31mred? ?right to left\tkept\n"
+    assert plain_line("Ärger µm² – “q”") == "Ärger µm² – “q”"
+
+
+def test_a_fault_of_ours_is_said_as_one(capsys):
+    def command():
+        raise KeyError("x")
+
+    assert code_of(command) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("chladni: a fault of chladni, not of its input: KeyError")
+    assert said.count("\n") == 1
+
+
+def test_sigterm_clears_up_and_says_what_is_kept(tmp_path, capsys):
+    def command():
+        with run_folder(tmp_path / "out", "modes") as part:
+            write_text(part / "half.txt", "half")
+            try:
+                os.kill(os.getpid(), signal.SIGTERM)
+                time.sleep(5)
+            except KeyboardInterrupt:
+                raise Interrupted("3 of 9 samples are kept") from None
+
+    before = signal.getsignal(signal.SIGTERM)
+    assert code_of(command) == 130
+    assert capsys.readouterr().err == "chladni: 3 of 9 samples are kept\n"
+    assert not (tmp_path / "out").exists()
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+MAIN = [sys.executable, "-m", "chladni"]
+
+
+def test_who_reads_may_leave(deck, tmp_path):
+    """As `| head -1` does: the results are written, and nobody speaks of a pipe."""
+    read, write = os.pipe()
+    os.close(read)
+    words = [*MAIN, "modes", str(deck), "--out", str(tmp_path / "out")]
+    done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out" / "modes.json").exists()
+
+
+def test_a_full_disk_is_a_sentence_and_the_earlier_results_stay(deck, tmp_path):
+    """The largest file allowed is smaller than a picture: a write fails half way."""
+    out = tmp_path / "out"
+    assert call("modes", deck, "--out", out).exit_code == 0
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+
+    def small() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+
+    words = [*MAIN, "modes", str(deck), "--count", "1", "--out", str(out)]
+    done = subprocess.run(words, capture_output=True, text=True, preexec_fn=small, check=False)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("chladni: ")
+    assert done.stderr.count("\n") == 1
+    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
+
+
+def test_a_place_that_cannot_be_written_is_a_sentence(deck):
+    """No user, root included, makes a folder in /proc."""
+    if not Path("/proc").is_dir():
+        pytest.skip("no /proc here")
+    done = call("modes", deck, "--out", "/proc/chladni")
+    assert done.exit_code == 2
+    assert done.stderr.startswith("chladni: /proc/chladni: ")
+    with pytest.raises(FileError), run_folder("/proc/self/task", "modes"):
+        pass

@@ -1,0 +1,73 @@
+"""Injured inputs end in a sentence or a result; what does not is called by its name and kept."""
+
+import sys
+
+import pytest
+
+import chladni_evidence.fuzz as fuzzing
+from chladni_evidence.__main__ import main
+from chladni_evidence.fuzz import DUE, fuzz, outcome
+from chladni_evidence.fuzz_inputs import KINDS, FuzzInput, fuzz_inputs
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs processes that fork")
+GOOD = "BEGIN BULK\nSPOINT,1\nCELAS4,1,1000.,1\nCMASS4,2,1.,1\nENDDATA\n"
+
+
+def test_fifty_injured_inputs(tmp_path):
+    """The same as the evidence run of ten thousand: python -m chladni_evidence fuzz."""
+    said = []
+    counts = fuzz(fuzz_inputs(50, 11, KINDS), tmp_path, said.append)
+    wrong = {n: c for count in counts.values() for n, c in count.items() if n not in DUE}
+    assert not wrong, said
+    assert sum(sum(count.values()) for count in counts.values()) == 50
+    assert sum(count["refused"] for count in counts.values()) > 10  # the injuries are felt
+
+
+def test_the_same_seed_makes_the_same_inputs():
+    first, again, other = (
+        [one.files for one in fuzz_inputs(12, seed, KINDS)] for seed in (1, 1, 2)
+    )
+    assert first == again
+    assert first != other
+
+
+def test_every_kind_is_made():
+    for kind in KINDS:
+        (one,) = fuzz_inputs(1, 3, [kind])
+        assert one.kind == kind
+
+
+BREAKS = {  # a command, put in the place of chladni, that breaks a rule
+    "traceback": "raise KeyError('x')",
+    "no sentence": "import sys; print('what?', file=sys.stderr); raise SystemExit(2)",
+    "noise": "import os; os.mkdir('out'); open('out/a','w'); import sys; sys.stderr.write('hm')",
+    "half-written": "import os, sys; os.mkdir('out'); sys.stderr.write('chladni: no'); sys.exit(2)",
+    "nothing written": "import os; os.mkdir('out')",
+    "programmer's words": "import sys; sys.stderr.write(\"chladni: ['a']\"); sys.exit(2)",
+    "ended by signal 11": "import os; os.kill(os.getpid(), 11)",
+    "hang": "while True: pass",
+    "memory": "",
+}
+
+
+@pytest.mark.parametrize("called", BREAKS)
+def test_what_breaks_a_rule_is_told_and_kept(called, tmp_path, monkeypatch):
+    import runpy
+
+    monkeypatch.setattr(runpy, "run_module", lambda *_, **__: exec(BREAKS[called]))
+    if called == "memory":
+        monkeypatch.setattr(fuzzing, "MEMORY", 1e6)
+    one = FuzzInput("deck", {"a.bdf": GOOD.encode()}, ("modes", "a.bdf"))
+    found = outcome(one, patience=1.0 if called == "hang" else 60.0)
+    assert (found.called, found.good) == (called, False)
+    if called == "traceback":
+        counts = fuzz([one], tmp_path, lambda text: None)
+        assert counts["deck"]["traceback"] == 1
+        (kept,) = (p for p in tmp_path.iterdir() if p.is_dir())
+        assert (kept / "a.bdf").read_text() == GOOD
+        assert (kept / "command.txt").read_text().startswith("chladni modes a.bdf --out out\n")
+
+
+def test_an_unknown_kind_is_refused(tmp_path, capsys):
+    assert main(["fuzz", "--kinds", "poem", "--out", str(tmp_path)]) == 2
+    assert "no kind poem; there are deck" in capsys.readouterr().err

@@ -1,0 +1,141 @@
+"""What is not known to leave the structure as it is is refused by name, unless it is allowed."""
+
+import pytest
+
+from chladni.errors import ChladniError, FileError
+from chladni.io.nastran import assembly, read_deck
+from chladni.io.nastran.read.analysis_requests import _LEFT_OUT
+from chladni.io.nastran.text.known_cards import refusal
+
+from .conftest import PLATE
+
+
+@pytest.mark.parametrize(
+    "card",
+    """NSM,5,PSHELL,101,1. NSM1,5,PSHELL,NSM,1. NSML1,5,PSHELL,NSM,1. NSMADD,5,1 RBAR1,9,1,3,123456
+    RBE22,9,1,123456,3 SPCC1,1,123456,1 MFLUID,1 MLIST,1 MATT1,5,7 SESET,1,2 BCTABLE,1 TF,1,1,1
+    BCPROP,1 SNORM,1 XYZ,4 CGAP,9,1,1,2""".split(),
+)
+def test_a_card_not_known_is_refused_unless_allowed(bulk, card):
+    name = card.partition(",")[0]
+    with pytest.raises(FileError, match=rf"deck.bdf:8: {name} .*--allow {name}$"):
+        bulk(f"{PLATE}{card}\n")
+    assert len(bulk(f"{PLATE}{card}\n", allow=(name.lower(),))[name]) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("SPCC1", "SPC1"), ("RBE22", "RBE2"), ("GRIDD", "GRID")]
+)
+def test_a_misspelt_card_is_told_what_is_meant(name, meant):
+    assert f"is {meant} meant?" in refusal(name, 1)
+
+
+def test_what_is_left_out_with_a_note_is_known():
+    assert not [name for name in _LEFT_OUT if refusal(name, 1)]
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("NSM = 5", "NSM"), ("SPCC = 1", "SPCC"), ("MFLUID = 1", "MFLUID"),
+        ("BCONTACT = 1", "BCONTACT"), ("STATSUB = 1", "STATSUB"), ("TFL = 3", "TFL"),
+        ("SUBCASE 1\n  LOADD = 3", "LOADD"), ("NOSUCH", "NOSUCH"),
+    ],
+)  # fmt: skip
+def test_a_command_not_known_is_refused_unless_allowed(bulk, line, name):
+    with pytest.raises(FileError, match=rf"deck.bdf:\d+: the command {name} .*--allow {name}$"):
+        bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n")
+    assert bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n", allow=(name,)).case.sol == 103
+
+
+def test_usual_commands_pass(bulk):
+    """Abbreviations, titles with anything, requests, plots to the end of the case control."""
+    text = """ASSIGN OUTPUT2 = 'a.op2'
+SOL 103
+CEND
+TITLE = SPCC = 1
+SUBTI = x
+LABEL = NSM = 4
+ECHO = NONE
+DISP(PLOT) = ALL
+SPCF = ALL
+ELFOR = ALL
+SET 1 = 1,
+  2, THRU, 4
+AUTOSPC(NOPRINT) = NO
+RIGID = LINEAR
+SUBCASE 1
+  ACCELER(SORT2) = 1
+OUTPUT(XYPLOT)
+XTITLE = f
+ANY NOISE = 1
+"""
+    deck = bulk(PLATE, before=text)
+    assert not assembly(deck).auto_spc  # as PARAM,AUTOSPC does
+
+
+@pytest.mark.parametrize("place", ["", "PARAM,CK1,2.0\n"])
+def test_parameters_that_scale_a_matrix_are_refused(bulk, place):
+    card = "" if place else "PARAM,CM1,2.\n"
+    with pytest.raises(FileError, match=r"scales a matrix.*--allow C[KM]1"):
+        bulk(PLATE + card, before=f"SOL 103\nCEND\n{place}")
+    assert bulk(f"{PLATE}PARAM,CM1,1.0\n")  # as it is without
+
+
+@pytest.mark.parametrize(
+    ("cards", "said"),
+    [
+        ("GRID,9,,1.,1.,1.,,,3\n", "GRID 9: SEID .*superelement"),
+        ("CTUBE,90,9,1,3\nPTUBE,9,5,2.,.2,,4.\n", r"PTUBE 9: a tapered tube \(OD2 = 4\)"),
+        ("CBUSH,90,9,1,3,,,,0\nPBUSH,9,M,5.\n", "PBUSH 9: a mass M is not supported"),
+        ("GRID,9,,1.,1.,1.\nCONM2,90,9,,3.\n", "mass 90 is on grid 9, which nothing joins"),
+        ("CMASS2,90,-1.,1,3\n", "CMASS2 90: its mass is negative"),
+        ("PMASS,9,-1.\nCMASS1,90,9,1,3\n", "CMASS1 90: its mass is negative"),
+        ("MAT8,7,1.,1.,.3\nPCOMP,7\n,7,1.\nCQUAD4,90,7,1,2,3,4\n", "MAT8 7: .*G12 0 are to be"),
+        ("RBE3,90,,1,123,1.,123,2,THRU\n", "RBE3 90: 'THRU' is not an integer"),
+        ("RBE3,90,,1,123,1.,123,2,THRU,x\n", "RBE3 90"),
+        ("SPOINT,100,THRU,40000000\n", "SPOINT 100: the range .* more than 1000000"),
+        ("RBE2,90,1,123,2,THRU,49000000\n", "RBE2 90: the range .* more than 1000000"),
+    ],
+)
+def test_fields_are_heeded_or_refused(bulk, cards, said):
+    with pytest.raises(ChladniError, match=said):
+        assembly(bulk(PLATE + cards))
+
+
+def test_a_long_range_of_supports_passes_over_what_is_not_there(bulk, work):
+    """Work follows the grids of the deck, not the numbers a THRU runs through."""
+
+    def held(last):
+        deck = bulk(f"{PLATE}SPC1,1,3,1,THRU,{last}\n", before="CEND\nSPC = 1\n")
+        return assembly(deck).supports
+
+    short, long = (work(lambda last=last: held(last)) for last in (4, 49_000_000))
+    assert len(held(49_000_000)) == 4
+    assert long < 1.1 * short
+
+
+def test_two_parts_of_one_name_are_told_apart(bulk):
+    names = '$HMNAME PROP 101 "sheet"\n$HMNAME PROP 102 "sheet"\n'
+    assert bulk(names + PLATE).names == {101: "sheet (101)", 102: "sheet (102)"}
+
+
+def test_includes_without_end(tmp_path):
+    for k in range(200):
+        (tmp_path / f"{k}.inc").write_text(f"INCLUDE '{k + 1}.inc'\n")
+    (tmp_path / "a.inc").symlink_to("b.inc")
+    (tmp_path / "b.inc").symlink_to("a.inc")
+    for name, said in (("0.inc", "nested more than 100"), ("a.inc", "too many links|cannot be")):
+        (tmp_path / "d.bdf").write_text(f"BEGIN BULK\nINCLUDE '{name}'\nENDDATA\n")
+        with pytest.raises(FileError, match=said):
+            read_deck(tmp_path / "d.bdf")
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "fifo"])
+def test_what_is_no_file_is_not_read(tmp_path, name):
+    import os
+
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "d.bdf").write_text(f"BEGIN BULK\nINCLUDE '{name}'\nENDDATA\n")
+    with pytest.raises(FileError, match=r":2: INCLUDE .* is a device or a pipe"):
+        read_deck(tmp_path / "d.bdf")
