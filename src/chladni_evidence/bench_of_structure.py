@@ -6,6 +6,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from chladni.bench.sine_schedule import TABLE_3, stage_lines
 from chladni.dofs import label
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
@@ -15,7 +16,7 @@ from chladni.geometry.sampling import farthest_point_sample
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
 from chladni.planning import PlanSettings, plan
-from chladni.planning.measurement_lines import TABLE_3, even_lines, stage_lines
+from chladni.planning.measurement_lines import even_lines
 from chladni_specimens.forms import FORMS
 from chladni_specimens.holed_plate import holed_plate
 from chladni_specimens.plates import folded_panel

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.article import MeasurementChain, measured
+from chladni.bench.noisy_frf import MeasurementChain, measured
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.effects import registry

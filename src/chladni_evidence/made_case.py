@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.bench.article import MeasurementChain, recorded
+from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.effects.ordinary import value
 from chladni.errors import ModelError

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from chladni.bench.article import MeasurementChain, recorded
+from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Screening
 from chladni.ema.identification import identify

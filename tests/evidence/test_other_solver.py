@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.bench.article import MeasurementChain, measured
+from chladni.bench.noisy_frf import MeasurementChain, measured
 from chladni.dynamics.modes import ModalModel
 from chladni.fem.energy import mass_properties
 from chladni.model.properties import Orthotropic

@@ -12,11 +12,12 @@ import numpy as np
 from ..dynamics.frf import FRF
 from ..errors import FileError, LabelError
 from .local_polynomial import local_polynomial
+from .periodic_signals import is_periodic, of_periods
 from .signals import Estimator, estimated, spectra, window
 from .stepped_sine import demodulated
 from .time_record import TimeRecord
 
-Excitation = Literal["hammer", "burst", "random", "sine"]
+Excitation = Literal["hammer", "burst", "random", "sine", "multisine"]
 Method = Literal["H1", "H2", "Hv", "LPM"]
 
 PULSE = 0.02  # share of samples above a tenth of the peak: a hammer's at most
@@ -34,7 +35,7 @@ class EstimateSettings:
 
     Attributes
     ----------
-    excitation : hammer, burst, random or sine
+    excitation : hammer, burst, random, sine (stepped) or multisine (blocks are its periods)
     method : H1 (noise at the response), H2 (at the force), Hv (at both), LPM (no window)
     resolution : distance of lines [Hz], of continuous random
     exponential : what the exponential window falls to at the end of a hammer's block, in (0, 1]
@@ -96,10 +97,11 @@ def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()
             "LPM tells FRF and leakage apart by the roughness of the force's spectrum, which a hit "
             "lacks; use H1, H2 or Hv"
         )
-    if settings.method == "LPM" and kind != "sine":
+    if settings.method == "LPM" and kind not in ("sine", "multisine"):
         found = _by_polynomials(record, kind)
     else:
-        road = {"hammer": _hammer, "burst": _burst, "random": _random, "sine": _sine}[kind]
+        road = {"hammer": _hammer, "burst": _burst, "random": _random, "sine": _sine,
+                "multisine": _multisine}[kind]  # fmt: skip
         found = road(record, settings)
     f = found.frf.frequency
     low, high = settings.band or (0.0, np.inf)
@@ -121,6 +123,8 @@ def excitation_of(record: TimeRecord) -> Excitation:
         return "hammer"
     if _is_sine(x[0]):
         return "sine"
+    if is_periodic(record):
+        return "multisine"
     tail = x[:, -max(1, x.shape[1] // 20) :]
     silent = np.sqrt((tail**2).mean()) < SILENT * np.sqrt((x**2).mean())
     return "burst" if silent or len(_onsets(x)) > 2 else "random"
@@ -275,6 +279,15 @@ def _random(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
         f"overlap by half, worth {averages:.3g} averages"
     )
     return FrfEstimate(frf, "random", settings.method, averages, notes=(said,))
+
+
+def _multisine(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
+    """Whole periods, and only the lines that are driven."""
+    if settings.method == "LPM":
+        raise LabelError("whole periods do not leak, so LPM has nothing to fit; use H1, H2 or Hv")
+    frf, averages, said = of_periods(record, settings.method)
+    note = f"{len(record.force)} periods of {record.duration:.3g} s, no window; {said}"
+    return FrfEstimate(frf, "multisine", settings.method, averages, notes=(note,))
 
 
 def _by_polynomials(record: TimeRecord, kind: Excitation) -> FrfEstimate:

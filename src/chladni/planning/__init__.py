@@ -1,5 +1,9 @@
 """Pre-test planning on a structure: candidates on the mesh, sensors, shaker, cords, test time."""
 
+from ..bench.sine_schedule import TABLE_3 as TABLE_3
+from ..bench.sine_schedule import Stage as Stage
+from ..bench.sine_schedule import stage_lines as stage_lines
+from ..bench.sine_schedule import stepped_sine_time as stepped_sine_time
 from ..ema.correlation import auto_mac as auto_mac
 from .actuator_ranking import ActuatorRanking as ActuatorRanking
 from .actuator_ranking import Shaking as Shaking
@@ -48,8 +52,6 @@ from .layouts.layout_rules import too_near as too_near
 from .layouts.layout_search import annealed as annealed
 from .layouts.layout_search import evolved as evolved
 from .layouts.layout_walk import Walk as Walk
-from .measurement_lines import TABLE_3 as TABLE_3
-from .measurement_lines import Stage as Stage
 from .measurement_lines import burst_random_time as burst_random_time
 from .measurement_lines import delay_at as delay_at
 from .measurement_lines import delay_cycles as delay_cycles
@@ -58,8 +60,6 @@ from .measurement_lines import half_bandwidth as half_bandwidth
 from .measurement_lines import lines_for_poles as lines_for_poles
 from .measurement_lines import lines_per_bandwidth as lines_per_bandwidth
 from .measurement_lines import lines_time as lines_time
-from .measurement_lines import stage_lines as stage_lines
-from .measurement_lines import stepped_sine_time as stepped_sine_time
 from .measurement_lines import transient_left as transient_left
 from .parameter_information import Linearised as Linearised
 from .plan_summary import sensors_csv as sensors_csv

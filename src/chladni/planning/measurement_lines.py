@@ -3,9 +3,6 @@
 Echaniz Granado (2015), section 4.2.5 and table 3.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import ShapeError
@@ -65,43 +62,6 @@ def lines_per_bandwidth(
     """Measured lines within the half-bandwidth f_r (1 ± ζ_r) of each mode (r,) int."""
     low, high = frequency * (1 - damping), frequency * (1 + damping)
     return np.searchsorted(lines, high, side="right") - np.searchsorted(lines, low, side="left")
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One range of a stepped-sine test: lines per octave, cycles to wait and to measure."""
-
-    low: float  # [Hz]
-    high: float  # [Hz]
-    per_octave: float
-    delay: float  # cycles
-    measure: float = 20.0  # cycles
-
-    def lines(self) -> np.ndarray:
-        """Lines of the stage, its upper end left out [Hz]."""
-        count = round(self.per_octave * float(np.log2(self.high / self.low)))
-        return self.low * (self.high / self.low) ** (np.arange(count) / count)
-
-
-TABLE_3 = (
-    Stage(10, 20, 50, 10),
-    Stage(20, 50, 200, 30),
-    Stage(50, 100, 200, 80),
-    Stage(100, 200, 200, 120),
-    Stage(200, 400, 200, 300),
-)  # Echaniz Granado 2015, table 3, five sweeps
-
-
-def stage_lines(stages: Sequence[Stage]) -> np.ndarray:
-    """All lines of a stepped-sine test, the upper end of the last stage included [Hz]."""
-    return np.r_[np.concatenate([s.lines() for s in stages]), float(stages[-1].high)]
-
-
-def stepped_sine_time(stages: Sequence[Stage], sweeps: int = 1) -> float:
-    """Duration Σ (delay + measure) / f over all lines and sweeps [s]."""
-    last = stages[-1]
-    each = [((s.delay + s.measure) / s.lines()).sum() for s in stages]
-    return float(sweeps * (sum(each) + (last.delay + last.measure) / last.high))
 
 
 def burst_random_time(resolution: float, averages: int) -> float:

@@ -1,4 +1,4 @@
-"""An article on the bench: its modes, a front end with noise, and the recording that comes out."""
+"""FRFs as a front end averages them, with independent noise on every line, and no time data."""
 
 from dataclasses import dataclass
 

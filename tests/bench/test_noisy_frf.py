@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.bench.article import MeasurementChain, measured
+from chladni.bench.noisy_frf import MeasurementChain, measured
 from chladni.dynamics.frf import transfer
 from chladni.dynamics.modes import ModalModel
 

@@ -1,0 +1,68 @@
+"""What stands on the bench: an article by its modes, seen where something is fixed to it."""
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from ..arrays import readonly
+from ..dynamics.modes import ModalModel, rigid_modes
+from ..errors import ShapeError
+from .local_forces import LocalForce
+
+
+@dataclass(frozen=True, eq=False)
+class BenchArticle:
+    """Modes of an article and their motion at every place of the test [1/√kg].
+
+    Attributes
+    ----------
+    name : str
+    weight : float              as it is weighed, without sensors [kg]
+    frequency, damping : (r,)   [Hz], of critical; rigid motions have 0 Hz
+    outputs : (n_out, r)        along what each sensor feels, at its true place
+    mounts : (n_out, 3, r)      translation where each sensor sits
+    drive : (6, r)              at the shaker: along the stinger, two ways across, three rotations
+                                about these axes
+    hangers : (k, 3, r)         where cords hold it: along the cord, two ways across
+    sites : (s, r)              opening of every site with a local force
+    laws : what acts at these sites
+    output_labels, input_label  as 412:+Z
+    """
+
+    name: str
+    weight: float
+    frequency: np.ndarray
+    damping: np.ndarray
+    outputs: np.ndarray
+    mounts: np.ndarray
+    drive: np.ndarray
+    hangers: np.ndarray
+    output_labels: tuple[str, ...]
+    input_label: str
+    sites: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    laws: tuple[LocalForce, ...] = ()
+
+    def __post_init__(self) -> None:
+        r, n = len(self.frequency), len(self.output_labels)
+        if not self.laws:
+            object.__setattr__(self, "sites", np.zeros((0, r)))
+        due = {"damping": (r,), "outputs": (n, r), "mounts": (n, 3, r), "drive": (6, r),
+               "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r)}  # fmt: skip
+        for name, shape in due.items():
+            if (found := np.shape(getattr(self, name))) != shape:
+                raise ShapeError(f"{name} is {found}, modes, labels and laws say {shape}")
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """True for modes that are no rigid motion (r,)."""
+        none = np.zeros((0, len(self.frequency)))
+        modal = ModalModel(self.frequency, self.damping, none, np.zeros((0, 2), int))
+        return np.asarray(~rigid_modes(modal))
+
+    def turned(self, frequency: np.ndarray, damping: np.ndarray, Q: np.ndarray, name: str) -> Self:
+        """The article whose modes are Φ Q, Q (r, r) orthogonal."""
+        parts = ("outputs", "mounts", "drive", "hangers", "sites")
+        seen = {part: getattr(self, part) @ Q for part in parts}
+        return replace(self, name=name, frequency=frequency, damping=damping, **seen)

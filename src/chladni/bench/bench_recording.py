@@ -1,0 +1,224 @@
+"""A test on the bench: the excitation runs, the front end records, FRFs are estimated."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+from ..ema.frf_estimate import EstimateSettings, estimate
+from ..ema.time_record import TimeRecord
+from ..errors import LabelError, ModelError
+from ..progress import Progress, silent
+from .accelerometers import drawn_gains
+from .bench_rig import BenchRig
+from .excitation import ON, Kind, blow, burst, multisine, pink_lines
+from .first_order_hold import HeldRun
+from .front_end import anti_alias, digitised, sampling_rate
+from .local_integration import LocalRun
+from .pole_model import PoleModel, filtered
+
+FINER, FINER_LOCAL, FINER_BLOW = 2, 8, 8  # steps of a sample: linear, with local forces, of a blow
+ROOM = 0.25  # of the range that the strongest channel's rms (of a sine: amplitude) may take
+SETTLE = 1  # periods of a multisine before the first that is kept
+LEFT = 1e-3  # of a free decay when the next blow may come
+LONGEST = 40.0  # a block of a hammer test at most [s]
+
+
+@dataclass(frozen=True)
+class BenchTest:
+    """How a test is run.
+
+    Attributes
+    ----------
+    excitation : burst-random, stepped-sine, multisine or hammer
+    band : [Hz]
+    level : N; of the coil's force the rms while a burst or multisine lasts, of the measured force
+        the amplitude of a sine, of a blow its peak
+    resolution : distance of lines of burst random and multisine [Hz]
+    averages : bursts, periods of a multisine, blows
+    sweeps : of a stepped sine
+    """
+
+    excitation: Kind
+    band: tuple[float, float]
+    level: float
+    resolution: float = 0.05
+    averages: int = 20
+    sweeps: int = 5
+
+
+@dataclass(frozen=True, eq=False)
+class BenchRecording:
+    """What comes out of a test.
+
+    Attributes
+    ----------
+    article : its name
+    test : BenchTest
+    frf : FRF                  accelerance with coherence (and variance)
+    averages : float           what the estimate is worth
+    time : TimeRecord or None  where it was kept
+    overloads : {channel in words: blocks, lines or sweeps in which it was beyond its range}
+    transient : (n_f,) or None  largest residual transient of a line over its steady part, of all
+        channels (stepped sine)
+    added_damping : that a window added [1/s]
+    truth : (n_f, n_out)       the FRF of a front end without noise and errors of sensors
+    notes : how the FRFs were estimated
+    """
+
+    article: str
+    test: BenchTest
+    frf: FRF
+    averages: float
+    time: TimeRecord | None = None
+    overloads: dict[str, int] = field(default_factory=dict)
+    transient: np.ndarray | None = None
+    added_damping: float = 0.0
+    truth: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Force first, then every accelerometer: volts per unit, true and stated, and noise.
+
+    Attributes
+    ----------
+    true, stated : (1 + n_out,) [V/N], [V s²/m]
+    noise : (1 + n_out,)        [V/√Hz]
+    """
+
+    true: np.ndarray
+    stated: np.ndarray
+    noise: np.ndarray
+
+
+def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
+    """The sensors of a test with the sensitivities they happen to have."""
+    kind, n = rig.setup.accelerometer, len(rig.article.outputs)
+    gauge = rig.setup.shaker.gauge if rig.setup.shaker else None
+    volts, noise = (gauge.sensitivity, gauge.noise) if gauge else (0.01124, 4.5e-5)
+    stated = np.r_[volts, np.full(n, kind.sensitivity)]
+    true = stated * np.r_[1.0, drawn_gains(kind, n, rng)]
+    return Channels(true, stated, true * np.r_[noise, np.full(n, kind.noise)])
+
+
+def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:
+    """The level [N] at which the strongest channel takes a quarter of its range.
+
+    Of pink noise by the rms of the response while it lasts, of a sine by its largest amplitude, of
+    a blow by the sum of the modes' amplitudes.
+    """
+    kind, front = rig.setup.accelerometer, rig.setup.front_end
+    f = np.geomspace(band[0], band[1], 4000)
+    H = rig.measured.response(2j * np.pi * f)[:, :, 0]
+    if excitation == "stepped-sine":
+        volts = np.abs(H[:, 1:] / H[:, :1]).max() * kind.sensitivity
+        return float(ROOM * front.volts / volts)
+    if excitation == "hammer":
+        width = 0.8 / band[1] * 2 / np.pi  # area of a half sine of one newton [N s]
+        m = rig.measured
+        rows = np.abs(m.c[1:] * m.b[:, 0])[:, np.abs(m.poles) < 2 * np.pi * band[1]]
+        return float(2 * ROOM * front.volts / (width * rows.sum(axis=1).max() * kind.sensitivity))
+    density = 1 / f / np.trapezoid(1 / f, f)
+    rms = np.sqrt(np.trapezoid(np.abs(H) ** 2 * density[:, None], f, axis=0))
+    force = rig.setup.shaker.gauge.sensitivity if rig.setup.shaker else 0.01
+    volts = rms * np.r_[force, np.full(len(rms) - 1, kind.sensitivity)]
+    return float(ROOM * front.volts / volts.max())
+
+
+def record(
+    rig: BenchRig,
+    test: BenchTest,
+    rng: np.random.Generator,
+    keep_time: bool = False,
+    progress: Progress = silent,
+) -> BenchRecording:
+    """Run a test of bursts, a multisine or blows, and estimate its FRFs from the time data.
+
+    A stepped sine is run by ``sine_sweep.swept``.
+
+    Raises
+    ------
+    ModelError
+        If a hammer is to hit an article with a shaker, or a shaker is to drive one without.
+    """
+    if (test.excitation == "hammer") != (rig.setup.shaker is None):
+        raise ModelError("a hammer hits an article without a shaker, anything else needs one")
+    rate = sampling_rate(test.band[1])
+    channels = channels_of(rig, rng)
+    run = PhysicalRun(rig, rate, _finer(rig, test))
+    blocks, over = [], np.zeros(1 + len(rig.article.outputs), int)
+    signals = list(_signals(rig, test, rate, run.finer, rng))
+    for k, (u, kept) in enumerate(signals):
+        progress(f"{rig.article.name}: {test.excitation} {k + 1} of {len(signals)}", k / len(signals))
+        volts = channels.true[:, None] * run.on(test.level * u)
+        values, high = digitised(volts, channels.noise, rate, rig.setup.front_end, rng)
+        if kept:
+            blocks.append(values / channels.stated[:, None])
+            over += high
+    time = time_record_of(rig, blocks, rate)
+    kind = {"burst-random": "burst", "multisine": "multisine", "hammer": "hammer"}[test.excitation]
+    found = estimate(time, EstimateSettings(excitation=kind, band=test.band))  # type: ignore[arg-type]
+    named = {name: int(c) for name, c in zip(time.channels, over, strict=True) if c}
+    return BenchRecording(
+        rig.article.name, test, found.frf, found.averages, time if keep_time else None, named,
+        added_damping=found.added_damping, truth=rig.frf(found.frf.frequency), notes=found.notes,
+    )  # fmt: skip
+
+
+def time_record_of(rig: BenchRig, blocks: list[np.ndarray], rate: float) -> TimeRecord:
+    x = np.stack(blocks)
+    labels = (rig.article.input_label,), rig.article.output_labels
+    return TimeRecord(x[:, :1], x[:, 1:], rate, *labels)
+
+
+def _finer(rig: BenchRig, test: BenchTest) -> int:
+    if test.excitation == "hammer":
+        return FINER_BLOW
+    return FINER_LOCAL if rig.article.laws else FINER
+
+
+def _signals(
+    rig: BenchRig, test: BenchTest, rate: float, finer: int, rng: np.random.Generator
+) -> Iterator[tuple[np.ndarray, bool]]:
+    """Blocks of the drive of level one, and whether each is kept."""
+    n = round(rate / test.resolution)
+    if test.excitation == "hammer":
+        n = 2 ** int(np.ceil(np.log2(rate * _decay(rig))))
+        for _ in range(test.averages):
+            yield blow(n, rate, test.band[1], rng, finer), True
+    elif test.excitation == "burst-random":
+        for _ in range(test.averages):
+            yield burst(n, rate, test.band, rng, finer), True
+    elif test.excitation == "multisine":
+        period = multisine(n, rate, test.band, rng, finer)
+        for k in range(SETTLE + test.averages):
+            yield period, k >= SETTLE
+    else:
+        raise LabelError(f"{test.excitation} is not made of blocks")
+
+
+def _decay(rig: BenchRig) -> float:
+    """Until elastic motion has died away [s]."""
+    a = rig.article
+    slowest = (a.damping * 2 * np.pi * a.frequency)[a.elastic].min()
+    return float(np.clip(-np.log(LEFT) / slowest, 1.0, LONGEST))
+
+
+class PhysicalRun:
+    """Forces and accelerations behind the anti-alias filter, sampled, block after block."""
+
+    def __init__(self, rig: BenchRig, rate: float, finer: int) -> None:
+        self.finer = finer
+        h = 1 / (rate * finer)
+        self.outputs = HeldRun(filtered(rig.measured, anti_alias(rate)), h)
+        self.local = LocalRun(rig.openings, rig.article.laws, h) if rig.article.laws else None
+
+    def on(self, u: np.ndarray) -> np.ndarray:
+        """(channels, n) [N, m/s²] of a block of the drive (n · finer,) [N]."""
+        x = u[None]
+        if self.local is not None:
+            x = np.vstack([x, self.local.on(x)])
+        return self.outputs.on(x, self.finer)

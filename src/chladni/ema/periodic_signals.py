@@ -1,0 +1,66 @@
+"""FRFs of periodic excitation: whole periods, only the lines that are driven, no window.
+
+Lines between them that answer nevertheless were made by the structure: of an odd multisine even
+lines hold even distortion (Pintelon and Schoukens 2012, System Identification, section 4.3).
+"""
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ..dynamics.frf import FRF
+from ..errors import FileError
+from .signals import Estimator, estimated, spectra
+from .time_record import TimeRecord
+
+ALIKE = 0.9  # share of the force's power that is the same in every block, at least
+DRIVEN = 1e-3  # of the power of the strongest of the lines about it
+ABOUT = 9  # lines
+
+
+def is_periodic(record: TimeRecord) -> bool:
+    """Whether every block of the recording is a period of one signal."""
+    if len(record.force) < 2:
+        return False
+    F = np.fft.rfft(record.force)[:, :, 1:]
+    power = (np.abs(F) ** 2).mean(axis=0)
+    alike = np.abs(F.mean(axis=0)) ** 2
+    return bool(alike.sum() > ALIKE * power.sum())
+
+
+def of_periods(record: TimeRecord, method: Estimator) -> tuple[FRF, float, str]:
+    """FRF at the driven lines, averages, and what the other lines hold, in words.
+
+    Raises
+    ------
+    FileError
+        If there is more than one input, or hardly a line is driven.
+    """
+    if len(record.inputs) > 1:
+        raise FileError("periodic excitation drives one input at a time; give each its own file")
+    s = spectra(record.force, record.response, record.rate)
+    power = s.ff[:, 0, 0].real
+    driven = power > DRIVEN * maximum_filter1d(power, ABOUT)
+    driven &= power > 1e-6 * power.max()
+    driven[0] = False
+    if driven.sum() < 5:
+        raise FileError(f"{int(driven.sum())} lines of the period are driven; five are needed")
+    H = estimated(s, record.outputs, record.inputs, record.quantity, method)
+    at = np.flatnonzero(driven)
+    assert H.coherence is not None
+    frf = FRF(
+        H.values[at], H.frequency[at], H.outputs, H.inputs, H.quantity,
+        variance=None if H.variance is None else H.variance[at], coherence=H.coherence[at],
+    )  # fmt: skip
+    return frf, s.averages, _between(s.frequency, np.abs(s.yy), at)
+
+
+def _between(f: np.ndarray, power: np.ndarray, driven: np.ndarray) -> str:
+    """How strong undriven lines answer, within the driven band."""
+    inside = np.arange(driven[0], driven[-1] + 1)
+    idle = np.setdiff1d(inside, driven)
+    said = f"{len(driven)} driven lines from {f[driven[0]]:.4g} to {f[driven[-1]]:.4g} Hz"
+    if not len(idle):
+        return said
+    ratio = power[idle].mean(axis=0) / power[driven].mean(axis=0)
+    worst = 10 * np.log10(max(float(ratio.max()), 1e-30))
+    return f"{said}; the {len(idle)} between them answer {-worst:.3g} dB less, noise or distortion"
