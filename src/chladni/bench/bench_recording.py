@@ -1,7 +1,7 @@
 """A test on the bench: the excitation runs, the front end records, FRFs are estimated."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,14 +12,15 @@ from ..errors import LabelError, ModelError
 from ..progress import Progress, silent
 from .accelerometers import drawn_gains
 from .bench_rig import BenchRig
-from .excitation import ON, Kind, blow, burst, multisine, pink_lines
+from .excitation import Kind, blow, burst, multisine
 from .first_order_hold import HeldRun
 from .front_end import anti_alias, digitised, sampling_rate
 from .local_integration import LocalRun
-from .pole_model import PoleModel, filtered
+from .pole_model import filtered
 
 FINER, FINER_LOCAL, FINER_BLOW = 2, 8, 8  # steps of a sample: linear, with local forces, of a blow
-ROOM = 0.25  # of the range that the strongest channel's rms (of a sine: amplitude) may take
+ROOM = 0.25  # of the range that the largest amplitude of a sine or a blow may take
+ROOM_RANDOM = 0.15  # that of a random response its rms: peaks are five times as large
 SETTLE = 1  # periods of a multisine before the first that is kept
 LEFT = 1e-3  # of a free decay when the next blow may come
 LONGEST = 40.0  # a block of a hammer test at most [s]
@@ -61,7 +62,8 @@ class BenchRecording:
     time : TimeRecord or None  where it was kept
     overloads : {channel in words: blocks, lines or sweeps in which it was beyond its range}
     transient : (n_f,) or None  largest residual transient of a line over its steady part, of all
-        channels (stepped sine)
+        channels and sweeps (stepped sine)
+    force : (sweeps, n_f) or None  measured amplitude [N] (stepped sine)
     added_damping : that a window added [1/s]
     truth : (n_f, n_out)       the FRF of a front end without noise and errors of sensors
     notes : how the FRFs were estimated
@@ -74,6 +76,7 @@ class BenchRecording:
     time: TimeRecord | None = None
     overloads: dict[str, int] = field(default_factory=dict)
     transient: np.ndarray | None = None
+    force: np.ndarray | None = None
     added_damping: float = 0.0
     truth: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     notes: tuple[str, ...] = ()
@@ -105,7 +108,7 @@ def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
 
 
 def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:
-    """The level [N] at which the strongest channel takes a quarter of its range.
+    """The level [N] at which the strongest channel takes about a quarter of its range.
 
     Of pink noise by the rms of the response while it lasts, of a sine by its largest amplitude, of
     a blow by the sum of the modes' amplitudes.
@@ -125,7 +128,7 @@ def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> flo
     rms = np.sqrt(np.trapezoid(np.abs(H) ** 2 * density[:, None], f, axis=0))
     force = rig.setup.shaker.gauge.sensitivity if rig.setup.shaker else 0.01
     volts = rms * np.r_[force, np.full(len(rms) - 1, kind.sensitivity)]
-    return float(ROOM * front.volts / volts.max())
+    return float(ROOM_RANDOM * front.volts / volts.max())
 
 
 def record(
@@ -152,7 +155,9 @@ def record(
     blocks, over = [], np.zeros(1 + len(rig.article.outputs), int)
     signals = list(_signals(rig, test, rate, run.finer, rng))
     for k, (u, kept) in enumerate(signals):
-        progress(f"{rig.article.name}: {test.excitation} {k + 1} of {len(signals)}", k / len(signals))
+        progress(
+            f"{rig.article.name}: {test.excitation} {k + 1} of {len(signals)}", k / len(signals)
+        )
         volts = channels.true[:, None] * run.on(test.level * u)
         values, high = digitised(volts, channels.noise, rate, rig.setup.front_end, rng)
         if kept:
@@ -169,6 +174,7 @@ def record(
 
 
 def time_record_of(rig: BenchRig, blocks: list[np.ndarray], rate: float) -> TimeRecord:
+    """Blocks (channels, n) of force and accelerations as a record of the article's labels."""
     x = np.stack(blocks)
     labels = (rig.article.input_label,), rig.article.output_labels
     return TimeRecord(x[:, :1], x[:, 1:], rate, *labels)

@@ -24,10 +24,10 @@ class BenchSetup:
     hit by a hammer.
     """
 
-    accelerometer: AccelerometerType = AccelerometerType()
+    accelerometer: AccelerometerType = field(default_factory=AccelerometerType)
     shaker: Shaker | None = field(default_factory=Shaker)
     cords: tuple[Cord, ...] | None = None
-    front_end: FrontEnd = FrontEnd()
+    front_end: FrontEnd = field(default_factory=FrontEnd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,9 @@ class _Matrices:
             own += rows.T @ A @ rows
 
 
-def bench_rig(article: BenchArticle, setup: BenchSetup = BenchSetup()) -> BenchRig:
+def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRig:
     """Couple all that is on the bench, and find its poles."""
+    setup = setup or BenchSetup()
     r = len(article.frequency)
     cords = cords_for(article.weight, len(article.hangers)) if setup.cords is None else setup.cords
     lines = 3 * INNER * len(article.hangers)

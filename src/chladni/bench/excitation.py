@@ -62,9 +62,7 @@ def multisine(
     return np.asarray(x / x.std())
 
 
-def blow(
-    n: int, rate: float, f_max: float, rng: np.random.Generator, finer: int = 1
-) -> np.ndarray:
+def blow(n: int, rate: float, f_max: float, rng: np.random.Generator, finer: int = 1) -> np.ndarray:
     """A half sine of about 1 N, 0.8 / f_max long, at the beginning of a block (n · finer,)."""
     h, width = 1 / (rate * finer), BLOW / f_max
     t = np.arange(n * finer) * h - LEAD * n / rate

@@ -8,7 +8,7 @@ from scipy.signal import ellip, residue
 from .pole_model import PoleFilter
 
 PASS = 0.4  # of the rate: up to there the anti-alias filter is flat, as 1/2.56 of a front end's
-RIPPLE, STOP, ORDER = 0.05, 100.0, 9  # [dB], [dB]; an odd order falls to nothing at infinity
+RIPPLE, STOP, ORDER = 0.05, 100.0, 11  # [dB], [dB]; an odd order falls to nothing at infinity
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def sampling_rate(f_max: float) -> float:
 
 
 def anti_alias(rate: float) -> PoleFilter:
-    """Elliptic low-pass, flat to 0.4 of the rate, 100 dB down from 0.55 of it on.
+    """Elliptic low-pass, flat to 0.4 of the rate, 100 dB down from half of it on.
 
     All channels share it, so that no FRF sees it.
     """

@@ -1,6 +1,6 @@
 """The shaker, its stinger and the force gauge."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -65,5 +65,5 @@ class Shaker:
     armature: float = 0.2  # [kg]
     suspension: float = 12.3e3  # [N/m]
     braking: float = 40.0  # (Bl)²/R and its own losses [N s/m]
-    stinger: Stinger = Stinger()
-    gauge: ForceGauge = ForceGauge()
+    stinger: Stinger = field(default_factory=Stinger)
+    gauge: ForceGauge = field(default_factory=ForceGauge)

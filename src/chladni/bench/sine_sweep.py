@@ -1,4 +1,4 @@
-"""A stepped sine on the bench: state carried from line to line, the force controlled, all sweeps.
+"""A stepped sine on the bench: state carried from line to line, the force controlled.
 
 A linear article answers a line in closed form: q = γ e^{pt} + α e^{iωt} + β e^{-iωt}, γ what is left
 of the line before; the transient's share of what is measured is an integral of exponentials, so a
@@ -12,8 +12,16 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..ema.signals import Spectra, estimated
+from ..ema.time_record import TimeRecord
 from ..progress import Progress, silent
-from .bench_recording import BenchRecording, BenchTest, Channels, PhysicalRun, time_record_of, channels_of
+from .bench_recording import (
+    BenchRecording,
+    BenchTest,
+    Channels,
+    PhysicalRun,
+    channels_of,
+    time_record_of,
+)
 from .bench_rig import BenchRig
 from .front_end import digitised, sampling_rate
 from .pole_model import PoleModel
@@ -61,7 +69,9 @@ def swept(
     """
     channels = channels_of(rig, rng)
     in_time = keep_time or bool(rig.article.laws)
-    sweep = _TimeSweep(rig, test, channels, keep_time) if in_time else _ExactSweep(rig, test, channels)
+    sweep = (
+        _TimeSweep(rig, test, channels, keep_time) if in_time else _ExactSweep(rig, test, channels)
+    )
     f = np.array([line.frequency for line in lines])
     control = _Force(float(np.abs(rig.measured.response(2j * np.pi * f[:1])[0, 0, 0])))
     found = np.empty((test.sweeps, len(lines), len(channels.true)), complex)
@@ -76,16 +86,20 @@ def swept(
             control.seen(n, float(np.abs(found[k, n, 0])) / drive)
             over += high
     frf = _averaged(rig, f, found)
-    names = (f"input {rig.article.input_label}", *(f"output {o}" for o in rig.article.output_labels))
+    names = (
+        f"input {rig.article.input_label}",
+        *(f"output {o}" for o in rig.article.output_labels),
+    )
     seconds = test.sweeps * sum((x.delay + x.measure) / x.frequency for x in lines)
     said = (
-        f"stepped sine: {len(lines)} lines, {test.sweeps} sweeps, {seconds / 60:.3g} minutes on the "
-        f"bench; the transient left in a line is at most {100 * max(sweep.left):.2g} % of it"
+        f"stepped sine: {len(lines)} lines, {test.sweeps} sweeps, {seconds / 60:.3g} minutes on "
+        f"the bench; the transient left in a line is at most {100 * max(sweep.left):.2g} % of it"
     )
     return BenchRecording(
         rig.article.name, test, frf, float(test.sweeps), sweep.time(),
         {name: int(c) for name, c in zip(names, over, strict=True) if c},
-        np.array(sweep.left[: len(lines)]), truth=rig.frf(f), notes=(said,),
+        np.reshape(sweep.left, (test.sweeps, -1)).max(axis=0), np.abs(found[:, :, 0]),
+        truth=rig.frf(f), notes=(said,),
     )  # fmt: skip
 
 
@@ -190,11 +204,13 @@ class _TimeSweep:
         self.left.append(float((change / np.maximum(np.abs(y[1:] / y[0]), 1e-300)).max()))
         return y, over
 
-    def time(self) -> object:
+    def time(self) -> TimeRecord | None:
         """One stretch, where it is kept."""
         if not self.keep:
             return None
-        return time_record_of(self.rig, [np.concatenate(self.blocks, axis=1).astype(float)], self.rate)
+        return time_record_of(
+            self.rig, [np.concatenate(self.blocks, axis=1).astype(float)], self.rate
+        )
 
 
 def _fitted(x: np.ndarray, angle: np.ndarray) -> np.ndarray:

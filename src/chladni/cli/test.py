@@ -17,7 +17,7 @@ from .run import Out, limits, started
 def run(
     source: Annotated[Path, typer.Argument(metavar="CASE_or_RECORDING")],
     excitation: Annotated[
-        str, typer.Option(help="hammer, burst, random, sine or multisine; default: what it looks like.")
+        str, typer.Option(help="hammer, burst, random, sine, multisine; else what it looks like.")
     ] = "",
     method: Annotated[str, typer.Option(help="H1, H2, Hv or LPM.")] = "H1",
     resolution: Annotated[
