@@ -103,8 +103,8 @@ def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
     gauge = rig.setup.shaker.gauge if rig.setup.shaker else None
     volts, noise = (gauge.sensitivity, gauge.noise) if gauge else (0.01124, 4.5e-5)
     stated = np.r_[volts, np.full(n, kind.sensitivity)]
-    true = stated * np.r_[1.0, drawn_gains(kind, n, rng)]
-    return Channels(true, stated, true * np.r_[noise, np.full(n, kind.noise)])
+    true = stated * np.r_[1.0, rig.article.gains * drawn_gains(kind, n, rng)]
+    return Channels(true, stated, np.abs(true) * np.r_[noise, np.full(n, kind.noise)])
 
 
 def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:

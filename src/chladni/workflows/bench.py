@@ -1,0 +1,277 @@
+"""The virtual test: a case's structure on the bench, its articles, excitations and levels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, get_args
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..bench.article_scatter import Scatter, fitted, scattered_article
+from ..bench.bench_article import BenchArticle
+from ..bench.bench_recording import BenchRecording, BenchTest, level_for, record
+from ..bench.bench_rig import BenchRig, BenchSetup, bench_rig
+from ..bench.excitation import Kind
+from ..bench.sine_schedule import SineLine, dwells_of, stages_for
+from ..bench.sine_sweep import swept
+from ..case import Case
+from ..effects.family import Article
+from ..effects.registry import family
+from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
+from ..fem.modelled import modelled
+from ..geometry.refine import refined
+from ..model.assembly import Assembly
+from ..progress import Progress, silent, within
+from .bench_sites import LOCAL, local_site
+from .benched_article import benched, true_places
+
+NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+BALANCE = 5e-4  # error of the weighing, relative
+MODES = 20  # elastic modes of the band where nobody names one
+BELOW, BEYOND = 0.6, 1.05  # of the lowest and of the highest frequency of interest: the test's band
+LEAST = 5.0  # [Hz]
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """What a virtual test is to be.
+
+    Attributes
+    ----------
+    excitation : burst-random, stepped-sine, multisine or hammer
+    band : [Hz]; None: what the case fits and holds out, else the first twenty elastic modes
+    level : N, as ``BenchTest`` has it; None: the strongest channel takes a quarter of its range
+    levels : factors on it, a recording each
+    articles : how many, each drawn
+    seed : of all that is drawn
+    hide : names of effects to conceal
+    local : clearance, cubic-spring, friction: what acts where nobody knows of it
+    exact : the articles are the deck's own, without scatter
+    finer : the articles' mesh is the deck's with every shell cut in four
+    resolution, averages, sweeps : as ``BenchTest`` has them
+    keep_time : whether time data are kept
+    """
+
+    excitation: Kind = "burst-random"
+    band: tuple[float, float] | None = None
+    level: float | None = None
+    levels: tuple[float, ...] = (1.0,)
+    articles: int = 1
+    seed: int = 0
+    hide: tuple[str, ...] = ()
+    local: tuple[str, ...] = ()
+    exact: bool = False
+    finer: bool = False
+    resolution: float = 0.05
+    averages: int = 20
+    sweeps: int = 5
+    keep_time: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class BenchResult:
+    """Recordings, article by article and level by level, and what nobody was told.
+
+    Attributes
+    ----------
+    settings, setup : as tested
+    outputs, inputs : where, as the user believes
+    band : of the test [Hz]
+    mass : weighed, of the first article [kg]
+    recordings : tuple
+    truth : what was concealed, true places and scatter
+    schedule : lines of the stepped sine, else none
+    """
+
+    settings: BenchSettings
+    setup: BenchSetup
+    outputs: MeasuredDofs
+    inputs: MeasuredDofs
+    band: tuple[float, float]
+    mass: float
+    recordings: tuple[BenchRecording, ...]
+    truth: dict[str, Any]
+    schedule: tuple[SineLine, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+
+def bench(
+    case: Case, settings: BenchSettings | None = None, progress: Progress = silent
+) -> BenchResult:
+    """Put the case's structure on the bench, hide in it what is to be hidden, test it.
+
+    Raises
+    ------
+    FileError
+        If the case names no sensors or no place that is driven, or its base moves.
+    LabelError
+        If an effect, a local force or an excitation has no such name.
+    """
+    settings = settings or BenchSettings()
+    _known(settings)
+    _places_known(case)
+    with threadpool_limits(1):
+        return _tested(case, settings, progress)
+
+
+def _known(settings: BenchSettings) -> None:
+    if settings.excitation not in get_args(Kind):
+        raise LabelError(
+            f"no excitation {settings.excitation!r}; there are {', '.join(get_args(Kind))}"
+        )
+    for name in settings.hide:
+        family(name)
+    for name in settings.local:
+        if name not in LOCAL:
+            raise LabelError(f"no local force {name!r}; there are {', '.join(LOCAL)}")
+    if not 1 <= settings.articles <= len(NAMES):
+        raise LabelError(f"{settings.articles} articles; there may be 1 to {len(NAMES)}")
+    if not settings.levels or min(settings.levels) <= 0:
+        raise LabelError(f"levels {settings.levels} must be factors above zero")
+
+
+def _places_known(case: Case) -> None:
+    for what, dofs in (("sensor", case.outputs), ("driven place", case.inputs)):
+        if not dofs.labels:
+            raise FileError(
+                f"{case.path} names no {what}; give them in sensors.csv ([test] sensors), as "
+                "chladni plan writes it"
+            )
+        if dofs.base.any():
+            raise FileError(f"{case.path}: a moving base is no test of this bench; it drives by "
+                            "a shaker or a hammer")  # fmt: skip
+
+
+def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchResult:
+    rng = np.random.default_rng([settings.seed, 7])
+    progress("modes", 0.0)
+    band = settings.band or _band(case)
+    setup = BenchSetup()
+    if settings.excitation == "hammer":
+        setup = replace(setup, shaker=None)
+    scatter = fitted()
+    nominal, truth = _article(case, settings, setup, band, scatter, rng)
+    level = settings.level or level_for(bench_rig(nominal, setup), settings.excitation, band)
+    if settings.local:
+        nominal, sites = local_site(nominal, setup, settings.local, level, band, rng)
+        truth["local"] = sites
+    articles = _drawn(nominal, settings, scatter, ABOVE_BAND * band[1], rng)
+    schedule = dwells_of(stages_for(*band)) if settings.excitation == "stepped-sine" else ()
+    recordings: list[BenchRecording] = []
+    jobs = [(a, factor) for a in articles for factor in settings.levels]
+    for k, (article, factor) in enumerate(jobs):
+        test = BenchTest(
+            settings.excitation, band, level * factor, settings.resolution, settings.averages,
+            settings.sweeps,
+        )  # fmt: skip
+        part = within(progress, 0.2 + 0.8 * k / len(jobs), 0.2 + 0.8 * (k + 1) / len(jobs))
+        rig, seed = bench_rig(article, setup), np.random.default_rng([settings.seed, 8, k])
+        recordings.append(_run(rig, test, schedule, seed, settings.keep_time, part))
+    mass = articles[0].weight * (1 + BALANCE * rng.normal())
+    truth |= {
+        "weight_kg": {a.name: a.weight for a in articles},
+        "frequency_hz": {a.name: a.frequency[a.frequency < 1.5 * band[1]] for a in articles},
+        "damping": {a.name: a.damping[a.frequency < 1.5 * band[1]] for a in articles},
+    }
+    return BenchResult(
+        settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
+        tuple(_notes(case, settings, recordings)),
+    )  # fmt: skip
+
+
+ABOVE_BAND = 1.5  # articles differ in their modes up to so many times the highest line
+
+
+def _run(
+    rig: BenchRig, test: BenchTest, schedule: Sequence[SineLine], rng: np.random.Generator,
+    keep_time: bool, progress: Progress,
+) -> BenchRecording:  # fmt: skip
+    if test.excitation == "stepped-sine":
+        return swept(rig, test, schedule, rng, keep_time, progress)
+    return record(rig, test, rng, keep_time, progress)
+
+
+def _band(case: Case) -> tuple[float, float]:
+    """Of the case, a little wider; else of its first modes [Hz]."""
+    named = [b for b in (case.band, case.held_band) if b is not None]
+    if named:
+        low, high = min(b[0] for b in named), max(b[1] for b in named)
+        return max(LEAST, BELOW * low), BEYOND * high
+    from ..dynamics.eigen import normal_modes
+    from ..dynamics.modes import rigid_modes
+    from ..fem.assemble import structure
+    from ..fem.modelled import node_points
+
+    built = structure(case.assembly)
+    count = min(MODES + 6, len(built.system.dofs))
+    modal = normal_modes(built.system, count, points=node_points(built))
+    f = modal.frequency[~rigid_modes(modal)]
+    return max(LEAST, BELOW * float(f[0])), BEYOND * float(f[-1])
+
+
+def _article(
+    case: Case, settings: BenchSettings, setup: BenchSetup, band: tuple[float, float],
+    scatter: Scatter, rng: np.random.Generator,
+) -> tuple[BenchArticle, dict[str, Any]]:  # fmt: skip
+    """The nominal article with what is hidden in it, and the truth of it."""
+    made, truth = case.assembly, {"seed": settings.seed, "effects": {}}
+    if settings.finer:
+        made = refined(made)
+    hangers = np.array(case.setup.hangers, dtype=np.int64)
+    held = Article(made, case.assembly, _grids(case), hangers, np.ones(len(case.outputs.labels)))
+    for name in settings.hide:
+        if name == "suspension" and not len(hangers):
+            raise FileError(f"{case.path} names no hangers, so that no cord can be too stiff")
+        held = family(name).conceal(held, rng)
+        truth["effects"][name] = held.truth  # type: ignore[index]
+    places = true_places(held.assembly, case.outputs, case.inputs, setup.accelerometer, rng)
+    article = benched(
+        held.assembly, case.outputs, case.inputs, case.setup.hangers, places, band[1], scatter, rng
+    )
+    off = float(held.off_scale)
+    truth["sensors"] = {
+        label: {"point_m": x, "direction": d}
+        for label, x, d in zip(case.outputs.labels, places.points, places.directions, strict=True)
+    }  # type: ignore[assignment]
+    return replace(article, weight=article.weight - off, gains=held.gains), truth
+
+
+def _grids(case: Case) -> np.ndarray:
+    """Grid of the deck at or nearest to every output (n_out,)."""
+    a, out = case.assembly, case.outputs
+    d2 = ((a.points[None] - out.points[:, None]) ** 2).sum(axis=-1)
+    return np.where(out.grids > 0, out.grids, a.ids[d2.argmin(axis=1)])
+
+
+def _drawn(
+    nominal: BenchArticle, settings: BenchSettings, scatter: Scatter, within_hz: float,
+    rng: np.random.Generator,
+) -> list[BenchArticle]:  # fmt: skip
+    if settings.exact:
+        return [replace(nominal, name=NAMES[k]) for k in range(settings.articles)]
+    return [
+        replace(
+            scattered_article(nominal, scatter, NAMES[k], within_hz, rng),
+            weight=nominal.weight * float(np.exp(scatter.weight * rng.normal())),
+        )
+        for k in range(settings.articles)
+    ]
+
+
+def _notes(
+    case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]
+) -> list[str]:
+    out = [*case.said("bench")]
+    if not case.setup.hangers:
+        out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
+    for r in recordings:
+        out += [f"{r.article}, level {r.test.level:.3g} N: {said}" for said in r.notes]
+        if r.overloads:
+            worst = ", ".join(f"{name} ({n})" for name, n in sorted(r.overloads.items()))
+            out.append(f"Overload in article {r.article} at {r.test.level:.3g} N: {worst}; lower "
+                       "the level (--level)")  # fmt: skip
+    if len(case.inputs.labels) > 1:
+        out.append(f"One shaker at a time: {case.inputs.labels[0]} was driven, "
+                   f"{', '.join(case.inputs.labels[1:])} not.")  # fmt: skip
+    return out

@@ -1,0 +1,62 @@
+"""Where a local force acts that nobody knows of, and how strong: it must be felt at the level."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..bench.bench_article import BenchArticle
+from ..bench.bench_rig import BenchSetup, bench_rig
+from ..bench.local_forces import Clearance, CubicSpring, JenkinsSlider, LocalForce
+from .benched_article import with_site
+
+STRONG = 0.2  # stiffness of the site over m ω_1²: what would be a firm support if it were linear
+CLOSES = 1.5  # rms displacements at which a gap closes: one sample in fifteen is beyond it
+SLIPS = 0.7  # rms displacements at which friction gives way
+
+
+def _clearance(k: float, rms: float) -> LocalForce:
+    return Clearance(gap=CLOSES * rms, k=k)
+
+
+def _cubic(k: float, rms: float) -> LocalForce:
+    return CubicSpring(k3=k / rms**2, reach=3 * rms)
+
+
+def _friction(k: float, rms: float) -> LocalForce:
+    return JenkinsSlider(k=k, limit=SLIPS * k * rms)
+
+
+LOCAL = {"clearance": _clearance, "cubic-spring": _cubic, "friction": _friction}
+
+
+def local_site(
+    article: BenchArticle, setup: BenchSetup, names: Sequence[str], level: float,
+    band: tuple[float, float], rng: np.random.Generator,
+) -> tuple[BenchArticle, list[dict[str, Any]]]:  # fmt: skip
+    """Local forces to ground at places of sensors drawn at random, and what each is.
+
+    Their size goes by the rms displacement that pink noise of this level causes there.
+    """
+    truth = []
+    order = rng.permutation(len(article.outputs))
+    first = article.frequency[article.elastic].min()
+    k = STRONG * article.weight * (2 * np.pi * first) ** 2
+    rms = _rms(article, setup, level, band)
+    for at, name in zip(order, names, strict=False):
+        law = LOCAL[name](k, float(rms[at]))
+        article = with_site(article, article.outputs[at], law)
+        said = {"at": article.output_labels[at], "rms_m": float(rms[at])}
+        truth.append({"name": name, **said, **vars(law)})
+    return article, truth
+
+
+def _rms(
+    article: BenchArticle, setup: BenchSetup, level: float, band: tuple[float, float]
+) -> np.ndarray:
+    """Of the displacement at every sensor (n_out,) [m]."""
+    f = np.geomspace(*band, 3000)
+    s = 2j * np.pi * f
+    H = bench_rig(article, setup).measured.response(s)[:, 1:, 0] / (s**2)[:, None]
+    density = 1 / f / np.trapezoid(1 / f, f)
+    return np.asarray(level * np.sqrt(np.trapezoid(np.abs(H) ** 2 * density[:, None], f, axis=0)))
