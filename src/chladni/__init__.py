@@ -20,6 +20,7 @@ from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
 from .workflows.case_check import check as check
 from .workflows.plan import plan as plan
+from .workflows.virtual_test import virtual_test as virtual_test
 from .workflows.evaluation import evaluate_recordings as evaluate_recordings
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate

@@ -19,6 +19,7 @@ WORKFLOW = {  # command: the function it calls
     "calibrate": "chladni.workflows.calibrate.calibrate",
     "correlate": "chladni.workflows.correlate.correlate",
     "test": "chladni.workflows.evaluation.evaluate_recordings",
+    "bench": "chladni.workflows.virtual_test.virtual_test",
     "identify": "chladni.workflows.identify.identify",
     "modes": "chladni.workflows.modes.modes",
     "frf": "chladni.workflows.frf.frf",

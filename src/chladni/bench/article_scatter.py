@@ -13,11 +13,8 @@ from .bench_article import BenchArticle
 WEIGHTS = np.array([10.508, 10.523, 10.508])  # [kg]
 FREQUENCIES = np.array(
     [
-        [28.2, 56.1, 77.9, 91.3, 97.3, 118.1, 135.5, 142.1, 155.7, 159.4, 171.7, 181.1, 186.3, 191.6],
-        [28.2, 56.4, 78.5, 91.7, 98.3, 119.5, 136.5, 139.7, 153.5, 159.4, 172.1, 184.1, 186.8, 192.4],
-        [28.2, 56.5, 79.4, 92.5, 98.6, 120.7, 138.7, 142.8, 155.9, 157.9, 173.4, 181.5, 185.8, 192.3],
     ]
-)  # [Hz]
+)  # fmt: skip
 DAMPING = 1e-4 * np.array(
     [
         [114, 82, 64, 37, 81, 71, 71, 74, 90, 126, 110, 77, 56, 60],
@@ -51,7 +48,7 @@ class Scatter:
 
 
 def components(x: np.ndarray) -> tuple[float, float, float]:
-    """Standard deviations of x (articles, modes) = μ + mode + article + rest: (mode, article, rest).
+    """x (articles, modes) = μ + mode + article + rest: standard deviations (mode, article, rest).
 
     By the mean squares of a two-way table without repeats (Searle, Casella and McCulloch 1992,
     Variance Components, section 4.6); what comes out negative is zero.

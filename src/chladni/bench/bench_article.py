@@ -27,6 +27,7 @@ class BenchArticle:
     hangers : (k, 3, r)         where cords hold it: along the cord, two ways across
     sites : (s, r)              opening of every site with a local force
     laws : what acts at these sites
+    masses : (n_out,)           of each sensor [kg]; 0: as its type weighs
     gains : (n_out,)            factor on every channel that nobody knows of (miswired, mistyped)
     output_labels, input_label  as 412:+Z
     """
@@ -43,17 +44,19 @@ class BenchArticle:
     input_label: str
     sites: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     laws: tuple[LocalForce, ...] = ()
+    masses: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         r, n = len(self.frequency), len(self.output_labels)
         if not self.laws:
             object.__setattr__(self, "sites", np.zeros((0, r)))
-        if not len(self.gains):
-            object.__setattr__(self, "gains", np.ones(n))
+        for name, usual in (("gains", np.ones(n)), ("masses", np.zeros(n))):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, usual)
         due = {"damping": (r,), "outputs": (n, r), "mounts": (n, 3, r), "drive": (6, r),
                "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r),
-               "gains": (n,)}  # fmt: skip
+               "gains": (n,), "masses": (n,)}  # fmt: skip
         for name, shape in due.items():
             if (found := np.shape(getattr(self, name))) != shape:
                 raise ShapeError(f"{name} is {found}, modes, labels and laws say {shape}")

@@ -60,6 +60,7 @@ class BenchRecording:
     frf : FRF                  accelerance with coherence (and variance)
     averages : float           what the estimate is worth
     time : TimeRecord or None  where it was kept
+    sample : TimeRecord or None  its first block, of tests that are made of blocks
     overloads : {channel in words: blocks, lines or sweeps in which it was beyond its range}
     transient : (n_f,) or None  largest residual transient of a line over its steady part, of all
         channels and sweeps (stepped sine)
@@ -74,6 +75,7 @@ class BenchRecording:
     frf: FRF
     averages: float
     time: TimeRecord | None = None
+    sample: TimeRecord | None = None
     overloads: dict[str, int] = field(default_factory=dict)
     transient: np.ndarray | None = None
     force: np.ndarray | None = None
@@ -168,7 +170,8 @@ def record(
     found = estimate(time, EstimateSettings(excitation=kind, band=test.band))  # type: ignore[arg-type]
     named = {name: int(c) for name, c in zip(time.channels, over, strict=True) if c}
     return BenchRecording(
-        rig.article.name, test, found.frf, found.averages, time if keep_time else None, named,
+        rig.article.name, test, found.frf, found.averages, time if keep_time else None,
+        time_record_of(rig, blocks[:1], rate), named,
         added_damping=found.added_damping, truth=rig.frf(found.frf.frequency), notes=found.notes,
     )  # fmt: skip
 

@@ -1,8 +1,8 @@
 """A stepped sine on the bench: state carried from line to line, the force controlled.
 
-A linear article answers a line in closed form: q = γ e^{pt} + α e^{iωt} + β e^{-iωt}, γ what is left
-of the line before; the transient's share of what is measured is an integral of exponentials, so a
-sweep of an hour is exact and takes no steps in time. With local forces the sweep runs in time.
+A linear article answers a line in closed form: q = γ e^{pt} + α e^{iωt} + β e^{-iωt}, γ what is
+left of the line before; the transient's share of what is measured is an integral of exponentials,
+so a sweep of an hour is exact and takes no steps in time. With local forces it runs in time.
 """
 
 from collections.abc import Sequence
@@ -96,7 +96,7 @@ def swept(
         f"the bench; the transient left in a line is at most {100 * max(sweep.left):.2g} % of it"
     )
     return BenchRecording(
-        rig.article.name, test, frf, float(test.sweeps), sweep.time(),
+        rig.article.name, test, frf, float(test.sweeps), sweep.time(), None,
         {name: int(c) for name, c in zip(names, over, strict=True) if c},
         np.reshape(sweep.left, (test.sweeps, -1)).max(axis=0), np.abs(found[:, :, 0]),
         truth=rig.frf(f), notes=(said,),

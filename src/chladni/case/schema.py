@@ -12,13 +12,14 @@ from ..dynamics.frf import Quantity
 from ..units import UNITS
 
 COMMANDS = ("test", "identify", "correlate", "calibrate", "diagnose",
-            "frf", "modes", "render", "plan", "study")  # fmt: skip
+            "frf", "modes", "render", "plan", "study", "bench")  # fmt: skip
 _FIT = ("calibrate", "diagnose")
 _TEST = ("correlate", *_FIT)
 _SCORE = ("study", *_TEST)  # what Q is taken by
 _FRF = ("frf", *_SCORE)
 _READ = ("test", "identify", *_FRF)
 _VARIED = ("study", *_FIT)
+_PLACED = (*_FRF, "bench")
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ SCHEMA = (
         "first is compared with the model (or the one `use` names). Recordings of one article, "
         "level and state that were driven at other places are stacked with it; the rest is held "
         "out and scored. `identify` reads all.",
-        '["article_A.uff", "article_B.uff"]', _READ),
+        '["article_A.uff", "article_B.uff"]', (*_READ, "bench")),
     Key("test", "use", "text", "", "the first",
         "Which recording is compared: the name of its file, its article, its level or its state.",
         '"article_B.uff"', _READ),
@@ -89,14 +90,14 @@ SCHEMA = (
         "By how much all responses lag the forces; it is taken off.", "0.0005", _READ),
     Key("test", "sensors", "file", "", "nodes of the recording are grids of the deck",
         "Where sensors and shakers sit, which channels are left out or of a wrong gain: the table "
-        "below.", '"sensors.csv"', _READ),
+        "below.", '"sensors.csv"', (*_READ, "bench")),
     Key("test", "mass", "number", "kg", "not weighed",
         "Weighed mass of the article, its sensors taken off.", "10.508", _TEST),
     Key("test", "mass_sd", "number above 0", "kg", "0.2 % of the mass",
         "Standard deviation of the weighing.", "0.005", _FIT),
     Key("test", "hangers", "list of grids", "", "none",
         "Where cords hold the article: the springs of `suspension` sit there.", "[101, 102]",
-        ("diagnose",)),
+        ("diagnose", "bench")),
     Key("recording", "file", "file", "", "needed",
         "One more recording, or one of `recordings` of which more is to be said.",
         '"article_B.uff"', _READ),
@@ -113,13 +114,14 @@ SCHEMA = (
     Key("recording", "mass", "number", "kg", "not weighed in this state",
         "Weighed mass in this state.", "1.95", _FIT),
     Key("band", "fit", "[low, high]", "Hz", "all the recording holds",
-        "Band that is identified, scored and fitted.", "[26.0, 195.0]", ("identify", *_SCORE)),
+        "Band that is identified, scored and fitted.", "[26.0, 195.0]",
+        ("identify", *_SCORE, "bench")),
     Key("band", "exclude", "list of [low, high]", "Hz", "none",
         "Bands within it that are left out.", "[[23.0, 27.5]]", ("identify", *_SCORE)),
     Key("held_out", "sensors", "number, or list of labels", "", "a fifth of the outputs",
         "Outputs no fit may see.", '["412:+Z"]', _FIT),
     Key("held_out", "band", "[low, high]", "Hz", "the upper fifth of the band",
-        "Band no fit may see.", "[200.0, 300.0]", _FIT),
+        "Band no fit may see.", "[200.0, 300.0]", (*_FIT, "bench")),
     Key("parameter", "name", "text", "", "the field", "What the page calls it.", '"E steel"',
         _VARIED),
     Key("parameter", "parts", "list of parts", "", "all that have the field",
@@ -140,24 +142,24 @@ SCHEMA = (
 
 COLUMNS = (
     Key("sensors.csv", "label", "text", "", "needed",
-        "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _FRF),
+        "The output or input of the recording, as `412:+Z` or `412:n`.", "412:+Z", _PLACED),
     Key("sensors.csv", "grid", "whole number, or base", "", "the node of the label",
         "Grid of the deck it sits at; `base`: it measures the motion of all supports together, "
-        "the input of a transmissibility.", "412", _FRF),
+        "the input of a transmissibility.", "412", _PLACED),
     Key("sensors.csv", "x", "number", "m", "", "Place, basic frame, in place of a grid.", "0.25",
-        _FRF),
-    Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _FRF),
-    Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _FRF),
+        _PLACED),
+    Key("sensors.csv", "y", "number", "m", "", "Place.", "0.1", _PLACED),
+    Key("sensors.csv", "z", "number", "m", "", "Place.", "0.0", _PLACED),
     Key("sensors.csv", "direction", "+X -X +Y -Y +Z -Z n", "", "the direction of the label",
-        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _FRF),
-    Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _FRF),
-    Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _FRF),
-    Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _FRF),
-    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _FRF,
+        "Which way it points, basic frame; `n` is the normal of the surface.", "+Z", _PLACED),
+    Key("sensors.csv", "nx", "number", "", "", "Direction as three numbers.", "0.0", _PLACED),
+    Key("sensors.csv", "ny", "number", "", "", "Direction.", "0.6", _PLACED),
+    Key("sensors.csv", "nz", "number", "", "", "Direction.", "0.8", _PLACED),
+    Key("sensors.csv", "role", "word", "", "output", "What it does.", "input", _PLACED,
         ("output", "input")),
     Key("sensors.csv", "mass", "number", "kg", "0",
         "Mass on the article while it is measured. It is in the model before anything is asked and "
-        "in no deck that is written. Rows of one place and role are one device.", "0.005", _FRF),
+        "in no deck that is written. Rows of one place and role are one device.", "0.005", _PLACED),
     Key("sensors.csv", "gain", "number, not 0", "", "1",
         "The recording shows this many times what was there; the channel is divided by it.", "0.5",
         _READ),
@@ -165,7 +167,7 @@ COLUMNS = (
         ("yes", "no")),
     Key("sensors.csv", "position_sd", "number", "m", "0",
         "Uncertainty of the place. Above 5 mm natural frequencies are compared, not FRFs.",
-        "0.01", _FIT),
+        "0.01", (*_FIT, "bench")),
 )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "calibrate",
     "correlate",
     "test",
+    "bench",
     "identify",
     "modes",
     "frf",

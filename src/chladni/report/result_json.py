@@ -11,6 +11,8 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
+from ..workflows.virtual_test import BenchResult
+from .bench_page import bench_json
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
 from .plan_json import plan_json
@@ -42,6 +44,11 @@ def _(result: ParameterStudy) -> dict[str, Any]:
 @to_json.register
 def _(result: CaseCheck) -> dict[str, Any]:
     return check_json(result)
+
+
+@to_json.register
+def _(result: BenchResult) -> dict[str, Any]:
+    return bench_json(result)
 
 
 @to_json.register

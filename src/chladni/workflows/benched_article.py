@@ -49,7 +49,7 @@ def true_places(
     """
     n = len(outputs.labels)
     u, v = tangents(outputs.directions)
-    off = kind.place_sd * rng.normal(size=(2, n))
+    off = np.where(outputs.sd > 0, outputs.sd, kind.place_sd) * rng.normal(size=(2, n))
     at_drive = np.linalg.norm(outputs.points - inputs.points[0], axis=1) < SAME_PLACE
     angle = rng.uniform(0, 2 * np.pi, n)
     off = np.where(at_drive, kind.beside * np.stack([np.cos(angle), np.sin(angle)]), off)
@@ -95,7 +95,7 @@ def benched(
         name="A", weight=mass_properties(assembly)[0], frequency=whole.frequency, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
         hangers=(hung @ phi).reshape(len(hangers), 3, r), output_labels=outputs.labels,
-        input_label=inputs.labels[0],
+        input_label=inputs.labels[0], masses=outputs.mass,
     )  # fmt: skip
 
 

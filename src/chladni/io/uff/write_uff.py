@@ -78,8 +78,8 @@ def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
         for i, output in enumerate(frf.outputs):
             H = FunctionSet(
                 function=4,
-                response=_code(output),
-                reference=_code(input),
+                response=uff_code(output),
+                reference=uff_code(input),
                 due=len(frf.frequency),
                 x=frf.frequency,
                 y=frf.values[:, i, j],
@@ -95,7 +95,7 @@ def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
                 yield _encoded(gamma, title, binary)
 
 
-def _code(dof: str) -> tuple[int, int]:
+def uff_code(dof: str) -> tuple[int, int]:
     """(node, direction code) of a label."""
     node, _, way = dof.partition(":")
     try:
@@ -113,7 +113,7 @@ def _encoded(record: FunctionSet, title: str, binary: bool) -> bytes:
     """One record: head, numbers, end mark."""
     x, y = record.x, record.y
     even = _even(x) and not binary
-    head = _head(record, title, even)
+    head = head_records(record, title, even)
     if not binary:
         return (f"    -1\n    58{'':74}\n" + head + _text(x, y, even)).encode()
     bits = _columns(x, y).astype("<f8").tobytes()  # 1: little-endian, 2: IEEE
@@ -121,8 +121,8 @@ def _encoded(record: FunctionSet, title: str, binary: bool) -> bytes:
     return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"
 
 
-def _head(record: FunctionSet, title: str, even: bool) -> str:
-    """Records 1 to 11."""
+def head_records(record: FunctionSet, title: str, even: bool, single: bool = False) -> str:
+    """Records 1 to 11; ``single`` precision in place of double."""
     (out, out_way), (ref, ref_way) = record.response, record.reference
     f = record.x
     start, step = (f[0], (f[-1] - f[0]) / (len(f) - 1)) if even else (0.0, 0.0)
@@ -130,14 +130,21 @@ def _head(record: FunctionSet, title: str, even: bool) -> str:
     lines += [
         f"{record.function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}"
         f"{ref:10d}{ref_way:4d}",
-        f"{6 if np.iscomplexobj(record.y) else 4:10d}{len(f):10d}{int(even):10d}{start:13.5e}"
+        f"{_number_kind(record.y, single):10d}{len(f):10d}{int(even):10d}{start:13.5e}"
         f"{step:13.5e}{0:13.5e}",
     ]
-    names = ("Frequency", "NONE", "NONE", "NONE")
+    names = ("Time" if record.abscissa.kind == 17 else "Frequency", "NONE", "NONE", "NONE")
     axes = (record.abscissa, record.ordinate, record.denominator, Axis())
     for name, axis in zip(names, axes, strict=True):
         lines.append(f"{axis.kind:10d}{0:5d}{0:5d}{0:5d} {name:20} {axis.unit:20}")
     return "\n".join(lines) + "\n"
+
+
+def _number_kind(y: np.ndarray, single: bool) -> int:
+    """2 real, 4 real double, 5 complex, 6 complex double."""
+    if np.iscomplexobj(y):
+        return 5 if single else 6
+    return 2 if single else 4
 
 
 def _even(f: np.ndarray) -> bool:

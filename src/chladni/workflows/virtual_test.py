@@ -19,18 +19,17 @@ from ..effects.family import Article
 from ..effects.registry import family
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
-from ..fem.modelled import modelled
 from ..geometry.refine import refined
-from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
-from .bench_sites import LOCAL, local_site
 from .benched_article import benched, true_places
+from .local_sites import LOCAL, local_site
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 BALANCE = 5e-4  # error of the weighing, relative
 MODES = 20  # elastic modes of the band where nobody names one
 BELOW, BEYOND = 0.6, 1.05  # of the lowest and of the highest frequency of interest: the test's band
 LEAST = 5.0  # [Hz]
+ABOVE_BAND = 1.5  # articles differ in their modes up to so many times the highest line
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ class BenchResult:
     notes: tuple[str, ...] = field(default=())
 
 
-def bench(
+def virtual_test(
     case: Case, settings: BenchSettings | None = None, progress: Progress = silent
 ) -> BenchResult:
     """Put the case's structure on the bench, hide in it what is to be hidden, test it.
@@ -180,9 +179,6 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     )  # fmt: skip
 
 
-ABOVE_BAND = 1.5  # articles differ in their modes up to so many times the highest line
-
-
 def _run(
     rig: BenchRig, test: BenchTest, schedule: Sequence[SineLine], rng: np.random.Generator,
     keep_time: bool, progress: Progress,
@@ -259,9 +255,7 @@ def _drawn(
     ]
 
 
-def _notes(
-    case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]
-) -> list[str]:
+def _notes(case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]) -> list[str]:
     out = [*case.said("bench")]
     if not case.setup.hangers:
         out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")

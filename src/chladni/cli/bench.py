@@ -1,0 +1,132 @@
+"""``chladni bench``: a virtual test of a case or a deck, and the case it leaves."""
+
+import tempfile
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+
+from ..bench.excitation import Kind
+from ..case import Case, load_case
+from ..errors import FileError
+from ..planning import PlanSettings, plan, sensors_csv
+from ..progress import Progress, within
+from ..report.result_json import to_json
+from ..workflows.loaded_model import is_case, load_deck, load_model
+from ..workflows.virtual_test import BenchSettings, virtual_test
+from .run import Out, Units, limits, started
+
+
+def run(
+    source: Annotated[Path, typer.Argument(metavar="CASE_or_DECK")],
+    excitation: Annotated[
+        str, typer.Option(help="burst-random, stepped-sine, multisine or hammer.")
+    ] = "burst-random",
+    band: Annotated[str, typer.Option(help="From and to, in Hz; default that of the case.")] = "",
+    level: Annotated[
+        float | None,
+        typer.Option(help="[N]; default: the strongest channel takes a quarter of its range."),
+    ] = None,
+    levels: Annotated[str, typer.Option(help="Factors on the level, as 0.5,1,2.")] = "1",
+    articles: Annotated[int, typer.Option(help="How many, each scattered.")] = 1,
+    exact: Annotated[bool, typer.Option("--exact", help="No scatter: the deck's own.")] = False,
+    finer: Annotated[
+        bool, typer.Option("--finer", help="Articles on a mesh of half the element size.")
+    ] = False,
+    hide: Annotated[
+        list[str] | None, typer.Option(help="Effect to conceal, by its name (repeatable).")
+    ] = None,
+    local: Annotated[
+        list[str] | None,
+        typer.Option(help="clearance, cubic-spring, friction where nobody knows (repeatable)."),
+    ] = None,
+    resolution: Annotated[
+        float, typer.Option(help="Distance of lines of bursts and multisines [Hz].", min=1e-3)
+    ] = 0.05,
+    averages: Annotated[
+        int, typer.Option(help="Bursts, periods of a multisine, blows.", min=2)
+    ] = 20,
+    sweeps: Annotated[int, typer.Option(help="Of a stepped sine.", min=1)] = 5,
+    time: Annotated[bool, typer.Option("--time", help="Write the time data as well.")] = False,
+    seed: Annotated[int, typer.Option(help="Of all that is drawn.", min=0)] = 0,
+    sensors: Annotated[
+        Path | None, typer.Option(help="Table of sensors of a bare deck; else one is planned.")
+    ] = None,
+    units: Units = None,
+    out: Out = None,
+) -> None:
+    """Test a structure on the virtual bench: articles, shaker, sensors, front end, recordings.
+
+    It leaves a case (--out/case) that every other command takes, and the sealed truth beside it.
+    """
+    settings = BenchSettings(
+        excitation=cast(Kind, excitation),
+        band=limits(band) if band else None,
+        level=level,
+        levels=_factors(levels),
+        articles=articles,
+        seed=seed,
+        hide=tuple(hide or ()),
+        local=tuple(local or ()),
+        exact=exact,
+        finer=finer,
+        resolution=resolution,
+        averages=averages,
+        sweeps=sweeps,
+        keep_time=time,
+    )
+    from ..report.bench_folder import write_bench
+    from ..report.bench_page import bench_page
+
+    with started("bench", source, out) as job:
+        job.progress("reading", 0.0)
+        with tempfile.TemporaryDirectory() as scratch:
+            case = _case(source, units, sensors, Path(scratch), within(job.progress, 0.0, 0.2))
+            found = virtual_test(case, settings, within(job.progress, 0.2, 0.95))
+            job.progress("writing", 0.95)
+            job.files += write_bench(job.folder, case, found)
+        job.json("bench.json", to_json(found))
+        job.show(bench_page(job.folder, found))
+
+
+def _factors(text: str) -> tuple[float, ...]:
+    """Levels as numbers.
+
+    >>> _factors("0.5, 1,2")
+    (0.5, 1.0, 2.0)
+    """
+    try:
+        return tuple(float(x) for x in text.split(","))
+    except ValueError:
+        raise FileError(f"--levels {text!r} is not of the form 0.5,1,2") from None
+
+
+def _case(
+    source: Path, units: str | None, sensors: Path | None, scratch: Path, progress: Progress
+) -> Case:
+    """The case itself; of a bare deck one that is drafted in a scratch folder."""
+    if source.exists() and is_case(source):
+        if sensors is not None or units is not None:
+            raise FileError(f"{source} is a case, which names its sensors and units itself")
+        return load_case(source)
+    deck = load_deck(source, units).deck
+    if units is None:
+        raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
+    if sensors is not None:
+        if not sensors.is_file():
+            raise FileError(f"no file {sensors}")
+        table, hangers = sensors.read_text(encoding="utf-8"), ""
+    else:
+        progress("planning the sensors", 0.1)
+        made = plan(load_model(source, units).assembly, PlanSettings(draws=0))
+        table, hangers = sensors_csv(made), f"hangers = {[int(h) for h in made.hangers]}\n"
+    (scratch / "sensors.csv").write_text(table, encoding="utf-8")
+    from ..io.nastran import write_deck
+
+    write_deck(deck, scratch / "deck.bdf", [])
+    (scratch / "case.toml").write_text(
+        f'[model]\ndeck = "deck.bdf"\nunits = "{units}"\n'
+        f'[test]\nsensors = "sensors.csv"\n{hangers}',
+        encoding="utf-8",
+    )
+    return load_case(scratch)

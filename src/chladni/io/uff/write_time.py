@@ -1,0 +1,71 @@
+"""Time histories as a universal file: dataset 58b, a record a channel and block.
+
+Single precision has the 24 bits a converter has.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ...ema.time_record import TimeRecord
+from ...errors import FileError
+from .uff_sets import Axis, FunctionSet
+from .write_uff import head_records, uff_code, write_head
+
+_MOTION = {
+    "receptance": Axis(8, "m"),
+    "mobility": Axis(11, "m/s"),
+    "accelerance": Axis(12, "m/s^2"),
+}
+
+
+def write_time_uff(
+    path: str | Path,
+    record: TimeRecord,
+    nodes: Mapping[int, np.ndarray] | None = None,
+    title: str = "NONE",
+) -> None:
+    """All channels of all blocks, inputs first; SI.
+
+    Raises
+    ------
+    FileError
+        If the record is of a moving base, which has no force to tell inputs by.
+    """
+    if record.quantity not in _MOTION:
+        raise FileError(f"time data of {record.quantity} cannot be written as a universal file")
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    partial.unlink(missing_ok=True)
+    try:
+        write_head(partial, nodes or {}, title)
+        with partial.open("ab") as file:
+            for block in _records(record, title):
+                file.write(block)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _records(record: TimeRecord, title: str) -> Iterator[bytes]:
+    motion = _MOTION[record.quantity]
+    for block in range(len(record.force)):
+        for label, x in zip(record.inputs, record.force[block], strict=True):
+            yield _record(label, x, record.rate, Axis(13, "N"), title)
+        for label, x in zip(record.outputs, record.response[block], strict=True):
+            yield _record(label, x, record.rate, motion, title)
+
+
+def _record(label: str, x: np.ndarray, rate: float, ordinate: Axis, title: str) -> bytes:
+    """Mark, head and samples of one channel, evenly spaced, in single precision."""
+    made = FunctionSet(
+        function=1, response=uff_code(label), reference=(0, 0), due=len(x),
+        x=np.arange(len(x)) / rate, y=x.astype("<f4"), abscissa=Axis(17, "s"), ordinate=ordinate,
+        denominator=Axis(),
+    )  # fmt: skip
+    bits = made.y.tobytes()
+    mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
+    head = head_records(made, title, even=True, single=True)
+    return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"

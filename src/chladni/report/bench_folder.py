@@ -1,0 +1,119 @@
+"""The folder of a virtual test: a case for every other command, time data, the sealed truth."""
+
+import csv
+import json
+from collections import Counter
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from ..bench.bench_recording import BenchRecording
+from ..case import Case
+from ..fem.measured_dofs import MeasuredDofs
+from ..io.nastran import write_deck
+from ..io.uff.estimate_stamp import stamp
+from ..io.uff.write_time import write_time_uff
+from ..io.uff.write_uff import write_uff
+from ..output import write_json, write_text
+from ..workflows.virtual_test import BenchResult
+
+Files = list[tuple[str, str]]
+
+
+def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
+    """``case/`` with deck, sensors and recordings, ``sealed/truth.json``; what was written."""
+    place = folder / "case"
+    place.mkdir(parents=True, exist_ok=True)
+    write_deck(case.deck, place / "deck.bdf", [])
+    write_text(place / "sensors.csv", _sensors(found))
+    names = file_names(found.recordings)
+    files: Files = [("case/case.toml", "a case with these recordings")]
+    for name, r in zip(names, found.recordings, strict=True):
+        nodes = _nodes(found)
+        write_uff(place / f"{name}.uff", r.frf, nodes, stamp(r.averages, r.added_damping))
+        files.append((f"case/{name}.uff", f"FRFs of article {r.article}, {r.test.level:.3g} N"))
+        if r.time is not None:
+            write_time_uff(place / f"{name}_time.uff", r.time, nodes)
+            files.append((f"case/{name}_time.uff", "its time data, for chladni test"))
+    write_text(place / "case.toml", _toml(case, found, names))
+    write_json(folder / "sealed" / "truth.json", found.truth)
+    files.append(("sealed/truth.json", "what was concealed: open it when the answer is on disk"))
+    return files
+
+
+def file_names(recordings: tuple[BenchRecording, ...]) -> list[str]:
+    """article_A, with the level where there are several of one article."""
+    count = Counter(r.article for r in recordings)
+    return [
+        f"article_{r.article}" + f"_{r.test.level:.3g}N" * (count[r.article] > 1)
+        for r in recordings
+    ]
+
+
+def _nodes(found: BenchResult) -> dict[int, np.ndarray]:
+    """Places of the dofs by the number of their label, as the user believes."""
+    out = {}
+    for dofs in (found.outputs, found.inputs):
+        for label, x in zip(dofs.labels, dofs.points, strict=True):
+            node = label.partition(":")[0]
+            if node.isdecimal():
+                out[int(node)] = x
+    return out
+
+
+def _sensors(found: BenchResult) -> str:
+    """The table of sensors, with the masses they were told to have."""
+    text = StringIO()
+    write = csv.writer(text, lineterminator="\n").writerow
+    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
+    usual, shaker = found.setup.accelerometer.mass, found.setup.shaker
+    behind = shaker.gauge.mass * shaker.gauge.beyond if shaker else 0.0
+    masses = np.where(found.outputs.mass > 0, found.outputs.mass, usual)
+    for row in _rows(found.outputs, "output", masses):
+        write(row)
+    write(_rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[0])
+    return text.getvalue()
+
+
+def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:
+    out = []
+    for k, label in enumerate(dofs.labels):
+        grid = int(dofs.grids[k])
+        place = [""] * 3 if grid else [f"{x:.7g}" for x in dofs.points[k]]
+        way = [f"{x:.9g}" for x in dofs.directions[k]]
+        out.append([label, str(grid) if grid else "", *place, *way, role, f"{masses[k]:.6g}"])
+    return out
+
+
+def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
+    files = ", ".join(json.dumps(f"{n}.uff") for n in names)
+    lines = [
+        "[model]",
+        'deck = "deck.bdf"',
+        f'units = "{case.units.name}"',
+        *([f"damping = {case.damping:g}"] if case.damping is not None else []),
+        "",
+        "[test]",
+        f"recordings = [{files}]",
+        'sensors = "sensors.csv"',
+        f"mass = {found.mass:.5f}",
+        f"mass_sd = {1e-3 * found.mass:.5f}",
+        *([f"hangers = {list(case.setup.hangers)}"] if case.setup.hangers else []),
+    ]
+    if len(names) > 1:
+        for name, r in zip(names, found.recordings, strict=True):
+            lines += ["", "[[recording]]", f"file = {json.dumps(name + '.uff')}",
+                      f'article = "{r.article}"', f"level = {r.test.level:.6g}"]  # fmt: skip
+    if case.band is not None:
+        lines += ["", "[band]", f"fit = [{case.band[0]:g}, {case.band[1]:g}]"]
+        if case.exclude:
+            lines.append(f"exclude = {[list(b) for b in case.exclude]}")
+    if case.held_band is not None or case.held_sensors is not None:
+        lines += ["", "[held_out]"]
+        if case.held_sensors is not None:
+            held = case.held_sensors
+            lines.append(f"sensors = {json.dumps(held if isinstance(held, int) else list(held))}")
+        if case.held_band is not None:
+            lines.append(f"band = [{case.held_band[0]:g}, {case.held_band[1]:g}]")
+    return "\n".join([*lines, ""])

@@ -1,0 +1,136 @@
+"""A virtual test as a page: what was tested, the schedule, a stretch of time, FRFs, overloads."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..bench.bench_recording import BenchRecording
+from ..dynamics.frf import UNIT
+from ..workflows.virtual_test import BenchResult
+from .blocks import Block, Facts, PageParts, Picture, Section, Table
+from .words import number
+
+_SHOWN = 2  # responses drawn over time
+
+
+def bench_page(folder: Path, found: BenchResult) -> PageParts:
+    """Sections of the page; its pictures are written into the folder."""
+    from ..view import bench_plots
+
+    files: list[tuple[str, str]] = []
+    first = found.recordings[0]
+    blocks: list[Block] = [Facts(_facts(found)), _table(found)]
+    if found.schedule and first.transient is not None and first.force is not None:
+        path = folder / "schedule.png"
+        lines = np.array([(x.frequency, x.delay, x.measure) for x in found.schedule])
+        bench_plots.sine_schedule(path, *lines.T, first.force, first.transient)
+        blocks.append(Picture(path, "The schedule; force and transient of every line of article "
+                              f"{first.article}, all sweeps (largest transient of any channel, "
+                              "antiresonances included)."))  # fmt: skip
+        files.append((path.name, "the schedule of the stepped sine"))
+    if first.sample is not None:
+        blocks.append(Picture(_time(folder / "time.png", first), "One block as the front end "
+                              "recorded it."))  # fmt: skip
+        files.append(("time.png", "one block of time data"))
+    k = _typical(first)
+    path = folder / "frf.png"
+    frf = first.frf
+    coherence = np.ones(len(frf.frequency)) if frf.coherence is None else frf.coherence[:, k, 0]
+    name = f"{frf.outputs[k]} from {frf.inputs[0]}, article {first.article}"
+    bench_plots.frf_over_coherence(
+        path, frf.frequency, frf.values[:, k, 0], first.truth[:, k], coherence, name,
+        UNIT["accelerance"],
+    )  # fmt: skip
+    blocks.append(Picture(path, "An FRF as it was estimated, and as an ideal front end with ideal "
+                          "sensors at the same places would have it."))  # fmt: skip
+    files.append((path.name, "an FRF and its coherence"))
+    return PageParts(lead(found), [Section("The test", blocks)], found.notes, files)
+
+
+def bench_json(found: BenchResult) -> dict[str, Any]:
+    """``bench.json``: what was tested and how well; nothing of what is sealed."""
+    return {
+        "excitation": found.settings.excitation,
+        "band_hz": found.band,
+        "outputs": found.outputs.labels,
+        "input": found.inputs.labels[0],
+        "mass_kg": found.mass,
+        "recordings": [
+            {
+                "article": r.article,
+                "level_n": r.test.level,
+                "lines": len(r.frf.frequency),
+                "averages": r.averages,
+                "coherence_median": None
+                if r.frf.coherence is None
+                else float(np.median(r.frf.coherence)),
+                "overloads": r.overloads,
+                "transient_largest": None if r.transient is None else float(r.transient.max()),
+            }
+            for r in found.recordings
+        ],
+        "notes": found.notes,
+    }
+
+
+def lead(found: BenchResult) -> str:
+    """The test in one sentence."""
+    s, r = found.settings, found.recordings
+    hidden = [*s.hide, *s.local]
+    return (
+        f"{len(r)} recordings of {s.articles} articles by {s.excitation}, {len(found.outputs.labels)} "
+        f"sensors, {number(found.band[0])} to {number(found.band[1])} Hz"
+        + (f"; {len(hidden)} concealed" if hidden else "")
+        + (
+            f"; overloaded: {sum(bool(x.overloads) for x in r)}"
+            if any(x.overloads for x in r)
+            else ""
+        )
+    )
+
+
+def _facts(found: BenchResult) -> list[tuple[str, str]]:
+    s, first = found.settings, found.recordings[0]
+    out = [
+        ("Driven at", found.inputs.labels[0]),
+        (
+            "Sensors",
+            f"{len(found.outputs.labels)} of {number(1e3 * found.setup.accelerometer.mass)} g",
+        ),
+        ("Weighed", f"{number(found.mass, 5)} kg"),
+        ("Lines", str(len(first.frf.frequency))),
+        ("Articles", f"{s.articles}, " + ("the deck's own" if s.exact else "scattered")),
+    ]
+    return out
+
+
+def _table(found: BenchResult) -> Table:
+    rows = []
+    for r in found.recordings:
+        gamma = None if r.frf.coherence is None else float(np.median(r.frf.coherence))
+        error = np.abs(r.frf.values[:, :, 0] / r.truth - 1)
+        over = ", ".join(f"{k} ({n})" for k, n in r.overloads.items()) or "none"
+        rows.append((r.article, number(r.test.level, 3), number(gamma, 6),
+                     number(100 * float(np.median(error)), 2), over))  # fmt: skip
+    heads = ("article", "level [N]", "coherence", "off the ideal FRF [%]", "overloaded")
+    caption = "Medians over lines and channels; overloads with blocks or lines they happened in."
+    return Table(heads, rows, ("article", "overloaded"), caption)
+
+
+def _typical(r: BenchRecording) -> int:
+    """The channel of median level."""
+    size = np.abs(r.frf.values[:, :, 0]).mean(axis=0)
+    return int(np.argsort(size)[len(size) // 2])
+
+
+def _time(path: Path, r: BenchRecording) -> Path:
+    from ..view import bench_plots
+
+    record = r.sample
+    assert record is not None
+    t = np.arange(record.force.shape[2]) / record.rate
+    signals: dict[str, Any] = {"force [N]": record.force[0, 0]}
+    for k in range(min(_SHOWN, len(record.outputs))):
+        signals[f"{record.outputs[k]} [m/s²]"] = record.response[0, k]
+    return bench_plots.time_histories(path, t, signals, f"Article {r.article}, {r.test.excitation}")
