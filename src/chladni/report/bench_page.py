@@ -77,32 +77,26 @@ def bench_json(found: BenchResult) -> dict[str, Any]:
 def lead(found: BenchResult) -> str:
     """The test in one sentence."""
     s, r = found.settings, found.recordings
-    hidden = [*s.hide, *s.local]
+    hidden, loud = len(s.hide) + len(s.local), sum(bool(x.overloads) for x in r)
     return (
-        f"{len(r)} recordings of {s.articles} articles by {s.excitation}, {len(found.outputs.labels)} "
-        f"sensors, {number(found.band[0])} to {number(found.band[1])} Hz"
-        + (f"; {len(hidden)} concealed" if hidden else "")
-        + (
-            f"; overloaded: {sum(bool(x.overloads) for x in r)}"
-            if any(x.overloads for x in r)
-            else ""
-        )
+        f"{len(r)} recordings of {s.articles} articles by {s.excitation}, "
+        f"{len(found.outputs.labels)} sensors, {number(found.band[0])} to {number(found.band[1])} Hz"
+        + (f"; {hidden} concealed" if hidden else "")
+        + (f"; {loud} of them overloaded" if loud else "")
+    )
     )
 
 
 def _facts(found: BenchResult) -> list[tuple[str, str]]:
     s, first = found.settings, found.recordings[0]
-    out = [
+    grams = number(1e3 * found.setup.accelerometer.mass)
+    return [
         ("Driven at", found.inputs.labels[0]),
-        (
-            "Sensors",
-            f"{len(found.outputs.labels)} of {number(1e3 * found.setup.accelerometer.mass)} g",
-        ),
+        ("Sensors", f"{len(found.outputs.labels)} of {grams} g"),
         ("Weighed", f"{number(found.mass, 5)} kg"),
         ("Lines", str(len(first.frf.frequency))),
         ("Articles", f"{s.articles}, " + ("the deck's own" if s.exact else "scattered")),
     ]
-    return out
 
 
 def _table(found: BenchResult) -> Table:
