@@ -77,13 +77,13 @@ def bench_json(found: BenchResult) -> dict[str, Any]:
 def lead(found: BenchResult) -> str:
     """The test in one sentence."""
     s, r = found.settings, found.recordings
+    low, high = found.band
     hidden, loud = len(s.hide) + len(s.local), sum(bool(x.overloads) for x in r)
     return (
         f"{len(r)} recordings of {s.articles} articles by {s.excitation}, "
-        f"{len(found.outputs.labels)} sensors, {number(found.band[0])} to {number(found.band[1])} Hz"
+        f"{len(found.outputs.labels)} sensors, {number(low)} to {number(high)} Hz"
         + (f"; {hidden} concealed" if hidden else "")
         + (f"; {loud} of them overloaded" if loud else "")
-    )
     )
 
 
