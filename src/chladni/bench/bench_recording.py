@@ -139,10 +139,12 @@ def record(
     rng: np.random.Generator,
     keep_time: bool = False,
     progress: Progress = silent,
+    channels: Channels | None = None,
 ) -> BenchRecording:
     """Run a test of bursts, a multisine or blows, and estimate its FRFs from the time data.
 
-    A stepped sine is run by ``sine_sweep.swept``.
+    A stepped sine is run by ``sine_sweep.swept``. ``channels`` are the sensors of other recordings
+    of the same test; else their sensitivities are drawn.
 
     Raises
     ------
@@ -152,7 +154,7 @@ def record(
     if (test.excitation == "hammer") != (rig.setup.shaker is None):
         raise ModelError("a hammer hits an article without a shaker, anything else needs one")
     rate = sampling_rate(test.band[1])
-    channels = channels_of(rig, rng)
+    channels = channels or channels_of(rig, rng)
     run = PhysicalRun(rig, rate, _finer(rig, test))
     blocks, over = [], np.zeros(1 + len(rig.article.outputs), int)
     signals = list(_signals(rig, test, rate, run.finer, rng))

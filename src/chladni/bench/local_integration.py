@@ -42,37 +42,47 @@ class LocalRun:
         self.force, self.memory = np.zeros(sites), [0.0] * sites
 
     def on(self, u: np.ndarray) -> np.ndarray:
-        """Forces (sites, n) at every sample of the driving inputs u (n_in, n)."""
-        sites, step = len(self.laws), HeldStep.of(self.openings.poles, self.h)
+        """Forces (sites, n) at every sample of the driving inputs u (n_in, n).
+
+        With r = E q + G_0 b f, what the sites would do without a force at the next sample, the
+        recursion is r ← E r + (E G_1 + G_0) b f: two products and a sum a step.
+        """
+        sites = len(self.laws)
+        s = HeldStep.of(self.openings.poles, self.h)
         b, c = self.openings.b[:, -sites:], self.openings.c
-        E, B0, B1 = step.E, step.G0[:, None] * b, step.G1[:, None] * b
-        S = (c @ B1).real
+        S = (c @ (s.G1[:, None] * b)).real
+        W = list(((s.E * s.G1 + s.G0)[:, None] * b).T.copy())
+        seen = np.stack([c.real, -c.imag], axis=-1).reshape(sites, -1)
         free = self.free.on(u).T.tolist()
-        q, f, memory, out = self.state, self.force, self.memory, np.empty((len(free), sites))
-        for n, x_free in enumerate(free):
-            q = E * q
-            if f.any():
-                q += B0 @ f
-            own = (c @ q).real
-            f, memory = _solved(self.laws, own + x_free, S, f, memory)
-            if f.any():
-                q += B1 @ f
+        r, pushed = self.state, np.empty_like(self.state)
+        flat, out, f = r.view(float), np.empty((len(free), sites)), self.force.tolist()
+        # flat: real and imaginary parts of r in turn, as ``seen`` takes them
+        memory = self.memory
+        for n, x in enumerate(free):
+            own = seen @ flat
+            a = [x[i] + float(own[i]) for i in range(sites)]
+            f, memory = _solved(self.laws, a, S, f, memory)
+            np.multiply(r, s.E, out=r)
+            for i in range(sites):
+                if f[i]:
+                    np.multiply(W[i], f[i], out=pushed)
+                    r += pushed
             out[n] = f
-        self.state, self.force, self.memory = q, f, memory
+        self.force, self.memory = np.array(f), memory
         return out.T
 
 
 def _solved(
-    laws: Sequence[LocalForce], a: np.ndarray, S: np.ndarray, before: np.ndarray,
+    laws: Sequence[LocalForce], a: list[float], S: np.ndarray, before: list[float],
     memory: list[float],
-) -> tuple[np.ndarray, list[float]]:  # fmt: skip
+) -> tuple[list[float], list[float]]:  # fmt: skip
     """Forces f with x = a + S f and f_i the law of x_i, and the memories after the step."""
     if len(laws) == 1:
-        one, after = laws[0].solve(float(a[0]), float(S[0, 0]), memory[0])
-        return np.array([one]), [after]
-    f, new = before.copy(), list(memory)
+        one, after = laws[0].solve(a[0], float(S[0, 0]), memory[0])
+        return [one], [after]
+    f, new = list(before), list(memory)
     for _ in range(ROUNDS):
         for i, law in enumerate(laws):
-            others = float(a[i] + S[i] @ f - S[i, i] * f[i])
+            others = a[i] + sum(float(S[i, j]) * f[j] for j in range(len(f)) if j != i)
             f[i], new[i] = law.solve(others, float(S[i, i]), memory[i])
     return f, new

@@ -62,12 +62,13 @@ def swept(
     rng: np.random.Generator,
     keep_time: bool = False,
     progress: Progress = silent,
+    channels: Channels | None = None,
 ) -> BenchRecording:
     """All sweeps of a stepped sine, demodulated line by line.
 
     With local forces, or where time data are wanted, it runs in time; else in closed form.
     """
-    channels = channels_of(rig, rng)
+    channels = channels or channels_of(rig, rng)
     in_time = keep_time or bool(rig.article.laws)
     sweep = (
         _TimeSweep(rig, test, channels, keep_time) if in_time else _ExactSweep(rig, test, channels)

@@ -104,10 +104,12 @@ class Homogeneity:
     rms : float             of log₁₀(H₂ / H₁), complex: the size of the difference
     channel : (n_out, n_in)  ratio of each channel
     frequency : (n_f,)      Hz, the common lines
-    line : (n_f,)           ratio of each line
+    line : (n_f,)           ratio about each line
     limit : float           ratio that chance does not reach
     linear : bool
     p : float               of so large a ratio by chance, N ratio being of a gamma distribution
+    channels : tuple of str  outputs beyond the limit, the worst first; none where it is linear
+    bands : ((low, high), ...)  where lines are beyond it [Hz], the worst first; none likewise
     """
 
     ratio: float
@@ -118,17 +120,25 @@ class Homogeneity:
     limit: float
     linear: bool
     p: float = float("nan")
+    channels: tuple[str, ...] = ()
+    bands: tuple[tuple[float, float], ...] = ()
+
+
+_POOLED = 15  # lines over which a variance is taken: one of few averages is too uncertain alone
+_ABOUT = 31  # lines by which a band is known
+_CHANCE = 0.1  # what the uncertain variances of five sweeps leave of the mean ratio, and more
 
 
 def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     """Is the response proportional to the level? |H₂ - H₁|² over what the noise explains.
 
     Worden and Tomlinson (2001), Nonlinearity in Structural Dynamics, section 2.3 (homogeneity).
-    ``linear`` unless the ratio is beyond chance (1.03, or five standard deviations of a mean of
+    ``linear`` unless the ratio is beyond chance (1.1, or five standard deviations of a mean of
     exponential variates) *and* the responses differ by more than ``least`` in log₁₀.
 
     The second recording is interpolated to the lines of the first; where a recording brings no
-    variance, its noise is what does not follow a parabola through five lines.
+    variance, its noise is what does not follow a parabola through five lines. Variances are means
+    over 15 lines: the reciprocal of one that comes from ν averages is too large by ν/(ν - 1).
     """
     if (low.outputs, low.inputs, low.quantity) != (high.outputs, high.inputs, high.quantity):
         raise ShapeError("the two levels differ in labels or quantity; use FRF.sel first")
@@ -145,20 +155,45 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     f = low.frequency[at]
     H1, H2 = low.values[at], _interpolated(f, high.frequency, high.values)
     noise = noise_of(low)[at] + _interpolated(f, high.frequency, noise_of(high)).real
-    whitened = np.abs(H2 - H1) ** 2 / np.maximum(noise, 1e-12 * np.abs(H1) ** 2 + 1e-300)
+    rounding = 1e-12 * np.abs(H1) ** 2 + 1e-300
+    whitened = np.abs(H2 - H1) ** 2 / np.maximum(_about(noise, _POOLED), rounding)
     delta = wrapped(np.log(H2 / H1) / _LN10)
     ratio, rms = float(whitened.mean()), float(np.sqrt((np.abs(delta) ** 2).mean()))
-    limit = 1 + max(0.03, 5 / np.sqrt(whitened.size))
+    limit = 1 + max(_CHANCE, 5 / np.sqrt(whitened.size))
+    linear = bool(ratio <= limit or rms <= least)
+    channel, line = whitened.mean(axis=0), _about(whitened.mean(axis=(1, 2)), _ABOUT)
     return Homogeneity(
         ratio=ratio,
         rms=rms,
-        channel=whitened.mean(axis=0),
+        channel=channel,
         frequency=f,
-        line=whitened.mean(axis=(1, 2)),
+        line=line,
         limit=float(limit),
-        linear=bool(ratio <= limit or rms <= least),
+        linear=linear,
         p=float(gammaincc(whitened.size, whitened.size * ratio)),
+        channels=() if linear else _beyond(low.outputs, channel.max(axis=1), len(f)),
+        bands=() if linear else _bands_beyond(f, line),
     )
+
+
+def _about(x: np.ndarray, lines: int) -> np.ndarray:
+    """Mean over so many lines about each (n_f, ...)."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(x, min(lines, len(x)), axis=0, mode="nearest"))
+
+
+def _beyond(outputs: Sequence[str], ratio: np.ndarray, lines: int) -> tuple[str, ...]:
+    """Outputs (n_out,) whose ratio chance does not reach, the worst first."""
+    limit = 1 + max(2 * _CHANCE, 5 / np.sqrt(lines))
+    return tuple(outputs[k] for k in np.argsort(-ratio, kind="stable") if ratio[k] > limit)
+
+
+def _bands_beyond(f: np.ndarray, line: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Runs of lines whose ratio chance does not reach, the worst first [Hz]."""
+    found = runs(f, line > 1 + 5 / np.sqrt(min(_ABOUT, len(f))))
+    worst = [float(line[(f >= a) & (f <= b)].max()) for a, b in found]
+    return tuple(found[k] for k in np.argsort(-np.array(worst), kind="stable"))
 
 
 def levels_checked(
@@ -177,20 +212,35 @@ def levels_checked(
         if compared.linear or name == "repeatability":
             continue
         odd.add(name)
-        worst = float(compared.frequency[compared.line.argmax()])
         sentence = (
             f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: they are "
             f"apart {compared.ratio:.3g} times as much as their noise (p = {compared.p:.2g}, "
-            f"{compared.rms:.2g} decades rms), most near {worst:.4g} Hz: not linear."
+            f"{compared.rms:.2g} decades rms), {_worst(compared)}: not linear."
         )
         mend = "name one level by use in case.toml, and read the result as that level's own"
-        found.append(Finding("not linear", sentence, "warning", (), mend, compared.ratio))
+        named = compared.channels[:_NAMED]
+        found.append(Finding("not linear", sentence, "warning", named, mend, compared.ratio))
     needs = {"homogeneity": "needs two levels", "repeatability": "needs a second recording"}
     checks = [
         Check(name, "; ".join(lines) or needs[name], name not in odd if lines else None)
         for name, lines in said.items()
     ]
     return found, checks
+
+
+_NAMED = 4  # channels and bands
+
+
+def _worst(h: Homogeneity) -> str:
+    """Channels and bands in which two levels differ most, in words."""
+    said = f"most near {h.frequency[h.line.argmax()]:.4g} Hz"
+    if h.channels:
+        more = f" and {len(h.channels) - _NAMED} more" if len(h.channels) > _NAMED else ""
+        said += f", at {', '.join(h.channels[:_NAMED])}{more}"
+    if h.bands:
+        bands = ", ".join(f"{a:.4g} to {b:.4g} Hz" for a, b in h.bands[:_NAMED])
+        said += f", in {bands}"
+    return said
 
 
 def _compared(one: Recording, other: Recording) -> Homogeneity | None:

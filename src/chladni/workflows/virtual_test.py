@@ -9,7 +9,14 @@ from threadpoolctl import threadpool_limits
 
 from ..bench.article_scatter import Scatter, fitted, scattered_article
 from ..bench.bench_article import BenchArticle
-from ..bench.bench_recording import BenchRecording, BenchTest, level_for, record
+from ..bench.bench_recording import (
+    BenchRecording,
+    BenchTest,
+    Channels,
+    channels_of,
+    level_for,
+    record,
+)
 from ..bench.bench_rig import BenchRig, BenchSetup, bench_rig
 from ..bench.excitation import Kind
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
@@ -157,6 +164,8 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         truth["local"] = sites
     articles = _drawn(nominal, settings, scatter, ABOVE_BAND * band[1], rng)
     schedule = dwells_of(stages_for(*band)) if settings.excitation == "stepped-sine" else ()
+    channels = channels_of(bench_rig(nominal, setup), rng)
+    truth["sensitivity"] = channels.true / channels.stated
     recordings: list[BenchRecording] = []
     jobs = [(a, factor) for a in articles for factor in settings.levels]
     for k, (article, factor) in enumerate(jobs):
@@ -166,7 +175,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         )  # fmt: skip
         part = within(progress, 0.2 + 0.8 * k / len(jobs), 0.2 + 0.8 * (k + 1) / len(jobs))
         rig, seed = bench_rig(article, setup), np.random.default_rng([settings.seed, 8, k])
-        recordings.append(_run(rig, test, schedule, seed, settings.keep_time, part))
+        recordings.append(_run(rig, test, schedule, seed, settings.keep_time, part, channels))
     mass = articles[0].weight * (1 + BALANCE * rng.normal())
     truth |= {
         "weight_kg": {a.name: a.weight for a in articles},
@@ -181,11 +190,11 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
 
 def _run(
     rig: BenchRig, test: BenchTest, schedule: Sequence[SineLine], rng: np.random.Generator,
-    keep_time: bool, progress: Progress,
+    keep_time: bool, progress: Progress, channels: Channels,
 ) -> BenchRecording:  # fmt: skip
     if test.excitation == "stepped-sine":
-        return swept(rig, test, schedule, rng, keep_time, progress)
-    return record(rig, test, rng, keep_time, progress)
+        return swept(rig, test, schedule, rng, keep_time, progress, channels)
+    return record(rig, test, rng, keep_time, progress, channels)
 
 
 def _band(case: Case) -> tuple[float, float]:
