@@ -19,6 +19,7 @@ from ..output import write_json, write_text
 from ..workflows.virtual_test import BenchResult
 
 Files = list[tuple[str, str]]
+LEAST = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
 
 def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
@@ -105,15 +106,27 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
         for name, r in zip(names, found.recordings, strict=True):
             lines += ["", "[[recording]]", f"file = {json.dumps(name + '.uff')}",
                       f'article = "{r.article}"', f"level = {r.test.level:.6g}"]  # fmt: skip
-    if case.band is not None:
-        lines += ["", "[band]", f"fit = [{case.band[0]:g}, {case.band[1]:g}]"]
+    band, held = _covered(case.band, found.band), _covered(case.held_band, found.band)
+    if band is not None:
+        lines += ["", "[band]", f"fit = [{band[0]:g}, {band[1]:g}]"]
         if case.exclude:
             lines.append(f"exclude = {[list(b) for b in case.exclude]}")
-    if case.held_band is not None or case.held_sensors is not None:
+    if held is not None or case.held_sensors is not None:
         lines += ["", "[held_out]"]
         if case.held_sensors is not None:
-            held = case.held_sensors
-            lines.append(f"sensors = {json.dumps(held if isinstance(held, int) else list(held))}")
-        if case.held_band is not None:
-            lines.append(f"band = [{case.held_band[0]:g}, {case.held_band[1]:g}]")
+            kept = case.held_sensors
+            lines.append(f"sensors = {json.dumps(kept if isinstance(kept, int) else list(kept))}")
+        if held is not None:
+            lines.append(f"band = [{held[0]:g}, {held[1]:g}]")
     return "\n".join([*lines, ""])
+
+
+def _covered(
+    band: tuple[float, float] | None, by: tuple[float, float]
+) -> tuple[float, float] | None:
+    """What of a band the test covers [Hz]; None where that is less than half of it."""
+    if band is None:
+        return None
+    low, high = max(band[0], by[0]), min(band[1], by[1])
+    enough = high - low >= LEAST * (band[1] - band[0]) or band[0] <= by[0] < by[1] <= band[1]
+    return (low, high) if enough else None

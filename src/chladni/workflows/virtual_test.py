@@ -160,7 +160,8 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     nominal, truth = _article(case, settings, setup, band, scatter, rng)
     level = settings.level or level_for(bench_rig(nominal, setup), settings.excitation, band)
     if settings.local:
-        nominal, sites = local_site(nominal, setup, settings.local, level, band, rng)
+        sized = BenchTest(settings.excitation, band, level)
+        nominal, sites = local_site(nominal, setup, settings.local, sized, rng)
         truth["local"] = sites
     articles = _drawn(nominal, settings, scatter, ABOVE_BAND * band[1], rng)
     schedule = dwells_of(stages_for(*band)) if settings.excitation == "stepped-sine" else ()

@@ -1,0 +1,209 @@
+"""A case goes on the bench and comes back as a case that every other command reads."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.effects import registry
+from chladni.ema.frf_estimate import estimate
+from chladni.errors import FileError, LabelError
+from chladni.io.package_files import mesh_path
+from chladni.workflows.virtual_test import BenchSettings, virtual_test
+
+QUICK = BenchSettings(band=(15.0, 120.0), resolution=0.5, averages=4, sweeps=2)
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return mesh_path("demo/case.toml").parent
+
+
+@pytest.fixture(scope="module")
+def case(demo):
+    return chladni.load_case(demo)
+
+
+def benched(case, **changes):
+    return virtual_test(case, replace(QUICK, **changes))
+
+
+@pytest.fixture(scope="module")
+def folder(demo, tmp_path_factory):
+    """What ``chladni bench --time`` writes of two articles at two levels."""
+    out = tmp_path_factory.mktemp("bench") / "out"
+    words = ["bench", str(demo), "--band", "15:120", "--resolution", "0.5", "--averages", "4"]
+    words += [
+        "--articles",
+        "2",
+        "--levels",
+        "1,2",
+        "--time",
+        "--hide",
+        "point-mass",
+        "--seed",
+        "540",
+    ]
+    done = CliRunner().invoke(application(), [*words, "--out", str(out)])
+    assert done.exit_code == 0, (done.output, done.exception)
+    return out
+
+
+def test_the_case_that_is_left_can_be_read(folder, case):
+    made = chladni.load_case(folder / "case")
+    assert [(r.article, r.level is not None) for r in made.recordings] == [
+        ("A", True), ("A", True), ("B", True), ("B", True),
+    ]  # fmt: skip
+    assert made.frfs[0].outputs == case.outputs.labels
+    assert made.setup.hangers == case.setup.hangers
+    assert made.band == (15.0, 120.0)  # of the case's, what the test covered
+    assert made.held_band is None
+    assert sum(kg for _, kg in made.carried) == pytest.approx(20 * 0.005 + 0.4 * 0.023)
+    np.testing.assert_allclose(made.assembly.points, case.assembly.points, atol=1e-9)
+
+
+def test_truth_is_sealed_and_stands_nowhere_else(folder):
+    truth = json.loads((folder / "sealed" / "truth.json").read_text())
+    value = truth["effects"]["point-mass"]["value"]
+    for path in (folder / "case").rglob("*.toml"):
+        assert f"{value:.4g}" not in path.read_text()
+    told = (folder / "bench.json").read_text()
+    assert "point-mass" not in told
+    assert str(value)[:8] not in told
+
+
+def test_time_data_give_the_frfs_beside_them(folder):
+    """Read from the universal file and estimated as ``chladni test`` does."""
+    name = min((folder / "case").glob("article_A_*N_time.uff"))
+    (read,) = chladni.load_recordings(name)
+    beside = name.with_name(name.name.replace("_time", ""))
+    (frf,) = (r.frf for r in chladni.load_recordings(beside))
+    found = estimate(read.time).frf.sel(band=(14.9, 120.1))
+    assert found.values.shape == frf.values.shape
+    size = np.abs(frf.values).max()
+    np.testing.assert_allclose(found.values, frf.values, atol=1e-4 * size)
+    test = CliRunner().invoke(application(), ["test", str(name), "--out", str(name.parent / "t")])
+    assert test.exit_code == 0, test.output
+    shutil.rmtree(name.parent / "t")
+
+
+def test_the_page_shows_a_stretch_of_time_and_an_frf(folder):
+    page = (folder / "report.html").read_text()
+    for words in ("Driven at", "One block as the front end recorded it", "off the ideal FRF"):
+        assert words in page
+    assert (folder / "time.png").stat().st_size > 5000
+
+
+def test_the_same_seed_is_the_same_test_and_another_is_not(case):
+    a, b, c = (benched(case, seed=s).recordings[0].frf.values for s in (540, 540, 541))
+    np.testing.assert_array_equal(a, b)
+    assert not np.allclose(a, c)
+
+
+def test_levels_of_one_article_differ_by_noise_alone(case):
+    """The sensors keep their sensitivities; a linear article answers alike."""
+    found = benched(case, excitation="multisine", levels=(1.0, 2.0), resolution=0.2)
+    low, high = (r.frf.values for r in found.recordings)
+    assert np.median(np.abs(high / low - 1)) < 2e-3
+
+
+def test_articles_differ_and_exact_ones_do_not(case):
+    def f(result):
+        return [np.array(v)[6:12] for v in result.truth["frequency_hz"].values()]
+
+    a, b = f(benched(case, articles=2))
+    assert 1e-4 < np.abs(b / a - 1).max() < 0.05
+    a, b = f(benched(case, articles=2, exact=True))
+    np.testing.assert_allclose(a, b)
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_every_effect_of_the_catalogue_can_be_hidden(case, name):
+    """What is hidden changes the recording by more than its noise."""
+    plain = benched(case, exact=True, seed=540)
+    found = benched(case, exact=True, seed=540, hide=(name,))
+    assert found.truth["effects"][name]
+    away = np.abs(found.recordings[0].truth / plain.recordings[0].truth - 1)
+    gain = np.abs(found.recordings[0].frf.values / plain.recordings[0].frf.values - 1)
+    assert max(np.median(away), np.median(gain, axis=0).max()) > 5e-3
+
+
+def test_weighed_mass_is_the_articles_without_sensors(case):
+    from chladni.fem.energy import mass_properties
+
+    found = benched(case, exact=True)
+    assert found.mass == pytest.approx(mass_properties(case.assembly)[0], rel=3e-3)
+
+
+def test_a_sine_follows_the_schedule_of_the_thesis(case):
+    found = benched(case, excitation="stepped-sine", band=(20.0, 60.0))
+    f = found.recordings[0].frf.frequency
+    np.testing.assert_allclose(f[0], 20.0)
+    assert f[1] / f[0] == pytest.approx(2 ** (1 / 200), rel=1e-3)
+    assert {(x.delay, x.measure) for x in found.schedule} == {(30, 20), (80, 20)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"hide": ("point-moss",)}, "no effect 'point-moss'"),
+        ({"local": ("gap",)}, "no local force 'gap'; there are clearance"),
+        ({"excitation": "swept-sine"}, "no excitation 'swept-sine'; there are burst-random"),
+        ({"articles": 0}, "1 to 26"),
+        ({"levels": (0.0,)}, "above zero"),
+    ],
+)
+def test_what_is_not_there_is_refused(case, changes, words):
+    with pytest.raises(LabelError, match=words):
+        benched(case, **changes)
+
+
+def test_a_case_without_sensors_is_refused(case):
+    bare = replace(case.outputs, labels=(), grids=np.zeros(0, int), points=np.zeros((0, 3)),
+                   directions=np.zeros((0, 3)), sd=np.zeros(0), mass=np.zeros(0))  # fmt: skip
+    with pytest.raises(FileError, match="names no sensor"):
+        benched(replace(case, outputs=bare))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--levels", "a"], "is not of the form"),
+        (["--excitation", "noise"], "no excitation"),
+        (["--sensors", "x.csv"], "names its sensors"),
+        (["--band", "100:20"], "must increase"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, said):
+    done = CliRunner().invoke(
+        application(), ["bench", str(demo), *words, "--out", str(tmp_path / "o")]
+    )
+    assert done.exit_code == 2
+    assert said in done.output
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_bare_deck_is_tested_where_a_table_says(demo, folder, tmp_path):
+    """Deck, units and a table of sensors; without units it is refused."""
+    words = ["bench", str(demo / "deck.bdf"), "--sensors", str(folder / "case" / "sensors.csv")]
+    quick = [
+        "--band",
+        "15:80",
+        "--resolution",
+        "1",
+        "--averages",
+        "2",
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    refused = CliRunner().invoke(application(), [*words, *quick])
+    assert refused.exit_code == 2
+    assert "--units" in refused.output
+    done = CliRunner().invoke(application(), [*words, *quick, "--units", "mm-t-s"])
+    assert done.exit_code == 0, done.output
+    assert chladni.load_case(tmp_path / "o" / "case").frfs[0].values.shape[1] == 20
