@@ -19,6 +19,7 @@ from ..output import write_json, write_text
 from ..workflows.virtual_test import BenchResult
 
 Files = list[tuple[str, str]]
+CLEAR = 0.04  # of a cord's frequency to either side: two of its half-bandwidths
 LEAST = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
 
@@ -109,8 +110,7 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
     band, held = _covered(case.band, found.band), _covered(case.held_band, found.band)
     if band is not None:
         lines += ["", "[band]", f"fit = [{band[0]:g}, {band[1]:g}]"]
-        if case.exclude:
-            lines.append(f"exclude = {[list(b) for b in case.exclude]}")
+    lines += _left_out(case, found, band)
     if held is not None or case.held_sensors is not None:
         lines += ["", "[held_out]"]
         if case.held_sensors is not None:
@@ -119,6 +119,19 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
         if held is not None:
             lines.append(f"band = [{held[0]:g}, {held[1]:g}]")
     return "\n".join([*lines, ""])
+
+
+def _left_out(case: Case, found: BenchResult, band: tuple[float, float] | None) -> list[str]:
+    """Bands the case leaves out, and that of the cords, which anyone can tap."""
+    out = [list(b) for b in case.exclude]
+    low, high = band or found.band
+    tapped = [f for f in found.cords if low <= f <= high]
+    if tapped:
+        out.append([round((1 - CLEAR) * min(tapped), 2), round((1 + CLEAR) * max(tapped), 2)])
+    if not out:
+        return []
+    rung = f"  # the cords ring at {', '.join(f'{f:.3g}' for f in tapped)} Hz" * bool(tapped)
+    return [*([] if band else ["", "[band]"]), f"exclude = {out}{rung}"]
 
 
 def _covered(

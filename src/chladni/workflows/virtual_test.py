@@ -18,6 +18,7 @@ from ..bench.bench_recording import (
     record,
 )
 from ..bench.bench_rig import BenchRig, BenchSetup, bench_rig
+from ..bench.cords import cords_for
 from ..bench.excitation import Kind
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
 from ..bench.sine_sweep import swept
@@ -88,6 +89,7 @@ class BenchResult:
     recordings : tuple
     truth : what was concealed, true places and scatter
     schedule : lines of the stepped sine, else none
+    cords : (k,) as they ring when tapped [Hz]
     """
 
     settings: BenchSettings
@@ -99,6 +101,7 @@ class BenchResult:
     recordings: tuple[BenchRecording, ...]
     truth: dict[str, Any]
     schedule: tuple[SineLine, ...] = ()
+    cords: tuple[float, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
 
@@ -185,6 +188,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
+        tuple(c.frequency for c in cords_for(mass, len(case.setup.hangers))),
         tuple(_notes(case, settings, recordings)),
     )  # fmt: skip
 
