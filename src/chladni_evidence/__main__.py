@@ -2,10 +2,13 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 from chladni.errors import ChladniError, LabelError
 
+from .benched_recording import PLAIN, Recorder
 from .evidence_run import run
 from .evidence_sets import SETS, orders, purpose, seed_range
 from .fuzz import DUE, fuzz
@@ -29,6 +32,7 @@ def main(words: list[str] | None = None) -> int:
             chosen = [o for o in chosen if not wanted or getattr(o, field) in wanted.split(",")]
         if not chosen:
             raise LabelError(f"no case of the set {asked.set} is left by --kinds and --structures")
+        chosen = [replace(o, recorder=asked.recorder) for o in chosen]
         run(chosen, asked.out, asked.workers, _say, asked.limit)
     except ChladniError as error:
         sys.stderr.write(f"chladni_evidence: {error}\n")
@@ -80,6 +84,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--kinds", default="", help="only these, with commas")
     command.add_argument("--structures", default="", help="only these, with commas")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds a diagnosis may take")
+    command.add_argument(
+        "--recorder", choices=get_args(Recorder), default=PLAIN,
+        help="how recordings are made: noise on every line, or a test on the virtual bench",
+    )  # fmt: skip
     command.add_argument("--out", type=Path, required=True)
     return top
 

@@ -41,7 +41,12 @@ def made(order: Order, places: RunFolders) -> str:
     if not said.exists():
         with threadpool_limits(1):
             case = made_case(
-                order.bench(), order.kind, order.seed, order.mesh, places.out / "cache"
+                order.bench(),
+                order.kind,
+                order.seed,
+                order.mesh,
+                places.out / "cache",
+                order.recorder,
             )
         write_text(said, write_case(case, places.of("cases", order), sealed) + "\n")
     mark = said.read_text(encoding="ascii").strip()

@@ -8,6 +8,7 @@ from chladni.errors import LabelError
 from chladni_specimens.forms import FORMS
 
 from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailgate_bench
+from .benched_recording import PLAIN, Recorder
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
 
@@ -36,6 +37,7 @@ class Order:
     kind: str
     seed: int
     mesh: str
+    recorder: Recorder = PLAIN
 
     @property
     def name(self) -> str:

@@ -15,6 +15,7 @@ from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import cell_areas
 from chladni.io.nastran import write_assembly
+from chladni.io.uff.estimate_stamp import stamp
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
 from chladni.model.properties import ShellSection
@@ -23,6 +24,7 @@ from chladni.units import units
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
+from .benched_recording import PLAIN, Benched, Recorder, benched_recording, can_be_benched
 from .footing import Spots, footing
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
@@ -43,12 +45,16 @@ LIGHT = 5e-4  # error of the balance, relative
 
 @dataclass(frozen=True, eq=False)
 class MadeCase:
-    """What the user has (bench, recording, weighed mass) and what is sealed."""
+    """What the user has (bench, recording, weighed mass) and what is sealed.
+
+    ``benched`` is what the lab knows of a recording that the virtual bench made.
+    """
 
     bench: Bench
     frf: FRF
     mass: float
     truth: dict[str, Any]
+    benched: Benched | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +88,21 @@ class _Rig:
         return accelerance(modes, phi_o, phi_i, zeta, lines, hidden.couplings), modes
 
 
-def made_case(bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None) -> MadeCase:
+def made_case(
+    bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None,
+    recorder: Recorder = PLAIN,
+) -> MadeCase:  # fmt: skip
     """An article of one of the bench's meshes with part scatter and an effect, measured.
 
     The effect grows (up to fivefold) until it moves the responses over the fitted band by twice
     what the scatter moves them, or twice ``FULL`` where that is less; both figures (rms decades)
     are in the truth. On CalculiX' mesh the size is found with our elements, the recording comes
     from CalculiX.
+
+    Parameters
+    ----------
+    recorder : "independent noise" on every line, or a test on the virtual bench; what depends on
+        frequency by a law of its own (rotors, foam, friction, lumps) keeps the first
     """
     common = [seed, *bench.name.encode(), *mesh.encode()]
     rng, noise = np.random.default_rng(common), np.random.default_rng([*common, *kind.encode()])
@@ -104,18 +118,25 @@ def made_case(bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None 
     hidden, effect, size = _sized(rig, site, kind, [seed, *kind.encode()], own, scatter, band)
     solver: Solver = "calculix" if mesh == "calculix" else "chladni"
     H, modes = rig.responses(hidden, bench.lines, solver)
-    frf = recorded(H, bench.lines, CHAIN, noise, bench.outputs.labels, bench.drive.labels)
-    frf = _spoiled(frf, hidden)
+    tested = None
+    if recorder != PLAIN and can_be_benched(hidden, modes):
+        tested = benched_recording(
+            bench, hidden, zeta, recorder, solver, rig.residual_bending, cache, noise
+        )
+        frf = tested.frf
+    else:
+        frf = recorded(H, bench.lines, CHAIN, noise, bench.outputs.labels, bench.drive.labels)
+        frf = _spoiled(frf, hidden)
     weight = mass_properties(hidden.article)[0] - hidden.unweighed
     truth = {
         "effect": kind, "seed": seed, "structure": bench.name, "mesh": mesh,
-        "solver": solver,
+        "solver": solver, **({} if tested is None else {"recorded_by": recorder}),
         **hidden.truth, "size": size, **_ordinary(bench.deck, hidden.article),
         "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
         "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
         "drive": bench.drive.labels[0], "mass_kg": weight,
     }  # fmt: skip
-    return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth)
+    return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth, tested)
 
 
 def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
@@ -175,8 +196,9 @@ def write_case(case: MadeCase, folder: Path, sealed: Path) -> str:
     """The case as a user would have it, elsewhere the truth; the hash of the sealed file."""
     folder.mkdir(parents=True, exist_ok=True)
     write_assembly(case.bench.deck, folder / "deck.bdf", units("mm-t-s"))
-    write_uff(folder / "recording.uff", case.frf)
-    write_text(folder / "sensors.csv", _sensors(case.bench))
+    title = stamp(case.benched.averages, 0.0) if case.benched else "NONE"
+    write_uff(folder / "recording.uff", case.frf, title=title)
+    write_text(folder / "sensors.csv", _sensors(case))
     write_text(folder / "case.toml", _toml(case))
     return seal_hash(write_json(sealed, case.truth))
 
@@ -191,11 +213,16 @@ def opened(sealed: Path) -> dict[str, Any]:
     return dict(json.loads(sealed.read_text(encoding="utf-8")))
 
 
-def _sensors(bench: Bench) -> str:
-    """The table of sensors and the shaker."""
-    rows = ["label,grid,x,y,z,nx,ny,nz,role"]
-    for spots, role in ((bench.outputs, "output"), (bench.drive, "input")):
-        rows += [_sensor(spots, k, role) for k in range(len(spots))]
+def _sensors(case: MadeCase) -> str:
+    """The table of sensors and the shaker, with their masses where the bench put them on."""
+    bench, known = case.bench, case.benched
+    masses = (known.sensor_mass, known.gauge_mass) if known else (0.0, 0.0)
+    rows = ["label,grid,x,y,z,nx,ny,nz,role" + ",mass" * (known is not None)]
+    for spots, role, m in zip(
+        (bench.outputs, bench.drive), ("output", "input"), masses, strict=True
+    ):
+        tail = f",{m:g}" * (known is not None)
+        rows += [_sensor(spots, k, role) + tail for k in range(len(spots))]
     return "\n".join([*rows, ""])
 
 

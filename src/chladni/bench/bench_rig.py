@@ -20,13 +20,14 @@ NARROW = 0.04  # relative distance between the swinging frequencies: no pole is 
 class BenchSetup:
     """What the article is tested with.
 
-    ``cords`` None: as many as there are hangers, tuned as the thesis' were; ``shaker`` None: it is
-    hit by a hammer.
+    ``cords`` None: as many as there are hangers, tuned as the thesis' were, with rubber at their
+    ends or not; ``shaker`` None: it is hit by a hammer.
     """
 
     accelerometer: AccelerometerType = field(default_factory=AccelerometerType)
     shaker: Shaker | None = field(default_factory=Shaker)
     cords: tuple[Cord, ...] | None = None
+    rubber: bool = False
     front_end: FrontEnd = field(default_factory=FrontEnd)
 
 
@@ -75,7 +76,8 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     """Couple all that is on the bench, and find its poles."""
     setup = setup or BenchSetup()
     r = len(article.frequency)
-    cords = cords_for(article.weight, len(article.hangers)) if setup.cords is None else setup.cords
+    usual = cords_for(article.weight, len(article.hangers), setup.rubber)
+    cords = usual if setup.cords is None else setup.cords
     lines = 3 * INNER * len(article.hangers)
     n = r + lines + (setup.shaker is not None)
 

@@ -4,7 +4,7 @@ Echaniz Granado (2015), section 4.2.4.1: tapped, the left cord rang at 23 Hz, th
 24.5 Hz, and both were seen in the responses nearest to them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ GRAVITY = 9.80665
 THESIS = (23.0, 24.5)  # [Hz]
 BOUNCE = 2.5  # of the article on its cords [Hz]: the highest rigid motion stays below 5 Hz
 LENGTH = 1.0  # [m]
+RUBBER = 0.5  # damping of a cord with soft rubber taped to its end: its peak is gone
 INNER = 1  # resonances of a cord that are modelled, each way: no higher one is told of
 
 
@@ -51,9 +52,10 @@ def cord(weight: float, number: int, frequency: float, length: float = LENGTH) -
     )
 
 
-def cords_for(weight: float, number: int) -> tuple[Cord, ...]:
-    """Cords whose resonances are those of the thesis in turn."""
-    return tuple(cord(weight, number, THESIS[k % len(THESIS)]) for k in range(number))
+def cords_for(weight: float, number: int, rubber: bool = False) -> tuple[Cord, ...]:
+    """Cords whose resonances are those of the thesis in turn, with rubber at their ends or not."""
+    bare = (cord(weight, number, THESIS[k % len(THESIS)]) for k in range(number))
+    return tuple(replace(c, damping=RUBBER) if rubber else c for c in bare)
 
 
 @dataclass(frozen=True, eq=False)

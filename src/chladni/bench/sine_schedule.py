@@ -70,8 +70,11 @@ def dwells_of(
     return tuple(line for line in out if band[0] <= line.frequency <= band[1])
 
 
-def stages_for(low: float, high: float) -> tuple[Stage, ...]:
+def stages_for(low: float, high: float, delay: float = 0.0) -> tuple[Stage, ...]:
     """Table 3 on another band: its ranges below 400 Hz, above them the last one octave by octave.
+
+    ``delay`` cycles are waited at least: the table is that of a tailgate whose damping is 1 % in
+    its lowest modes, and e^(-2πζN) of a transient is left after N cycles.
 
     The lines begin at ``low`` and end at ``high`` [Hz]; below 10 Hz the first range is as it is at
     10 Hz.
@@ -85,6 +88,7 @@ def stages_for(low: float, high: float) -> tuple[Stage, ...]:
     for one in ranges:
         if start < min(one.high, high):
             stop = min(one.high, high)
-            stages.append(Stage(start, stop, one.per_octave, one.delay, one.measure, one.share))
+            wait = max(one.delay, delay)
+            stages.append(Stage(start, stop, one.per_octave, wait, one.measure, one.share))
             start = stop
     return tuple(stages)

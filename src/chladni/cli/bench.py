@@ -47,6 +47,12 @@ def run(
         int, typer.Option(help="Bursts, periods of a multisine, blows.", min=2)
     ] = 20,
     sweeps: Annotated[int, typer.Option(help="Of a stepped sine.", min=1)] = 5,
+    delay: Annotated[
+        float, typer.Option(help="Cycles a stepped sine waits at least at every line.", min=0)
+    ] = 0.0,
+    rubber: Annotated[
+        bool, typer.Option("--rubber", help="Rubber at the cords' ends: they hardly ring.")
+    ] = False,
     time: Annotated[bool, typer.Option("--time", help="Write the time data as well.")] = False,
     seed: Annotated[int, typer.Option(help="Of all that is drawn.", min=0)] = 0,
     sensors: Annotated[
@@ -73,6 +79,8 @@ def run(
         resolution=resolution,
         averages=averages,
         sweeps=sweeps,
+        delay=delay,
+        rubber=rubber,
         keep_time=time,
     )
     from ..report.bench_folder import write_bench

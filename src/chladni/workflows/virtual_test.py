@@ -57,6 +57,8 @@ class BenchSettings:
     exact : the articles are the deck's own, without scatter
     finer : the articles' mesh is the deck's with every shell cut in four
     resolution, averages, sweeps : as ``BenchTest`` has them
+    delay : cycles a stepped sine waits at every line, where the thesis' table says less
+    rubber : whether the cords' ends are taped with it, so that they hardly ring
     keep_time : whether time data are kept
     """
 
@@ -73,6 +75,8 @@ class BenchSettings:
     resolution: float = 0.05
     averages: int = 20
     sweeps: int = 5
+    delay: float = 0.0
+    rubber: bool = False
     keep_time: bool = False
 
 
@@ -156,7 +160,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     rng = np.random.default_rng([settings.seed, 7])
     progress("modes", 0.0)
     band = settings.band or _band(case)
-    setup = BenchSetup()
+    setup = BenchSetup(rubber=settings.rubber)
     if settings.excitation == "hammer":
         setup = replace(setup, shaker=None)
     scatter = fitted()
@@ -167,7 +171,11 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         nominal, sites = local_site(nominal, setup, settings.local, sized, rng)
         truth["local"] = sites
     articles = _drawn(nominal, settings, scatter, ABOVE_BAND * band[1], rng)
-    schedule = dwells_of(stages_for(*band)) if settings.excitation == "stepped-sine" else ()
+    schedule = (
+        dwells_of(stages_for(*band, settings.delay))
+        if settings.excitation == "stepped-sine"
+        else ()
+    )
     channels = channels_of(bench_rig(nominal, setup), rng)
     truth["sensitivity"] = channels.true / channels.stated
     recordings: list[BenchRecording] = []
@@ -188,7 +196,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
-        tuple(c.frequency for c in cords_for(mass, len(case.setup.hangers))),
+        () if settings.rubber else tuple(c.frequency for c in cords_for(mass, len(case.setup.hangers))),
         tuple(_notes(case, settings, recordings)),
     )  # fmt: skip
 

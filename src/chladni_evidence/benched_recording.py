@@ -1,0 +1,131 @@
+"""A recording of an article as the virtual bench makes it: cords, shaker, sensors, front end.
+
+In place of independent noise on every line the recording has what a lab's has: sensors a little
+beside their places and tilted, sensitivities a little off, cords (with rubber at their ends, as a
+lab that heard them ring tapes it there), a stinger, transients or leakage, noise of sensors and
+converter.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from chladni.bench.accelerometers import AccelerometerType
+from chladni.bench.bench_article import BenchArticle
+from chladni.bench.bench_recording import BenchTest, level_for, record
+from chladni.bench.bench_rig import BenchSetup, bench_rig
+from chladni.bench.sine_schedule import dwells_of, stages_for
+from chladni.bench.sine_sweep import swept
+from chladni.dynamics.frf import FRF
+from chladni.fem.energy import mass_properties
+from chladni.geometry.facets import tangents, unit
+from chladni.model.assembly import Assembly
+
+from .article_modes import ArticleModes, Solver, article_modes
+from .bench_of_structure import Bench
+from .footing import Footing, Spots, footing
+from .hidden import Hidden
+from .response_of_article import seen
+
+Recorder = Literal["independent noise", "stepped-sine", "burst-random"]
+PLAIN: Recorder = "independent noise"
+LINES = 1500  # of burst random over the band, at most: more take minutes to identify
+DELAY = 200.0  # cycles: of the transient of a mode of 0.4 % damping 0.7 % is left
+
+
+@dataclass(frozen=True, eq=False)
+class Benched:
+    """What the bench recorded, and what the lab knows of it.
+
+    Attributes
+    ----------
+    frf : FRF            at the places the user believes in
+    averages : float
+    sensor_mass, gauge_mass : what each device adds to the article [kg]
+    """
+
+    frf: FRF
+    averages: float
+    sensor_mass: float
+    gauge_mass: float
+
+
+def can_be_benched(hidden: Hidden, modes: ArticleModes) -> bool:
+    """Whether its modes say all of it: nothing in it depends on frequency by a law of its own."""
+    return not hidden.couplings and not modes.loss.any()
+
+
+def benched_recording(
+    bench: Bench, hidden: Hidden, zeta: np.ndarray, by: Recorder, solver: Solver,
+    residual_bending: bool, cache: Path | None, rng: np.random.Generator,
+) -> Benched:  # fmt: skip
+    """The article with what is hidden in it, tested over the bench's lines."""
+    setup = BenchSetup(rubber=True)
+    article = _article(
+        bench, hidden, zeta, setup.accelerometer, solver, residual_bending, cache, rng
+    )
+    rig = bench_rig(article, setup)
+    band = (float(bench.lines[0]), float(bench.lines[-1]))
+    if by == "stepped-sine":
+        test = BenchTest("stepped-sine", band, level_for(rig, "stepped-sine", band))
+        found = swept(rig, test, dwells_of(stages_for(*band, DELAY)), rng)
+    else:
+        resolution = max(0.05, (band[1] - band[0]) / LINES)
+        level = level_for(rig, "burst-random", band)
+        found = record(rig, BenchTest("burst-random", band, level, resolution), rng)
+    assert setup.shaker is not None
+    gauge = setup.shaker.gauge
+    return Benched(
+        replace(found.frf, values=hidden.spoil(found.frf.values)), found.averages,
+        setup.accelerometer.mass, gauge.mass * gauge.beyond,
+    )  # fmt: skip
+
+
+def _article(
+    bench: Bench, hidden: Hidden, zeta: np.ndarray, kind: AccelerometerType, solver: Solver,
+    residual_bending: bool, cache: Path | None, rng: np.random.Generator,
+) -> BenchArticle:  # fmt: skip
+    """Its modes at true places; of rotations at the shaker nothing is known, so none is held."""
+    a = hidden.article
+    true = _true(bench.outputs, kind, rng)
+    out, drive = footing(a, true), footing(a, bench.drive)
+    hung = _nearest(a, bench.deck.points[bench.deck.rows(list(bench.hangers))])
+    rows = np.concatenate([out.rows.ravel(), hung])
+    modes = article_modes(
+        a, rows, drive.rows.ravel(), float(bench.lines[-1]), solver, cache, residual_bending
+    )
+    r, n = len(modes.frequency), len(bench.outputs)
+    d = bench.drive.directions[0]
+    u, _ = tangents(d)
+    way = np.stack([d, u, np.cross(d, u)])
+    moved = np.stack([_along(modes, out, e) for e in np.eye(3)], axis=1)
+    pushed = np.concatenate([_along(modes, drive, e) for e in way])
+    return BenchArticle(
+        name="A", weight=mass_properties(a)[0] - hidden.unweighed, frequency=modes.frequency,
+        damping=zeta[np.minimum(np.arange(r), len(zeta) - 1)],
+        outputs=seen(modes, out, true.directions), mounts=moved.reshape(n, 3, r),
+        drive=np.vstack([pushed, np.zeros((3, r))]), hangers=modes.at(hung),
+        output_labels=bench.outputs.labels, input_label=bench.drive.labels[0],
+    )  # fmt: skip
+
+
+def _along(modes: ArticleModes, foot: Footing, way: np.ndarray) -> np.ndarray:
+    """Shapes (k, r) of places along one direction."""
+    return seen(modes, foot, np.tile(way, (len(foot.rows), 1)))
+
+
+def _true(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Spots:
+    """Where sensors truly sit and which way they feel."""
+    u, v = tangents(spots.directions)
+    off, tilt = kind.place_sd * rng.normal(size=(2, len(spots))), rng.normal(size=(2, len(spots)))
+    turned = spots.directions + kind.tilt_sd * (tilt[0][:, None] * u + tilt[1][:, None] * v)
+    points = spots.points + off[0][:, None] * u + off[1][:, None] * v
+    return replace(spots, points=points, directions=unit(turned))
+
+
+def _nearest(a: Assembly, places: np.ndarray) -> np.ndarray:
+    """Rows of the points nearest to places (k,)."""
+    d2 = ((a.points[None] - places[:, None]) ** 2).sum(axis=-1)
+    return np.asarray(d2.argmin(axis=1))
