@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import plots, study_plots
+from chladni.view import bench_plots, plots, study_plots
 
 F = np.linspace(10, 200, 400)
 H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))
@@ -50,6 +50,20 @@ PLOTS = {  # name: the drawing, and words that must stand on it
     "deviation_map": (
         lambda p: plots.deviation_map(p, np.eye(2), ["1:+Z", "2:+Z"], ["0-50", "50-100"]),
         ("1:+Z", "50-100", "Q"),
+    ),
+    "sine_schedule": (
+        lambda p: bench_plots.sine_schedule(
+            p, F, np.full(400, 30.0), np.full(400, 20.0), np.ones((2, 400)), 1 / F
+        ),
+        ("cycles", "force [N]", "transient left [%]", "frequency [Hz]", "waited", "measured"),
+    ),
+    "time_histories": (
+        lambda p: bench_plots.time_histories(p, F, {"force [N]": F, "1:+Z [m/s²]": -F}, "a block"),
+        ("force [N]", "1:+Z [m/s²]", "time [s]", "a block"),
+    ),
+    "frf_over_coherence": (
+        lambda p: bench_plots.frf_over_coherence(p, F, H, 1.1 * H, 1 - 1 / F, "1:+Z", "m/s²/N"),
+        ("1:+Z", "|H| [m/s²/N]", "coherence", "recorded", "ideal front end"),
     ),
     "slope_map": (
         lambda p: study_plots.slope_map(p, np.eye(2), ["f1", "f2"], ["t", "E"], "slopes"),

@@ -24,7 +24,8 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
     if found.schedule and first.transient is not None and first.force is not None:
         path = folder / "schedule.png"
         lines = np.array([(x.frequency, x.delay, x.measure) for x in found.schedule])
-        bench_plots.sine_schedule(path, *lines.T, first.force, first.transient)
+        f, delay, measure = lines.T
+        bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient)
         blocks.append(Picture(path, "The schedule; force and transient of every line of article "
                               f"{first.article}, all sweeps (largest transient of any channel, "
                               "antiresonances included)."))  # fmt: skip

@@ -196,9 +196,14 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
-        () if settings.rubber else tuple(c.frequency for c in cords_for(mass, len(case.setup.hangers))),
-        tuple(_notes(case, settings, recordings)),
+        _tapped(case, settings, mass), tuple(_notes(case, settings, recordings)),
     )  # fmt: skip
+
+
+def _tapped(case: Case, settings: BenchSettings, mass: float) -> tuple[float, ...]:
+    """Frequencies at which the cords are heard to ring [Hz]."""
+    cords = cords_for(mass, len(case.setup.hangers))
+    return () if settings.rubber else tuple(c.frequency for c in cords)
 
 
 def _run(
