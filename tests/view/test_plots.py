@@ -85,7 +85,7 @@ PLOTS = {  # name: the drawing, and words that must stand on it
 
 
 def test_every_plot_is_drawn_here():
-    own = {name for module in (plots, study_plots) for name, f in vars(module).items()
+    own = {name for module in (bench_plots, plots, study_plots) for name, f in vars(module).items()
            if inspect.isfunction(f) and f.__module__ == module.__name__}  # fmt: skip
     assert {name for name in own if not name.startswith("_")} == PLOTS.keys()
 
@@ -103,7 +103,7 @@ def test_every_plot_says_what_it_shows(tmp_path, name, monkeypatch):
     """Labels with units, names of curves and of rows."""
     saved = []
     save = plots.save
-    for module in (plots, study_plots):
+    for module in (bench_plots, plots, study_plots):
         monkeypatch.setattr(
             module, "save", lambda figure, path: saved.append(figure) or save(figure, path)
         )
