@@ -15,6 +15,8 @@ from ..ema.signals import Spectra, estimated
 from ..ema.time_record import TimeRecord
 from ..progress import Progress, silent
 from .bench_recording import (
+    FINER,
+    FINER_LOCAL,
     BenchRecording,
     BenchTest,
     Channels,
@@ -26,9 +28,6 @@ from .bench_rig import BenchRig
 from .front_end import digitised, sampling_rate
 from .pole_model import PoleModel
 from .sine_schedule import SineLine
-
-FINER = 2
-FINER_LOCAL = 8
 
 
 @dataclass
