@@ -8,7 +8,7 @@ import pytest
 from chladni.bench.accelerometers import AccelerometerType
 from chladni.bench.bench_recording import BenchTest, level_for, record
 from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.excitation import ON, burst, multisine
+from chladni.bench.drive_signals import ON, burst, multisine
 from chladni.bench.front_end import FrontEnd, digitised, sampling_rate
 from chladni.bench.sine_schedule import TABLE_3, SineLine, dwells_of, stage_lines, stages_for
 from chladni.bench.sine_sweep import swept

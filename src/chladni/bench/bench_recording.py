@@ -12,7 +12,7 @@ from ..errors import LabelError, ModelError
 from ..progress import Progress, silent
 from .accelerometers import drawn_gains
 from .bench_rig import BenchRig
-from .excitation import Kind, blow, burst, multisine
+from .drive_signals import Kind, blow, burst, multisine
 from .first_order_hold import HeldRun
 from .front_end import anti_alias, digitised, sampling_rate
 from .local_integration import LocalRun

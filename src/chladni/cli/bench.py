@@ -6,7 +6,7 @@ from typing import Annotated, cast
 
 import typer
 
-from ..bench.excitation import Kind
+from ..bench.drive_signals import Kind
 from ..case import Case, load_case
 from ..errors import FileError
 from ..planning import PlanSettings, plan, sensors_csv

@@ -19,7 +19,7 @@ from ..bench.bench_recording import (
 )
 from ..bench.bench_rig import BenchRig, BenchSetup, bench_rig
 from ..bench.cords import cords_for
-from ..bench.excitation import Kind
+from ..bench.drive_signals import Kind
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
 from ..bench.sine_sweep import swept
 from ..case import Case
