@@ -79,13 +79,13 @@ def test_what_hardens_or_slips_with_the_level_is_found_and_told_where(small, law
 
 def test_a_gap_that_closes_at_the_higher_level_only_is_told_with_channels_and_band(small):
     """Stepped sine: it is reached about the resonances, so that is where the levels differ."""
-    article = site(small, "stepped-sine", lambda x, k: Clearance(1.5 * x, k))
+    article = site(small, "stepped-sine", lambda x, k: Clearance(1.5 * x, 3 * k))
     few = [SineLine(float(f), 30, 20, 1.0) for f in np.geomspace(*ABOUT, 16)]
     rig = bench_rig(article)
     rng = np.random.default_rng(0)
     level, channels = level_for(rig, "stepped-sine", BAND), channels_of(rig, rng)
     read = []
-    for factor in (0.5, 2.0):
+    for factor in (0.5, 3.0):
         test = BenchTest("stepped-sine", BAND, factor * level, sweeps=2)
         found = swept(rig, test, few, rng, channels=channels)
         read.append(Recording(f"{factor}.uff", found.frf, level=factor))
