@@ -96,7 +96,7 @@ _FILES = """\
   move together, and what is held to ground is held to them.
 - Poles as `.csv`: columns `mode` and `frequency_hz`; optional `frequency_sd_hz`, `damping` (noted,
   never fitted), `state` (the first is compared, or the one `use` names).
-- Time data, whose FRFs are estimated as `chladni test` does it (hits, bursts, continuous random,
+- Time data, whose FRFs are estimated as `chladni test` does it (hits, bursts, multisines, random,
   stepped sine are told apart): universal file (58, function type 1); `.csv` with columns `time_s`,
   optional `block`, and one a channel headed `412:+Z [m/s^2]`; `.npz` and `.mat` (to version 7) with
   `rate` (`fs`, `dt`, `t`), `force` and `acceleration` (`velocity`, `displacement`), optional
