@@ -120,6 +120,16 @@ def test_the_sweep_in_time_is_the_sweep_in_closed_form(small, ideal):
     assert excitation_of(timed.time) == "sine"
 
 
+def test_a_line_begins_with_what_the_line_before_left(small, ideal):
+    """No delay, one frequency: from line to line the transient dies as the mode does, no faster."""
+    rig = bench_rig(small(), ideal(shaker=None))
+    cycles = [SineLine(28.0 * (1 + k * 1e-9), 0, 4, 1.0) for k in range(3)]
+    left = swept(rig, BenchTest("stepped-sine", BAND, 1.0, sweeps=1), cycles, rng()).transient
+    poles = rig.measured.poles
+    pole = poles[np.abs(np.abs(poles) / (2 * np.pi) - 28).argmin()]
+    np.testing.assert_allclose(left[2] / left[1], np.exp(pole.real * 4 / 28), rtol=0.1)
+
+
 def test_the_force_is_held_at_its_level(small, ideal):
     """From the second sweep on the measured force is the level times its share, dip or no dip."""
     rig = bench_rig(small(), ideal())
