@@ -3,6 +3,7 @@
 from functools import singledispatch
 from typing import Any
 
+from ..ema.level_table import level_tables
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
 from ..workflows.case_check import CaseCheck
@@ -13,6 +14,7 @@ from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.modes import NormalModes
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
+from .level_blocks import level_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
 from .study_page import study_json
@@ -65,7 +67,10 @@ def _(result: NormalModes) -> dict[str, Any]:
 
 @to_json.register
 def _(result: Identification) -> dict[str, Any]:
-    return {"recordings": [_recording(r) for r in result.recordings]}
+    held: dict[str, Any] = {"recordings": [_recording(r) for r in result.recordings]}
+    if result.levels:
+        held["levels"] = [level_json(level_tables(study)) for study in result.levels]
+    return held
 
 
 def _recording(r: RecordingModes) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from ..case import Case
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
+from ..ema.level_table import level_tables
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -29,6 +30,7 @@ from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import leaning
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
+from ..updating.level_effects import level_effects
 from ..updating.likelihood import Poles, Responses
 from ..updating.other_recordings import scored_others
 from ..updating.outcome import (
@@ -57,6 +59,7 @@ from .screening_of_case import (
 )
 
 BLIND_SHARE = 0.05  # of the shells
+_NAMELESS = "nothing is named: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +116,7 @@ def explained(
         found = withheld(prepared, found)
     found, distrust = _judged(asked, prepared, found)
     if diagnosing and prepared.too_little:
-        distrust = (f"nothing is named: {prepared.too_little}", *distrust)
+        distrust = (f"{_NAMELESS}{prepared.too_little}", *distrust)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -125,12 +128,44 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     progress("the updated deck", 0.85)
     stages, lost = _updated(case, asked, prepared, found)
     progress("scores", 0.95)
-    result = _result(asked, prepared, found, stages)
+    result = _over_levels(prepared, stages, _result(asked, prepared, found, stages), diagnosing)
+    distrust = known.distrust
+    if result.verdict == "nonlinear":  # what is named is named by the levels
+        distrust = tuple(why for why in distrust if not why.startswith(_NAMELESS))
     said = () if known.screening is None else known.screening.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(
-        result, notes=notes, distrust=known.distrust, searched=diagnosing, screening=known.screening
+        result, notes=notes, distrust=distrust, searched=diagnosing, screening=known.screening
     )
+
+
+def _over_levels(
+    prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult, diagnosing: bool
+) -> DiagnosisResult:
+    """The result with the modes over levels; nonlinear where they move and no effect is named.
+
+    An effect of the catalogue is linear: it can explain one level, never that levels differ. Where
+    one was named from the level that is fitted it stays, and a note says that levels differ.
+    """
+    study = prepared.levels
+    result = replace(result, levels=level_tables(study))
+    if not (diagnosing and study.nonlinear):
+        return result
+    if result.effects:
+        note = (
+            f"modes move with level, which {result.effects[0].name} does not explain: it is that "
+            "of the level that was fitted"
+        )
+        return replace(result, notes=(*result.notes, note))
+    kept = () if result.verdict == "nothing missing" else result.calibrated
+    note = (
+        f"of the level that was fitted alone the verdict would be {result.verdict!r}; no linear "
+        "effect makes modes move with level, so it is 'nonlinear'"
+    )
+    return replace(
+        result, verdict="nonlinear", effects=level_effects(study, stages.final.model),
+        calibrated=kept, notes=(*result.notes, note),
+    )  # fmt: skip
 
 
 def _judged(
