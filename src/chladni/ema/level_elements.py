@@ -34,7 +34,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Piece:
+class BasicElement:
     """One describing function over relative amplitude, with its numbers."""
 
     name: str
@@ -47,7 +47,7 @@ class Piece:
 class Element:
     """Pieces side by side; without any the mode is linear. The first says what it means."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[BasicElement, ...]
 
     @property
     def name(self) -> str:
@@ -85,16 +85,16 @@ def _slip_by_loss(amplitude: np.ndarray, loss: float, n: float) -> np.ndarray:
 _SPRING = Number("stiffness over the mode's", STIFFNESS, (1e-3, 2e-2))
 _LOSS = Number("loss factor at the largest amplitude", STIFFNESS, (1e-3, 1e-2))
 _POWER = Number("power of amplitude", POWER, (0.6, 1.4))
-CUBIC = Piece(
+CUBIC = BasicElement(
     "cubic spring", "cubic", cubic,
     (Number("k3 over the mode's stiffness", (0.0, 2.0), (-0.01, 0.01), "1/m2", -2, signed=True),),
 )  # fmt: skip
-GAP = Piece("spring behind a gap", "clearance", gap_spring,
+GAP = BasicElement("spring behind a gap", "clearance", gap_spring,
             (_SPRING, Number("gap", PLACE, (0.1, 0.3, 0.7), "m", 1)))  # fmt: skip
-SLIDER = Piece("slider", "friction", slider,
+SLIDER = BasicElement("slider", "friction", slider,
                (_SPRING, Number("slip from", PLACE, (0.02, 0.1, 0.3, 0.8), "m", 1)))  # fmt: skip
-MICRO_SLIP = Piece("micro-slip", "friction", _slip_by_loss, (_LOSS, _POWER))
-DRAG = Piece("drag", "loss", drag, (_LOSS, _POWER))
+MICRO_SLIP = BasicElement("micro-slip", "friction", _slip_by_loss, (_LOSS, _POWER))
+DRAG = BasicElement("drag", "loss", drag, (_LOSS, _POWER))
 ELEMENTS = tuple(
     Element(pieces)
     for pieces in ((), (CUBIC,), (GAP,), (SLIDER,), (MICRO_SLIP,), (DRAG,),

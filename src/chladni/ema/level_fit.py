@@ -17,6 +17,7 @@ from .level_modes import ModeLevels
 
 FLOOR_FREQUENCY = 5e-4  # ln f between runs: what 4 K of temperature do to steel
 FLOOR_DAMPING = 0.05  # ln ζ between runs: what damping of clamped objects repeats to
+STARTS = 4  # fits of an element, from the best of its starts
 LEAST = 3  # levels an element is fitted to
 
 
@@ -93,7 +94,7 @@ def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
 
 
 def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
-    """The best of several starts."""
+    """The best of fits from the best starts."""
     largest = float(mode.amplitude.max())
     s_f, s_z = weights(mode)
     a, f, z = mode.amplitude / largest, mode.frequency, mode.damping
@@ -110,10 +111,12 @@ def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
 
     low, high = _bounds(element, signed)
     head = [float(np.log(f[0])), float(np.log(z.min()))]
+    starts = [np.where(signed, x, np.log(np.abs(x))) if x else np.zeros(0)
+              for x in element.starts()]  # fmt: skip
+    starts.sort(key=lambda theta: float((residual(np.array([*head, *theta])) ** 2).sum()))
+    scale = np.concatenate([[1e-3, 0.1], np.where(signed, 0.01, 0.3)])
     best: OptimizeResult | None = None
-    for start in element.starts():
-        theta = np.where(signed, start, np.log(np.abs(start))) if start else np.zeros(0)
-        scale = np.concatenate([[1e-3, 0.1], np.where(signed, 0.01, 0.3)])
+    for theta in starts[:STARTS]:
         found = least_squares(
             residual, [*head, *theta], x_scale=scale,
             bounds=([-np.inf, -np.inf, *low], [np.inf, np.inf, *high]),

@@ -13,7 +13,11 @@ DRAWN = 60  # points of a fitted curve
 
 @dataclass(frozen=True)
 class LevelRow:
-    """A mode at one level: measured, by the best element, and foretold where it was held out."""
+    """A mode at one level: measured, by the best element, and foretold where it was held out.
+
+    ``stiffness`` and ``loss`` are what the element adds at that amplitude, κ' and κ'' over the
+    stiffness of the mode.
+    """
 
     level: float
     amplitude_m: float
@@ -25,6 +29,8 @@ class LevelRow:
     fitted_damping: float | None = None
     foretold_hz: float | None = None
     foretold_damping: float | None = None
+    stiffness: float | None = None
+    loss: float | None = None
 
 
 @dataclass(frozen=True)
@@ -108,9 +114,12 @@ def _rows(one: ModeStudy) -> tuple[LevelRow, ...]:
     measured = (m.level, m.amplitude, m.frequency, m.frequency_sd, m.damping, m.damping_sd)
     columns = [c.tolist() for c in measured]
     n = len(m.level)
-    fitted: list[list[float | None]] = [[None] * n for _ in range(4)]
+    fitted: list[list[float | None]] = [[None] * n for _ in range(6)]
     if one.fits:
-        fitted[:2] = [x.tolist() for x in one.fits[0].at(m.amplitude)]
+        best = one.fits[0]
+        kappa = best.element.kappa(m.amplitude / best.largest, best.values)
+        fitted[:2] = [x.tolist() for x in best.at(m.amplitude)]
+        fitted[4:] = [kappa.real.tolist(), kappa.imag.tolist()]
     if held is not None:
         for k, f, zeta in zip(held.rows, held.frequency, held.damping, strict=True):
             fitted[2][k], fitted[3][k] = float(f), float(zeta)

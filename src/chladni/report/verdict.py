@@ -110,6 +110,17 @@ def _sentence(result: DiagnosisResult) -> str:
     return verdict
 
 
+def _joints(result: DiagnosisResult) -> list[Block]:
+    """What a linear deck would have in its joints at every level."""
+    rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
+    heads = ("mode [Hz]", "level", "K, times", "GE", "share of strain energy")
+    what = (
+        "Springs and bushes of a linear deck that has the mode as it is at a level: K over that of "
+        "the updated deck, and GE (PBUSH). They are in the updated deck as comments."
+    )
+    return [Table(heads, rows, caption=what)] if rows else []
+
+
 def _levels(figures: Mapping[str, Path]) -> dict[int, Path]:
     """Pictures of modes over levels by the mode's position."""
     numbers = {n.removeprefix(LEVELS): p for n, p in figures.items() if n.startswith(LEVELS)}
@@ -154,6 +165,7 @@ def sections(
         Section("At a glance", _glance(result)),
         Section("What was found", _effects(result.effects)),
         level_section(result.levels, of_levels),
+        Section("Joints at each level", _joints(result)),
         Section("What was calibrated", _calibrated(result)),
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),

@@ -1,6 +1,7 @@
 """What levels of excitation name: friction and clearance, and what the deck says of the place."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -64,6 +65,63 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
 
 
 JOINTS = "springs and bushes"
+
+
+@dataclass(frozen=True)
+class LinearJoint:
+    """What springs and bushes alike would be given to have a mode as it is at one level.
+
+    Attributes
+    ----------
+    mode_hz, level : of the mode at its lowest level [Hz], [N] or [m/s²]
+    stiffness : factor on K of the deck, which is that of the level that was fitted
+    loss : GE, with what the mode loses otherwise left in the damping of the mode
+    share : of the strain energy of the mode that they hold
+    """
+
+    mode_hz: float
+    level: float
+    stiffness: float
+    loss: float
+    share: float
+
+
+def linear_joints(
+    study: LevelStudy, model: Modelled, fitted: float | None
+) -> tuple[LinearJoint, ...]:
+    """K and GE of springs and bushes at each level, where friction or clearance may sit in them.
+
+    The element's κ is a share of the mode's stiffness; joints that hold the share e of its strain
+    energy make it by K (1 + κ'/e), GE = κ''/(e + κ') (modal strain energy, to first order).
+
+    Parameters
+    ----------
+    fitted : the level the deck was compared with
+    """
+    out = []
+    for one, t in zip(study.modes, level_tables(study), strict=True):
+        if one not in study.moving or one.signature not in EFFECT or one.explained is None:
+            continue
+        hertz = t.rows[0].frequency_hz
+        e = energy_shares(model, hertz).get(JOINTS, 0.0)
+        kappa = [(r.level, e + (r.stiffness or 0.0), r.loss or 0.0) for r in t.rows]
+        if e < HOLDS or min(real for _, real, _ in kappa) <= 0:
+            continue
+        base = next((real for level, real, _ in kappa if level == fitted), kappa[0][1])
+        out += [LinearJoint(hertz, level, real / base, loss / real, e)
+                for level, real, loss in kappa]  # fmt: skip
+    return tuple(out)
+
+
+def joint_comment(joints: Sequence[LinearJoint]) -> str:
+    """The same as comments of a deck."""
+    lines = ["Joints over levels of excitation: what a linear deck has in every spring and bush."]
+    for j in joints:
+        lines.append(
+            f"mode near {j.mode_hz:.5g} Hz, level {j.level:g}: K times {j.stiffness:.4f}, "
+            f"GE {j.loss:.4f}"
+        )
+    return "\n".join(lines)
 
 
 def energy_shares(model: Modelled, frequency: float) -> dict[str, float]:

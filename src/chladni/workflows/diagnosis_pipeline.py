@@ -14,7 +14,6 @@ import numpy as np
 from ..case import Case
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
-from ..ema.level_table import level_tables
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
@@ -30,7 +29,6 @@ from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import leaning
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
-from ..updating.level_effects import level_effects
 from ..updating.likelihood import Poles, Responses
 from ..updating.other_recordings import scored_others
 from ..updating.outcome import (
@@ -50,6 +48,7 @@ from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .over_levels import over_levels
 from .question_of_case import question
 from .screening_of_case import (
     RecordingAtFault,
@@ -128,7 +127,8 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     progress("the updated deck", 0.85)
     stages, lost = _updated(case, asked, prepared, found)
     progress("scores", 0.95)
-    result = _over_levels(prepared, stages, _result(asked, prepared, found, stages), diagnosing)
+    result = _result(asked, prepared, found, stages)
+    result = over_levels(asked, prepared, stages, result, diagnosing)
     distrust = known.distrust
     if result.verdict == "nonlinear":  # what is named is named by the levels
         distrust = tuple(why for why in distrust if not why.startswith(_NAMELESS))
@@ -137,35 +137,6 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     return replace(
         result, notes=notes, distrust=distrust, searched=diagnosing, screening=known.screening
     )
-
-
-def _over_levels(
-    prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult, diagnosing: bool
-) -> DiagnosisResult:
-    """The result with the modes over levels; nonlinear where they move and no effect is named.
-
-    An effect of the catalogue is linear: it can explain one level, never that levels differ. Where
-    one was named from the level that is fitted it stays, and a note says that levels differ.
-    """
-    study = prepared.levels
-    result = replace(result, levels=level_tables(study))
-    if not (diagnosing and study.nonlinear):
-        return result
-    if result.effects:
-        note = (
-            f"modes move with level, which {result.effects[0].name} does not explain: it is that "
-            "of the level that was fitted"
-        )
-        return replace(result, notes=(*result.notes, note))
-    kept = () if result.verdict == "nothing missing" else result.calibrated
-    note = (
-        f"of the level that was fitted alone the verdict would be {result.verdict!r}; no linear "
-        "effect makes modes move with level, so it is 'nonlinear'"
-    )
-    return replace(
-        result, verdict="nonlinear", effects=level_effects(study, stages.final.model),
-        calibrated=kept, notes=(*result.notes, note),
-    )  # fmt: skip
 
 
 def _judged(
