@@ -12,8 +12,10 @@ from chladni.ema.describing_functions import cubic, drag, gap_spring, micro_slip
 from chladni.ema.identification import identify
 from chladni.ema.level_fit import foretold
 from chladni.ema.level_modes import AtLevel, modes_over_levels
-from chladni.ema.level_study import level_study
+from chladni.ema.level_study import decay_study, level_study
 from chladni.ema.level_words import level_notes
+from chladni.ema.ring_down import ring_downs
+from chladni.ema.time_record import TimeRecord
 
 F = np.arange(37.5, 46, 0.05)
 OUT, DRIVE = ("1:+Z", "2:+Z", "3:+Z"), ("1:+Z",)
@@ -186,3 +188,42 @@ def test_a_mode_without_partner_is_not_followed():
     other[1] *= np.array([1.0, -1.0, 1.0])[:, None]
     turned = replace(at(8.0, seed=1), modes=replace(one.modes, residues=other))
     assert len(modes_over_levels([one, turned])) == 1
+
+
+def decay(force, seed=0, rate=2000.0, seconds=4.0):
+    """Accelerations of a 40 Hz oscillator let go at 1 m/s, its spring's extra force by ``force``.
+
+    Symplectic steps of a quarter sample; 0.1 % noise; a hit before it, so that it is a test.
+    """
+    w, dt, n = 2 * np.pi * 40, 0.25 / rate, int(rate * seconds)
+    p, v, f, out = 0.0, 1.0, 0.0, np.zeros(n)
+    for i in range(4 * n):
+        a = -2 * 0.003 * w * v - w**2 * (p + f)
+        v += dt * a
+        f = force(f, p + dt * v, dt * v)
+        p += dt * v
+        if i % 4 == 0:
+            out[i // 4] = a
+    out += 1e-3 * np.abs(out).max() * np.random.default_rng(seed).normal(size=n)
+    hit = np.zeros(n + 50)
+    hit[20:30] = 1.0
+    response = np.concatenate([np.zeros(50), out])
+    return TimeRecord(hit[None, None], response[None, None], rate, ("1:+Z",), ("1:+Z",))
+
+
+@pytest.mark.parametrize(
+    ("force", "sign"),
+    [
+        (lambda f, p, dp: 0.0, "linear"),
+        (lambda f, p, dp: 2e3 * p**3, "stiffening"),
+        (lambda f, p, dp: min(max(f + 0.02 * dp, -6e-6), 6e-6), "friction"),
+    ],
+)
+def test_a_free_decay_falls_through_levels(force, sign):
+    """Of one recording: the amplitude is the displacement, the signature that of the element."""
+    (found,) = decay_study(ring_downs(decay(force)), "accelerance").modes
+    assert found.signature == sign
+    assert 1 / (2 * np.pi * 40) * 0.2 < found.mode.amplitude[-1] < 1.05 / (2 * np.pi * 40)
+    if sign == "stiffening":
+        fit = found.explained
+        assert_allclose(fit.values[0] / fit.largest**2, 2e3, rtol=0.1)

@@ -110,7 +110,7 @@ SCHEMA = (
     Key("recording", "control", "word", "", "force",
         "What was held at `level` from line to line: the force (or the motion of the base), or the "
         "response of the drive point (else of the first output) in the unit of the recording.",
-        '"response"', ("identify", "diagnose"), get_args(Control)),
+        '"response"', _READ, get_args(Control)),
     Key("recording", "state", "text", "", "one state",
         "What was done to the object before this was measured. `calibrate` and `diagnose` take "
         "every state (or the one `use` names): E, rho, t are shared, an effect is a state's own. "

@@ -7,8 +7,19 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2
 
-from .level_fit import ElementFit, HeldOutLevels, fitted_elements, foretold, weights
+from ..dynamics.frf import Quantity
+from .identification import DERIVATIVES
+from .level_fit import (
+    FLOOR_DAMPING,
+    FLOOR_FREQUENCY,
+    ElementFit,
+    HeldOutLevels,
+    fitted_elements,
+    foretold,
+    weights,
+)
 from .level_modes import AtLevel, ModeLevels, modes_over_levels
+from .ring_down import RingDown
 
 Signature = Literal[
     "linear", "runs differ", "friction", "clearance", "stiffening", "softening", "loss"
@@ -92,6 +103,26 @@ def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
     """
     modes = modes_over_levels(recordings)
     return LevelStudy(tuple(_studied(m) for m in modes), _drifts(modes))
+
+
+def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:
+    """The same of free decays: each falls through levels of its own, its amplitudes [m].
+
+    Stretches of a decay are taken to be as well known as runs repeat to.
+
+    Parameters
+    ----------
+    quantity : of the responses
+    """
+    return LevelStudy(tuple(_studied(_falling(d, quantity)) for d in decays))
+
+
+def _falling(decay: RingDown, quantity: Quantity) -> ModeLevels:
+    """A decay as levels that rise."""
+    rise = np.argsort(decay.amplitude)
+    f, zeta = decay.frequency_at[rise], decay.damping_at[rise]
+    A = decay.amplitude[rise] / (2 * np.pi * decay.frequency) ** DERIVATIVES[quantity]
+    return ModeLevels(decay.output, A, A, f, FLOOR_FREQUENCY * f, zeta, FLOOR_DAMPING * zeta)
 
 
 def _studied(mode: ModeLevels) -> ModeStudy:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
+from ..ema.level_words import TINY
 from .blocks import Block, Items, Picture, Section, Table
 from .words import interval, number
 
@@ -48,8 +49,8 @@ def _summary(tables: Sequence[LevelTable]) -> Table:
             number(100 * t.rows[0].damping, 3),
             number(100 * t.rows[-1].damping, 3),
             str(len(t.rows)),
-            number(t.p_frequency, 2),
-            number(t.p_damping, 2),
+            _p(t.p_frequency),
+            _p(t.p_damping),
             t.signature,
         )
         for t in tables
@@ -89,7 +90,7 @@ def _elements(t: LevelTable) -> Table:
             number(e.chi2, 3),
             str(e.data),
             number(e.bic, 3),
-            number(e.p, 2),
+            _p(e.p),
             "; ".join(f"{n.name} {interval(n.value, n.low, n.high, n.unit)}" for n in e.numbers),
         )
         for e in t.elements
@@ -98,6 +99,10 @@ def _elements(t: LevelTable) -> Table:
     return Table(heads, rows, ("element", "numbers (95 %)"),
                  "Best first. Runs of one level are taken to repeat to 0.05 % in frequency and 5 % "
                  "in damping. p below 0.01: the element does not explain the levels.")  # fmt: skip
+
+
+def _p(p: float | None) -> str:
+    return number(p, 2) if p is None or p >= TINY else f"< {TINY:g}"
 
 
 def _percent(x: float | None) -> float | None:

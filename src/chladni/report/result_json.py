@@ -106,6 +106,7 @@ def _evaluated(r: RecordingEvaluation) -> dict[str, Any]:
         "band_hz": frf.frequency[[0, -1]],
         "screening": screening_json(r.screening),
         "free_decays": [dict(vars(d)) for d in r.decays],
+        "levels": level_json(level_tables(r.levels)),
     }
     if e is not None:
         found |= {

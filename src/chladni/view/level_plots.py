@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
 
@@ -71,4 +72,7 @@ def _panel(
     if mean is not None:
         ax.axhline(mean, color=BEFORE, lw=1.2, ls="--", label="one linear model")
     ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:.3g}"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.grid(which="both", lw=0.3, alpha=0.5)
