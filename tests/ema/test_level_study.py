@@ -227,3 +227,14 @@ def test_a_free_decay_falls_through_levels(force, sign):
     if sign == "stiffening":
         fit = found.explained
         assert_allclose(fit.values[0] / fit.largest**2, 2e3, rtol=0.1)
+
+
+def test_a_neighbour_that_beats_is_no_nonlinearity():
+    """Two linear modes within a bandwidth: what is filtered out of their decay swells and sinks."""
+    t = np.arange(8000) / 2000
+    rings = [np.exp(-0.006 * w * t) * np.sin(w * t) for w in 2 * np.pi * np.array([40.0, 40.3])]
+    one = decay(lambda f, p, dp: 0.0)
+    beating = np.concatenate([np.zeros(50), rings[0] + 0.6 * rings[1]])
+    study = decay_study(ring_downs(replace(one, response=beating[None, None])), "accelerance")
+    assert any(m.mode.moves for m in study.modes)
+    assert not study.nonlinear

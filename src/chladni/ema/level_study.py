@@ -108,13 +108,18 @@ def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
 def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:
     """The same of free decays: each falls through levels of its own, its amplitudes [m].
 
-    Stretches of a decay are taken to be as well known as runs repeat to.
+    Stretches of a decay are taken to be as well known as runs repeat to. A neighbour that beats
+    moves them as well, so that nothing is a sign of anything but what an element explains.
 
     Parameters
     ----------
     quantity : of the responses
     """
-    return LevelStudy(tuple(_studied(_falling(d, quantity)) for d in decays))
+    found = [_studied(_falling(d, quantity)) for d in decays]
+    return LevelStudy(
+        tuple(m if m.explained is not None or m.signature == "linear"
+              else ModeStudy(m.mode, "runs differ") for m in found)
+    )  # fmt: skip
 
 
 def _falling(decay: RingDown, quantity: Quantity) -> ModeLevels:

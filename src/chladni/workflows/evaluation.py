@@ -95,7 +95,8 @@ def evaluate_recordings(
 def _decay_notes(found: RecordingEvaluation) -> list[str]:
     """A sentence a mode whose frequency or damping goes with its amplitude as it dies away."""
     name = found.recording.name
-    return [f"{name}: free decay: {mode_sentence(m)}" for m in found.levels.moving]
+    beats = "to settle it, measure at two levels: a second mode within a bandwidth beats alike"
+    return [f"{name}: free decay: {mode_sentence(m)}; {beats}" for m in found.levels.moving]
 
 
 def _screened(
