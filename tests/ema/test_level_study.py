@@ -224,9 +224,12 @@ def test_a_free_decay_falls_through_levels(force, sign):
     (found,) = decay_study(ring_downs(decay(force)), "accelerance").modes
     assert found.signature == sign
     assert 1 / (2 * np.pi * 40) * 0.2 < found.mode.amplitude[-1] < 1.05 / (2 * np.pi * 40)
+    fit = found.explained
     if sign == "stiffening":
-        fit = found.explained
         assert_allclose(fit.values[0] / fit.largest**2, 2e3, rtol=0.1)
+    if sign == "friction":
+        assert fit.element.name == "slider"
+        assert_allclose(fit.values * [1, fit.largest], [0.02, 3e-4], rtol=0.1)
 
 
 def test_a_neighbour_that_beats_is_no_nonlinearity():

@@ -119,6 +119,22 @@ class Homogeneity:
     linear: bool
     p: float = float("nan")
 
+    @property
+    def band(self) -> tuple[float, float]:
+        """The lines about the worst one that chance does not reach, without a gap [Hz]."""
+        k, n = int(self.line.argmax()), self.channel.size
+        far = self.line > 1 + 5 / np.sqrt(n)
+        low = k - int(np.argmin(np.concatenate([far[:k][::-1], [False]])))
+        high = k + int(np.argmin(np.concatenate([far[k + 1 :], [False]])))
+        return float(self.frequency[low]), float(self.frequency[high])
+
+    @property
+    def channels(self) -> np.ndarray:
+        """Outputs that differ as chance does not reach, and half as much as the worst (n_out,)."""
+        each = self.channel.max(axis=1)
+        limit = 1 + 5 / np.sqrt(len(self.line))
+        return np.asarray((each > limit) & (each >= each.max() / 2))
+
 
 def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     """Is the response proportional to the level? |H₂ - H₁|² over what the noise explains.
@@ -177,14 +193,19 @@ def levels_checked(
         if compared.linear or name == "repeatability":
             continue
         odd.add(name)
-        worst = float(compared.frequency[compared.line.argmax()])
+        worst, (low, high) = float(compared.frequency[compared.line.argmax()]), compared.band
+        assert recording.frf is not None
+        named = zip(recording.frf.outputs, compared.channels, strict=True)
+        channels = tuple(o for o, differs in named if differs)
         sentence = (
             f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: they are "
             f"apart {compared.ratio:.3g} times as much as their noise (p = {compared.p:.2g}, "
-            f"{compared.rms:.2g} decades rms), most near {worst:.4g} Hz: not linear."
+            f"{compared.rms:.2g} decades rms), most near {worst:.4g} Hz "
+            f"({low:.4g} to {high:.4g} Hz without a gap) on "
+            f"{', '.join(channels) or 'no channel alone'}: not linear."
         )
         mend = "name one level by use in case.toml, and read the result as that level's own"
-        found.append(Finding("not linear", sentence, "warning", (), mend, compared.ratio))
+        found.append(Finding("not linear", sentence, "warning", channels, mend, compared.ratio))
     needs = {"homogeneity": "needs two levels", "repeatability": "needs a second recording"}
     checks = [
         Check(name, "; ".join(lines) or needs[name], name not in odd if lines else None)
