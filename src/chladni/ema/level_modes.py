@@ -15,6 +15,8 @@ from .setup import Control
 PARTNER = 0.05  # of a frequency: farther away is another mode
 SAME_SHAPE = 0.8  # MAC of the residues over three channels or more: less is another mode
 STANDS_OUT = 3.0  # of χ² a pole must bring, over what it pays, to be followed
+KNOWN = 0.5  # standard deviation over its damping: a mode of which less is known is not followed
+NEAR = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
 ABOUT = 0.75  # of a peak: lines above are averaged; there D is known best
 CHANCE = 1e-5  # of a linear mode: moves less probable than that, and larger than these, are moves
 MOVED_FREQUENCY = 1e-3  # largest over smallest - 1; a few kelvin of temperature do half of that
@@ -111,8 +113,9 @@ def modes_over_levels(recordings: Sequence[AtLevel]) -> tuple[ModeLevels, ...]:
 
 
 def _clear(found: Identified) -> np.ndarray:
-    """Modes that stand out and lose energy (r,)."""
-    return found.inside & (found.relative_delta_chi2 > STANDS_OUT) & (found.damping > 0)
+    """Modes that stand out, with a damping that is known (r,)."""
+    sure = found.damping_sd < KNOWN * found.damping
+    return found.inside & (found.relative_delta_chi2 > STANDS_OUT) & sure
 
 
 def _track(first: AtLevel, mode: int, known: Sequence[AtLevel]) -> ModeLevels | None:
@@ -126,9 +129,11 @@ def _track(first: AtLevel, mode: int, known: Sequence[AtLevel]) -> ModeLevels | 
         if not alike or (k := _partner(first.modes, mode, one.modes)) is None:
             continue
         if one.control == "response":
-            rows.append((one.level, *_pole(one, k, int(i), int(j))))
+            row = _pole(one, k, int(i), int(j))
         else:
-            rows.append((one.level, *_lines(first.modes, mode, one, int(i), int(j))))
+            row = _lines(first.modes, mode, one, one.modes.poles[k], int(i), int(j))
+        if row[4] < KNOWN * row[3]:
+            rows.append((one.level, *row))
     return ModeLevels(output, *np.array(rows, dtype=float).T) if len(rows) > 1 else None
 
 
@@ -168,7 +173,7 @@ def _pole(one: AtLevel, k: int, i: int, j: int) -> Seen:
     return float(rows[0]), float(rows[1]), float(rows[2]), float(rows[3]), float(rows[4])
 
 
-def _lines(first: Identified, mode: int, one: AtLevel, i: int, j: int) -> Seen:
+def _lines(first: Identified, mode: int, one: AtLevel, pole: complex, i: int, j: int) -> Seen:
     """Amplitude of output i [m], frequency [Hz], its sd, damping and its sd of a mode at a level.
 
     Under a constant force every line has an amplitude of its own, a peak leans, and one pole would
@@ -177,7 +182,7 @@ def _lines(first: Identified, mode: int, one: AtLevel, i: int, j: int) -> Seen:
     ω_r² (1 + κ') - ω² + i (2 ζ ω_r ω + ω_r² κ'') at that line's amplitude (inverse of the FRF:
     Worden and Tomlinson 2001, section 2.2). Lines about the peak are averaged, amplitudes too.
     """
-    omega, y, variance = _modal_lines(first, mode, one, j)
+    omega, y, variance = _modal_lines(first, mode, one, pole, j)
     top = _about_peak(np.abs(y))
     omega, y, variance = omega[top], y[top], variance[top]
     R = first.residues[mode, :, j]
@@ -195,11 +200,11 @@ def _lines(first: Identified, mode: int, one: AtLevel, i: int, j: int) -> Seen:
 
 
 def _modal_lines(
-    first: Identified, mode: int, one: AtLevel, j: int
+    first: Identified, mode: int, one: AtLevel, pole: complex, j: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """ω, y and the variance of y at the lines near a mode, all but it taken off (n,) each."""
-    f0 = first.frequency[mode]
-    near = np.abs(np.log(np.maximum(one.frf.frequency, 1e-9) / f0)) < PARTNER
+    """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each."""
+    away = np.abs(2 * np.pi * one.frf.frequency - np.abs(pole))
+    near = away <= max(-NEAR * pole.real, np.sort(away)[2])
     frf, s = one.frf, 2j * np.pi * one.frf.frequency[near]
     rest = first.sel(np.arange(first.order) != mode)
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2
