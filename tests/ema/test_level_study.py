@@ -12,7 +12,7 @@ from chladni.ema.describing_functions import cubic, drag, gap_spring, micro_slip
 from chladni.ema.identification import identify
 from chladni.ema.level_fit import foretold
 from chladni.ema.level_modes import AtLevel, modes_over_levels
-from chladni.ema.level_study import decay_study, level_study
+from chladni.ema.level_study import _overlapped, decay_study, level_study
 from chladni.ema.level_words import level_notes
 from chladni.ema.ring_down import ring_downs
 from chladni.ema.time_record import TimeRecord
@@ -241,3 +241,14 @@ def test_a_neighbour_that_beats_is_no_nonlinearity():
     study = decay_study(ring_downs(replace(one, response=beating[None, None])), "accelerance")
     assert any(m.mode.moves for m in study.modes)
     assert not study.nonlinear
+
+
+def test_a_neighbour_that_is_rung_into_is_no_sign():
+    """The second mode a bandwidth away: linear, it moves only as the peak beside it leans."""
+    study = studied("slider", "force")
+    first = study.modes[0]
+    beside = replace(first.mode, frequency=first.mode.frequency + 0.3,
+                     amplitude=first.mode.amplitude / 3)  # fmt: skip
+    far = replace(beside, frequency=first.mode.frequency + 20)
+    every = [first, replace(first, mode=beside), replace(first, mode=far)]
+    assert [_overlapped(m, every) for m in every] == [False, True, False]

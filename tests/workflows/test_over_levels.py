@@ -1,6 +1,8 @@
 """An object at several levels: the verdict, the page, the updated deck; and the same if linear."""
 
 import json
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,6 +18,10 @@ from chladni.io.nastran import read_deck, write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json, from_json
+from chladni.updating.question import Prepared, Question
+from chladni.updating.result import NamedEffect
+from chladni.workflows.diagnosis_result import DiagnosisResult, UpdatedModels
+from chladni.workflows.over_levels import over_levels
 from chladni_specimens.plates import plate
 
 LEVELS = (1.0, 4.0, 7.0, 10.0)
@@ -155,3 +161,18 @@ def test_what_is_held_must_have_a_level(folder, tmp_path):
     assert done.exit_code == 2
     assert "has no level" in done.output
     assert not (tmp_path / "o").exists()
+
+
+def test_a_linear_effect_that_was_named_stays_and_is_said_to_be_of_its_level(folder):
+    """No level takes its name away; a note says what it does not explain."""
+    case = chladni.load_case(folder)
+    (study,) = chladni.identify(case).levels
+    named = DiagnosisResult("missing physics", (NamedEffect("point-mass"),))
+    prepared = cast(Prepared, SimpleNamespace(levels=study))
+    asked, stages = cast(Question, None), cast(UpdatedModels, None)  # neither is asked here
+    kept = over_levels(asked, prepared, stages, named, diagnosing=True)
+    assert (kept.verdict, kept.effects) == (named.verdict, named.effects)
+    assert "point-mass does not explain" in kept.notes[-1]
+    assert len(kept.levels) == len(study.modes)
+    plainly = over_levels(asked, prepared, stages, DiagnosisResult("calibration only"), False)
+    assert plainly.verdict == "calibration only"

@@ -22,17 +22,27 @@ from .level_modes import AtLevel, ModeLevels, modes_over_levels
 from .ring_down import RingDown
 
 Signature = Literal[
-    "linear", "runs differ", "friction", "clearance", "stiffening", "softening", "loss"
+    "linear",
+    "runs differ",
+    "overlapped",
+    "friction",
+    "clearance",
+    "stiffening",
+    "softening",
+    "loss",
 ]
 MEANING: dict[Signature, str] = {
     "linear": "frequency and damping stay as the level rises",
     "runs differ": "it moves by more than its noise, by no more than runs of one test repeat to",
+    "overlapped": "a mode that moves rings into it, so that its own doing cannot be told",
     "friction": "a joint slips: stiffness goes and damping comes with the level",
     "clearance": "parts meet once they move far enough: it stiffens from an amplitude on",
     "stiffening": "it stiffens as it moves and loses no more: sheets stretch, or contact closes",
     "softening": "it softens as it moves and loses no more: contact opens, or it grew warm",
     "loss": "its damping moves with the level and no stiffness with it: air, foam, or the exciter",
 }
+CALM: tuple[Signature, ...] = ("linear", "runs differ", "overlapped")  # no sign of anything
+OVERLAP = 4.0  # sums of half-bandwidths: nearer modes ring into each other
 EFFECT: dict[Signature, str] = {"friction": "joint-friction", "clearance": "rattle"}  # public names
 REPEATED = 0.01  # chance of runs that differ so much, below which levels are why they do
 ALIKE = 0.05  # of a drift: as near do modes follow it (E falls with warmth as rho does not)
@@ -85,8 +95,7 @@ class LevelStudy:
     @property
     def moving(self) -> tuple[ModeStudy, ...]:
         """Modes whose frequency or damping goes with the level; none where all of them drifted."""
-        calm = ("linear", "runs differ")
-        return () if self.drift else tuple(m for m in self.modes if m.signature not in calm)
+        return () if self.drift else tuple(m for m in self.modes if m.signature not in CALM)
 
     @property
     def nonlinear(self) -> bool:
@@ -102,7 +111,31 @@ def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
     recordings : of one object; a study of fewer than two levels is empty
     """
     modes = modes_over_levels(recordings)
-    return LevelStudy(tuple(_studied(m) for m in modes), _drifts(modes))
+    found = [_studied(m) for m in modes]
+    told = [ModeStudy(m.mode, "overlapped") if _overlapped(m, found) else m for m in found]
+    return LevelStudy(tuple(told), _drifts(modes))
+
+
+def _overlapped(one: ModeStudy, every: Sequence[ModeStudy]) -> bool:
+    """Whether a mode moves beside one that moves too and is better explained, or larger."""
+    return one.signature not in CALM and any(
+        other is not one
+        and other.signature not in CALM
+        and abs(_hertz(one)[0] - _hertz(other)[0]) < OVERLAP * (_hertz(one)[1] + _hertz(other)[1])
+        and _weight(other) > _weight(one)
+        for other in every
+    )
+
+
+def _hertz(one: ModeStudy) -> tuple[float, float]:
+    """Frequency and half-bandwidth at the lowest level [Hz]."""
+    f = float(one.mode.frequency[0])
+    return f, float(one.mode.damping[0]) * f
+
+
+def _weight(one: ModeStudy) -> tuple[bool, int, float]:
+    """Whether an element explains it; at how many levels it was found; how far it swings."""
+    return one.explained is not None, len(one.mode.level), float(one.mode.amplitude[0])
 
 
 def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .level_study import MEANING, SETTLED_BY, LevelStudy, ModeStudy
+from .level_study import CALM, MEANING, SETTLED_BY, LevelStudy, ModeStudy
 
 TINY = 1e-12  # a smaller probability is a word, not a number
 
@@ -18,7 +18,7 @@ def level_notes(study: LevelStudy) -> list[str]:
             f"the object drifted (warmth, mass), it is not nonlinear; to settle it, {SETTLED_BY}"
         ]
     moving = [f"nonlinear: {mode_sentence(m)}" for m in study.moving]
-    calm = [mode_sentence(m) for m in study.modes if m.signature == "runs differ"]
+    calm = [mode_sentence(m) for m in study.modes if m.signature in ("runs differ", "overlapped")]
     if moving:
         return [*moving, *calm, f"to settle it, {SETTLED_BY}"]
     return [*calm, f"no natural frequency and no damping moves with level ({said})"]
@@ -48,6 +48,8 @@ def _p(p: float) -> str:
 def _elements(study: ModeStudy) -> str:
     """What fits, what fits as well, and how levels that no fit saw were foretold."""
     best = study.explained
+    if study.signature in CALM:
+        return ""
     if not study.fits:
         return "; three levels would tell which element does it"
     if best is None:

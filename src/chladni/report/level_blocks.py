@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..ema.level_study import CALM
 from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
 from ..ema.level_words import TINY
 from .blocks import Block, Items, Picture, Section, Table
 from .words import interval, number
 
 SHOWN = 6  # modes that are drawn
-_CALM = ("linear", "runs differ")
 _WHAT = (
     "Measured; 'element': by the first of the elements below, fitted to all levels; 'foretold': by "
     "one that was chosen and fitted without these levels; 'linear': the mean of the levels it was "
@@ -32,7 +32,7 @@ def level_section(tables: Sequence[LevelTable], pictures: Mapping[int, Path]) ->
         return Section("Levels", [])
     blocks: list[Block] = [_summary(tables)]
     for k, t in enumerate(tables):
-        if t.signature in _CALM:
+        if t.signature in CALM:
             continue
         blocks += [Items([t.sentence + "."])] if t.sentence else []
         blocks += [_levels(t)]
@@ -115,7 +115,7 @@ def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> d
 
     made: dict[int, Path] = {}
     for k, t in enumerate(tables):
-        if t.signature in _CALM or len(made) == SHOWN:
+        if t.signature in CALM or len(made) == SHOWN:
             continue
         path = folder / f"levels{stem}_{k + 1}.png"
         column = {name: np.array([_nan(getattr(r, name)) for r in t.rows]) for name in
@@ -145,7 +145,7 @@ def level_lines(tables: Sequence[LevelTable]) -> list[str]:
     """The modes that move, level by level, for a terminal."""
     out = []
     for t in tables:
-        if t.signature in _CALM:
+        if t.signature in CALM:
             continue
         out.append(f"mode at {t.output}, {t.signature}: level, amplitude [mm], Hz, damping [%]")
         for r in t.rows:
