@@ -6,8 +6,6 @@ from typing import Annotated
 import typer
 
 from ..case import load_case
-from ..ema.level_table import level_tables
-from ..report.level_blocks import level_lines
 from ..report.result_json import to_json
 from ..workflows.identify import identify
 from ..workflows.loaded_model import is_case
@@ -38,6 +36,4 @@ def run(
             found = identify(recordings, limit, averages, job.progress)
         job.json("identified.json", to_json(found))
         job.show(identification_page(job.folder, found))
-        for line in (line for s in found.levels for line in level_lines(level_tables(s))):
-            job.say(line)
     found.trusted()

@@ -1,4 +1,4 @@
-"""Modes over levels of excitation: tables and pictures of a page, lines of a terminal, JSON."""
+"""Modes over levels of excitation: tables and pictures of a page, JSON."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -139,22 +139,6 @@ def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> d
 
 def _nan(x: float | None) -> float:
     return float("nan") if x is None else x
-
-
-def level_lines(tables: Sequence[LevelTable]) -> list[str]:
-    """The modes that move, level by level, for a terminal."""
-    out = []
-    for t in tables:
-        if t.signature in CALM:
-            continue
-        out.append(f"mode at {t.output}, {t.signature}: level, amplitude [mm], Hz, damping [%]")
-        for r in t.rows:
-            said = f"  {r.level:<8g} {1e3 * r.amplitude_m:<10.3g} {r.frequency_hz:<10.6g} "
-            said += f"{100 * r.damping:.3g}"
-            if r.foretold_hz is not None and r.foretold_damping is not None:
-                said += f"   foretold {r.foretold_hz:.6g} Hz, {100 * r.foretold_damping:.3g} %"
-            out.append(said)
-    return out
 
 
 def level_json(tables: Sequence[LevelTable]) -> list[dict[str, Any]]:
