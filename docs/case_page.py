@@ -109,7 +109,11 @@ _FILES = """\
 Several recordings are told apart by article, level and state, as the files or `[[recording]]` say.
 Of one article, level and state, other shaker places are stacked as inputs of one test; the same
 places again are repeats. Repeats and articles give a measured spread below which no fit is asked to
-go; levels, whose frequencies are compared, do not. The first is fitted, the others score the decks.
+go; levels do not. The first is fitted, the others score the decks.
+From three levels on `identify` and `diagnose` fit elements that friction, play and stretching are
+known by (cubic spring, gap, slider, micro-slip, drag) to each mode's frequency and damping against
+its amplitude, and from four on they foretell levels that are held out. Levels are amplitudes: of
+one line of a stepped sine where `control` is `"response"`, else of the force.
 States are one object changed: each is diagnosed with what the others say of E, rho and t, all are
 then fitted at once with these shared, and each has its own effect, deck and page.
 

@@ -48,6 +48,7 @@ hangers = [1, 35]
 file = "b.npz"
 article = "B"
 level = 2.0
+control = "force"
 state = ""
 mass = 1.4
 [band]
@@ -91,6 +92,7 @@ OTHER = {  # another accepted value of every word
     ("recording", "file"): '"a.npz"',
     ("recording", "article"): '"C"',
     ("recording", "level"): "3.0",
+    ("recording", "control"): '"response"',
     ("recording", "state"): '"with the bracket"',
     ("recording", "mass"): "1.5",
     ("band", "fit"): "[5.0, 59.0]",

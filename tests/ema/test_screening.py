@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.screening import homogeneity, roughness, runs, screen
+from chladni.ema.screening import homogeneity, levels_checked, roughness, runs, screen
+from chladni.ema.setup import Recording
 from chladni.errors import ShapeError
 
 F = np.arange(1.0, 401.0)
@@ -77,6 +78,28 @@ def test_a_structure_that_stiffens_with_the_level_is_found(given: bool) -> None:
     result = homogeneity(resonance(seed=1, given=given), resonance(1.02, seed=2, given=given))
     assert not result.linear
     assert abs(result.frequency[result.line.argmax()] - 150) < 15
+
+
+def test_band_and_channels_of_what_is_not_linear_are_named() -> None:
+    """Only the last two channels move, and only about their resonance."""
+    low, high = resonance(seed=1), resonance(1.02, seed=2)
+    values = resonance(seed=3).values.copy()
+    values[:, 3:] = high.values[:, 3:]
+    there = replace(high, values=values)
+    found, _ = levels_checked(Recording("a", low, level=1.0), [Recording("b", there, level=5.0)])
+    assert set(found[0].channels) == {"3:+Z", "4:+Z"}
+    first, last = homogeneity(low, there).bands[0]
+    assert 20 < first < 150 < last < 260
+    assert f"{first:.4g} to {last:.4g} Hz" in found[0].text
+
+
+@pytest.mark.parametrize("count", [10, pytest.param(100, marks=pytest.mark.slow)])
+def test_levels_of_a_linear_structure_are_never_found(count: int) -> None:
+    for k in range(count):
+        a, b = resonance(seed=1000 + k), resonance(seed=3000 + k)
+        assert homogeneity(a, b).linear
+        found, _ = levels_checked(Recording("a", a, level=1.0), [Recording("b", b, level=4.0)])
+        assert not found
 
 
 def test_significant_but_negligible_is_linear() -> None:

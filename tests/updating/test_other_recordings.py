@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
 from chladni.ema.identification import equalised, identify
-from chladni.ema.level_shift import level_notes
+from chladni.ema.level_modes import AtLevel
+from chladni.ema.level_study import level_study
+from chladni.ema.level_words import level_notes
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import modelled
 from chladni.updating.map_fit import MassMeasurement
@@ -81,16 +83,16 @@ def test_a_level_is_no_repeat():
 
 
 @pytest.mark.parametrize(("stretch", "moves"), [(1.0, False), (0.985, True)])
-def test_frequencies_that_move_with_level_are_named(stretch, moves):
+def test_frequencies_that_move_from_level_to_level_are_named(stretch, moves):
+    """All of them by one factor: the object drifted."""
     other = OtherRecording("hard", "level", recorded(DECK, 7, stretch), 4.0)
     question = asked(other, level=1.0)
     others, _ = others_identified(question, (20.0, 170.0))
-    first = (question.level, identify(question.frf, (20.0, 170.0)))
-    (note,) = level_notes([first, *levels(others)])
-    assert note.startswith("nonlinear" if moves else "no natural frequency moves with level (1, 4")
-    if moves:
-        assert " Hz at level 1, " in note
-        assert " Hz at level 4" in note
+    first = AtLevel(question.level, question.frf, identify(question.frf, (20.0, 170.0)))
+    note = level_notes(level_study([first, *levels(others)]))[0]
+    drifted = "every mode moves by one factor from level to level (1, 4)"
+    calm = "no natural frequency and no damping moves with level (1, 4)"
+    assert note.startswith(drifted if moves else calm)
 
 
 def test_the_fit_is_not_asked_to_go_below_the_spread_and_others_are_scored():

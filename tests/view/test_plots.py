@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import bench_plots, plots, study_plots
+from chladni.view import bench_plots, level_plots, plots, study_plots
 
 F = np.linspace(10, 200, 400)
 H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))
@@ -81,12 +81,25 @@ PLOTS = {  # name: the drawing, and words that must stand on it
         ),
         ("Q", "f1", "t [m]", "E [Pa]"),
     ),
+    "mode_over_levels": (
+        lambda p: level_plots.mode_over_levels(
+            p, "friction: 30 Hz", R * 1e-6, (R, R / 100, np.array([np.nan, 81.0, np.nan])),
+            (R / 1e4, R / 1e6, np.array([np.nan, 0.007, np.nan])),
+            np.stack([R * 1e-6, R, R / 1e4], axis=1), "micro-slip", (70.0, 0.006),
+        ),
+        ("friction: 30 Hz", "amplitude [mm]", "natural frequency [Hz]", "damping [% of critical]",
+         "micro-slip, fitted to all", "foretold", "one linear model", "measured"),
+    ),
 }  # fmt: skip
 
 
 def test_every_plot_is_drawn_here():
-    own = {name for module in (bench_plots, plots, study_plots) for name, f in vars(module).items()
-           if inspect.isfunction(f) and f.__module__ == module.__name__}  # fmt: skip
+    own = {
+        name
+        for module in (bench_plots, level_plots, plots, study_plots)
+        for name, f in vars(module).items()
+        if inspect.isfunction(f) and f.__module__ == module.__name__
+    }
     assert {name for name in own if not name.startswith("_")} == PLOTS.keys()
 
 
@@ -103,7 +116,7 @@ def test_every_plot_says_what_it_shows(tmp_path, name, monkeypatch):
     """Labels with units, names of curves and of rows."""
     saved = []
     save = plots.save
-    for module in (bench_plots, plots, study_plots):
+    for module in (bench_plots, level_plots, plots, study_plots):
         monkeypatch.setattr(
             module, "save", lambda figure, path: saved.append(figure) or save(figure, path)
         )

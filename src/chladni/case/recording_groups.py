@@ -6,13 +6,14 @@ several inputs: their columns are stacked. Driven at the same places they are re
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
 from ..dynamics.frf import FRF
-from ..ema.setup import Recording
+from ..ema.setup import Control, Recording
 from ..errors import FileError
+from .schema import key
 from .toml_sections import TomlSection
 
 Relation = Literal["state", "article", "level", "repeat"]
@@ -49,8 +50,19 @@ def _told(section: TomlSection, r: Recording) -> Recording:
     if state and r.poles is not None:
         r = replace(r, poles=replace(r.poles, state=(state,) * len(r.poles.state)))
     mass = section.number("mass", low=1e-9)
-    level = r.level if level is None else level
-    return replace(r, article=article, level=level, state=state, mass=mass)
+    r = _held(section, replace(r, level=r.level if level is None else level))
+    return replace(r, article=article, state=state, mass=mass)
+
+
+def _held(section: TomlSection, r: Recording) -> Recording:
+    """The recording with what was held at its level."""
+    control = section.text("control", among=key("recording", "control").choices)
+    if control is None:
+        return r
+    if r.level is None:
+        raise FileError(f"{section.at('control')} = {control!r}, but {r.name} has no level")
+    said = f"{r.name}: the {control} was held at level {r.level:g}"
+    return replace(r, control=cast(Control, control), notes=(*r.notes, said))
 
 
 def relation(first: Recording, other: Recording) -> Relation:

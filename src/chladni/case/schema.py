@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from ..dynamics.frf import Quantity
+from ..ema.setup import Control
 from ..units import UNITS
 
 COMMANDS = ("test", "identify", "correlate", "calibrate", "diagnose",
@@ -105,7 +106,12 @@ SCHEMA = (
         "Which of several nominally equal objects it is. Repeats and articles give the spread that "
         "no fit is asked to go below.", '"B"', _READ),
     Key("recording", "level", "number", "N or m/s²", "what the file says",
-        "Level of excitation; frequencies that move with it are named in the notes.", "2.0", _READ),
+        "Amplitude that was held: of the force, of the base, or of the response as `control` says. "
+        "`identify` and `diagnose` hold frequency and damping against it.", "2.0", _READ),
+    Key("recording", "control", "word", "", "force",
+        "What was held at `level` from line to line: the force (or the motion of the base), or the "
+        "response of the drive point (else of the first output) in the unit of the recording.",
+        '"response"', _READ, get_args(Control)),
     Key("recording", "state", "text", "", "one state",
         "What was done to the object before this was measured. `calibrate` and `diagnose` take "
         "every state (or the one `use` names): E, rho, t are shared, an effect is a state's own. "

@@ -12,6 +12,7 @@ from ..errors import LabelError, ShapeError, named
 from .time_record import TimeRecord
 
 Role = Literal["output", "input"]
+Control = Literal["force", "response"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,8 @@ class Recording:
     functions : tuple            time histories, spectra
     time : TimeRecord or None    forces and responses against time
     added_damping : float        what an exponential window took from every pole's real part [1/s]
-    level : float or None        excitation [N], or [m/s²] for base excitation
+    level : float or None        amplitude of what was held: force [N], base or response [m/s²]
+    control : "force" (or the motion of the base), or "response" (of the drive point)
     article : str                which of several nominally equal objects
     state : str                  what was done to the object, where it was measured as it changed
     mass : float or None         weighed in this state [kg]
@@ -135,6 +137,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     state: str = ""
     mass: float | None = None
+    control: Control = "force"
 
 
 @dataclass(frozen=True, eq=False)

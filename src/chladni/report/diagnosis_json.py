@@ -7,6 +7,7 @@ from typing import Any, TypeVar, cast
 
 from ..effects.estimate import Estimate, Location
 from ..errors import FileError
+from ..updating.level_effects import LinearJoint
 from ..updating.result import (
     Adequacy,
     Agreement,
@@ -23,6 +24,7 @@ from ..updating.result import (
     Scores,
 )
 from ..workflows.diagnosis_result import Compared, DiagnosisResult, StateResult
+from .level_blocks import level_json, read_levels
 from .screening_blocks import read_screening, screening_json
 
 Row = TypeVar("Row")
@@ -62,6 +64,8 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
         "files": dict(r.files),
         "frequency_rms_percent": None if error is None else vars(error),
         "recordings": [dict(vars(row)) for row in r.recordings],
+        "levels": level_json(r.levels),
+        "joints": [dict(vars(j)) for j in r.joints],
         "states": [{"state": s.name, **diagnosis_json(s.result)} for s in r.states],
         "shared": [_calibrated(c) for c in r.shared],
     }
@@ -153,6 +157,8 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
         searched=bool(d.get("searched", alternatives is None or len(alternatives) > 0)),
         files=dict(d.get("files") or {}),
         recordings=tuple(_known(RecordingScore, r) for r in d.get("recordings") or ()),
+        levels=read_levels(d.get("levels")),
+        joints=tuple(_known(LinearJoint, j) for j in d.get("joints") or ()),
         states=tuple(
             StateResult(str(s.get("state", "")), from_json(s)) for s in d.get("states") or ()
         ),

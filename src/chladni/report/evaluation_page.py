@@ -1,16 +1,19 @@
 """The evaluation of a test as a page: findings, FRFs, coherence, distortion, free decays."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..dynamics.frf import FRF, UNIT
+from ..ema.level_table import level_tables
 from ..ema.ring_down import RingDown
 from ..io.tables.write_tables import write_npz
 from ..io.uff.estimate_stamp import stamp
 from ..io.uff.write_uff import write_uff
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from .blocks import Block, PageParts, Picture, Section, Table
+from .level_blocks import draw_levels, level_section
 from .screening_blocks import screening_section
 from .words import number
 
@@ -27,6 +30,12 @@ def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
         blocks, drawn = _blocks(folder, stem, r)
         sections.append(Section(r.recording.name, blocks))
         files += drawn
+        if r.levels.nonlinear:
+            tables = level_tables(r.levels)
+            pictures = draw_levels(folder, tables, f"_decay{stem}")
+            of = f"Free decays of {r.recording.name} by amplitude"
+            sections.append(replace(level_section(tables, pictures), title=of))
+            files += [(path.name, "a mode over its amplitudes") for path in pictures.values()]
     lead = "; ".join(r.screening.sentence for r in found.recordings)
     return PageParts(lead, sections, found.notes, files)
 

@@ -13,6 +13,7 @@ from ..updating.result import Alternative, NamedEffect, Scores
 from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
+from .level_blocks import draw_levels
 
 _GRID = 8  # channels in the overview
 CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
@@ -54,6 +55,7 @@ def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
     made = _places(folder, result, shown) | setup(folder, shown)
     made |= _scores(folder, result) | _left(folder, result, shown)
     made |= frequencies(folder, rows) | mac_picture(folder, shown)
+    made |= {path.stem: path for path in draw_levels(folder, result.levels).values()}
     return made | curves(folder, shown)
 
 

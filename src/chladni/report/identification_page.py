@@ -6,9 +6,11 @@ import numpy as np
 
 from ..dynamics.frf import UNIT
 from ..ema.identification import Identified, evaluate
+from ..ema.level_table import level_tables
 from ..io.tables.write_tables import write_poles
 from ..workflows.identify import Identification, RecordingModes, firm
 from .blocks import Block, PageParts, Picture, Section, Table
+from .level_blocks import draw_levels, level_section
 from .screening_blocks import screening_section
 from .words import number
 
@@ -25,6 +27,11 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         sections.append(Section(r.recording.name, [_table(r.modes), *_pictures(folder, stem, r)]))
         files.append((f"stabilisation{stem}.png", "stabilisation diagram"))
         files.append((f"fit{stem}.png", "the recording and the identified model"))
+    for k, study in enumerate(found.levels):
+        tables = level_tables(study)
+        drawn = draw_levels(folder, tables, "" if len(found.levels) == 1 else f"_{k + 1}")
+        sections.insert(k, level_section(tables, drawn))
+        files += [(path.name, "a mode over levels") for path in drawn.values()]
     lead = "; ".join(_sentence(r) for r in found.recordings)
     return PageParts(lead, sections, found.notes, files)
 

@@ -3,6 +3,7 @@
 from functools import singledispatch
 from typing import Any
 
+from ..ema.level_table import level_tables
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
 from ..workflows.case_check import CaseCheck
@@ -15,6 +16,7 @@ from ..workflows.virtual_test import BenchResult
 from .bench_page import bench_json
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
+from .level_blocks import level_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
 from .study_page import study_json
@@ -72,7 +74,10 @@ def _(result: NormalModes) -> dict[str, Any]:
 
 @to_json.register
 def _(result: Identification) -> dict[str, Any]:
-    return {"recordings": [_recording(r) for r in result.recordings]}
+    held: dict[str, Any] = {"recordings": [_recording(r) for r in result.recordings]}
+    if result.levels:
+        held["levels"] = [level_json(level_tables(study)) for study in result.levels]
+    return held
 
 
 def _recording(r: RecordingModes) -> dict[str, Any]:
@@ -108,6 +113,7 @@ def _evaluated(r: RecordingEvaluation) -> dict[str, Any]:
         "band_hz": frf.frequency[[0, -1]],
         "screening": screening_json(r.screening),
         "free_decays": [dict(vars(d)) for d in r.decays],
+        "levels": level_json(level_tables(r.levels)),
     }
     if e is not None:
         found |= {

@@ -7,6 +7,7 @@ from ..effects.estimate import Estimate, Location
 from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
+from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table
@@ -58,6 +59,7 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "evidence": ("why", "Log evidence of every explanation tried, relative to the best."),
     "setup": ("test", "Where sensors and shaker sit."),
 }
+LEVELS = "levels_"  # figures of modes over levels: with the number of the mode
 _HALF = ("waterfall", "held_out")  # two of them stand side by side
 _FILES = {
     "deck": "the updated deck",
@@ -91,7 +93,8 @@ def _sentence(result: DiagnosisResult) -> str:
     if verdict == "measurement fault":
         return f"The recording is at fault, not the model: {what}{gain}."
     if verdict == "nonlinear":
-        why = what or "no linear model fits"
+        signs = ", ".join(dict.fromkeys(t.signature for t in result.levels if t.sentence))
+        why = what or signs or "no linear model fits"
         return f"The structure does not answer in proportion to the force: {why}."
     if not result.searched and not result.effects:
         return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
@@ -105,6 +108,23 @@ def _sentence(result: DiagnosisResult) -> str:
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."
     return verdict
+
+
+def _joints(result: DiagnosisResult) -> list[Block]:
+    """What a linear deck would have in its joints at every level."""
+    rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
+    heads = ("mode [Hz]", "level", "K, times", "GE", "share of strain energy")
+    what = (
+        "Springs and bushes of a linear deck that has the mode as it is at a level: K over that of "
+        "the updated deck, and GE (PBUSH). They are in the updated deck as comments."
+    )
+    return [Table(heads, rows, caption=what)] if rows else []
+
+
+def _levels(figures: Mapping[str, Path]) -> dict[int, Path]:
+    """Pictures of modes over levels by the mode's position."""
+    numbers = {n.removeprefix(LEVELS): p for n, p in figures.items() if n.startswith(LEVELS)}
+    return {int(n) - 1: p for n, p in numbers.items() if n.isdecimal()}
 
 
 def _tied(result: DiagnosisResult) -> str:
@@ -132,13 +152,20 @@ def sections(
         ]
 
     found = screening_section(result.screening)
-    rest = [Picture(p, n) for n, p in figures.items() if n not in PLACES and n != "where"]
+    of_levels = _levels(figures)
+    rest = [
+        Picture(p, n)
+        for n, p in figures.items()
+        if n not in PLACES and n != "where" and p not in of_levels.values()
+    ]
     return [
         Section("Not to be trusted", [Items(result.distrust)] if result.distrust else []),
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
         Section("At a glance", _glance(result)),
         Section("What was found", _effects(result.effects)),
+        level_section(result.levels, of_levels),
+        Section("Joints at each level", _joints(result)),
         Section("What was calibrated", _calibrated(result)),
         Section("Test and model", shown("frf")),
         Section("Scores", [*_scores(result), *recording_scores(result), *shown("scores")]),

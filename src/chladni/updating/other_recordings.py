@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..ema.identification import Identified, equalised, identify
+from ..ema.identification import equalised, identify
+from ..ema.level_modes import AtLevel
 from ..errors import ChladniError
 from ..fem.modelled import Modelled
 from .likelihood import LN10, Responses
@@ -38,9 +39,13 @@ def others_identified(
     return found, notes
 
 
-def levels(others: Sequence[OtherTest]) -> list[tuple[float | None, Identified]]:
-    """Level and modes of those that were measured at another level."""
-    return [(o.recording.level, o.identified) for o in others if o.recording.relation == "level"]
+def levels(others: Sequence[OtherTest]) -> list[AtLevel]:
+    """Those that were measured at another level, or again at their own."""
+    alike = [o for o in others if o.recording.relation in ("level", "repeat")]
+    return [
+        AtLevel(o.recording.level, o.recording.frf, o.identified, o.recording.control)
+        for o in alike
+    ]
 
 
 def measured_spread(

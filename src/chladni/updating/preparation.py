@@ -19,7 +19,9 @@ from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import Identified, equalised, identify, noise_source
-from ..ema.level_shift import level_notes
+from ..ema.level_modes import AtLevel
+from ..ema.level_study import level_study
+from ..ema.level_words import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
 from ..errors import FileError
 from ..fem.assemble import Structure
@@ -136,9 +138,11 @@ def _by_responses(question: Question) -> Prepared:
         )
     notes += _mass_note(question)
     problem = replace(problem, damping=modal_damping(found, low, fit_max))
+    own = AtLevel(question.level, frf, found, question.control)
+    studied = level_study([own, *levels(others)])
     notes += [
         *said, *spread_note(spreads[1], data[1].use, others),
-        *level_notes([(question.level, found), *levels(others)]),
+        *level_notes(studied),
     ]  # fmt: skip
     floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
@@ -147,7 +151,7 @@ def _by_responses(question: Question) -> Prepared:
     few = too_little(borne, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
-        others=tuple(others),
+        others=tuple(others), levels=studied,
     )  # fmt: skip
 
 

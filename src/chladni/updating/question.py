@@ -7,6 +7,8 @@ import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
+from ..ema.level_study import LevelStudy
+from ..ema.setup import Control
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
@@ -26,6 +28,7 @@ class OtherRecording:
     relation: str
     frf: FRF
     level: float | None = None
+    control: Control = "force"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,8 @@ class Question:
     parameters: tuple[FreeParameter, ...] = ()  # what the user frees; none: a default set
     carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
     others: tuple[OtherRecording, ...] = ()
-    level: float | None = None  # of excitation, of the recording that is fitted [N], [m/s²]
+    level: float | None = None  # of the recording that is fitted [N], [m/s²]
+    control: Control = "force"  # what was held at it
 
     def tested(self, assembly: Assembly) -> Assembly:
         """An article with the sensors of known mass on it, as it was measured."""
@@ -102,6 +106,7 @@ class Prepared:
     unseen : the held-out samples in the shape of ``problem.data.use``
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
     others : recordings that no fit sees, with their modes
+    levels : the modes over levels of excitation, where there are two and more
     """
 
     problem: UpdatingProblem
@@ -116,3 +121,4 @@ class Prepared:
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     others: tuple[OtherTest, ...] = ()
+    levels: LevelStudy = field(default_factory=LevelStudy)

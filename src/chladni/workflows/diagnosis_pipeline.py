@@ -48,6 +48,7 @@ from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
 from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+from .over_levels import over_levels
 from .question_of_case import question
 from .screening_of_case import (
     RecordingAtFault,
@@ -57,6 +58,7 @@ from .screening_of_case import (
 )
 
 BLIND_SHARE = 0.05  # of the shells
+_NAMELESS = "nothing is named: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ def explained(
         found = withheld(prepared, found)
     found, distrust = _judged(asked, prepared, found)
     if diagnosing and prepared.too_little:
-        distrust = (f"nothing is named: {prepared.too_little}", *distrust)
+        distrust = (f"{_NAMELESS}{prepared.too_little}", *distrust)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -126,10 +128,14 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     stages, lost = _updated(case, asked, prepared, found)
     progress("scores", 0.95)
     result = _result(asked, prepared, found, stages)
+    result = over_levels(asked, prepared, stages, result, diagnosing)
+    distrust = known.distrust
+    if result.verdict == "nonlinear":  # what is named is named by the levels
+        distrust = tuple(why for why in distrust if not why.startswith(_NAMELESS))
     said = () if known.screening is None else known.screening.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(
-        result, notes=notes, distrust=known.distrust, searched=diagnosing, screening=known.screening
+        result, notes=notes, distrust=distrust, searched=diagnosing, screening=known.screening
     )
 
 

@@ -8,10 +8,12 @@ from typing import Literal
 
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
+from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
 from ..updating.left_where import LeftWhere
+from ..updating.level_effects import LinearJoint
 from ..updating.result import (
     Adequacy,
     Agreement,
@@ -80,6 +82,8 @@ class DiagnosisResult:
     models : the structures; None where the result was read from a file
     left_where : what the explanation leaves, on the mesh; None where frequencies were compared
     recordings : Q of the decks on the recordings that were not fitted
+    levels : its modes over levels of excitation, where it was measured at several
+    joints : K and GE that linear joints would have at each level, where friction may sit in them
     states : of an object measured in several states each one's result; this one is the first's
     shared : what the states share, fitted to all of them at once
     """
@@ -104,6 +108,8 @@ class DiagnosisResult:
     models: UpdatedModels | None = None
     left_where: LeftWhere | None = None
     recordings: tuple[RecordingScore, ...] = ()
+    levels: tuple[LevelTable, ...] = ()
+    joints: tuple[LinearJoint, ...] = ()
     states: tuple["StateResult", ...] = ()
     shared: tuple[CalibratedParameter, ...] = ()
 

@@ -1,7 +1,7 @@
 """The evaluation of a test: FRFs from time data, ring-downs, screening of every recording."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from threadpoolctl import threadpool_limits
 
@@ -10,6 +10,8 @@ from ..case.mended_recordings import with_frf
 from ..ema.finding import Check, Finding, Screening
 from ..ema.frf_estimate import EstimateSettings, FrfEstimate
 from ..ema.identification import Identified, identify
+from ..ema.level_study import LevelStudy, decay_study
+from ..ema.level_words import mode_sentence
 from ..ema.recording_screening import screened
 from ..ema.ring_down import RingDown, ring_downs
 from ..ema.setup import Recording
@@ -34,6 +36,7 @@ class RecordingEvaluation:
     recording : Recording     with the FRFs
     estimate : how they were estimated, where it held time data
     decays : free decays of its strongest modes, where its inputs stop
+    levels : what their amplitudes tell, level by level
     screening : Screening
     """
 
@@ -41,6 +44,7 @@ class RecordingEvaluation:
     estimate: FrfEstimate | None
     decays: tuple[RingDown, ...]
     screening: Screening
+    levels: LevelStudy = field(default_factory=LevelStudy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +82,21 @@ def evaluate_recordings(
             others = [] if k else [other for other, _ in held[1:]]
             decays = ring_downs(r.time) if r.time is not None else ()
             screening = _screened(case, r, others, first=k == 0)
-            found.append(RecordingEvaluation(r, e, decays, _with_time(screening, e, decays)))
+            assert r.frf is not None
+            levels = decay_study(decays, r.frf.quantity)
+            screening = _with_time(screening, e, decays)
+            found.append(RecordingEvaluation(r, e, decays, screening, levels))
     said = [note for f in found for note in f.screening.notes]
+    said += [note for f in found for note in _decay_notes(f)]
     own = case.said("test") if case is not None else [n for r, _ in held for n in r.notes]
     return Evaluation(tuple(found), tuple(dict.fromkeys([*said, *own])))
+
+
+def _decay_notes(found: RecordingEvaluation) -> list[str]:
+    """A sentence a mode whose frequency or damping goes with its amplitude as it dies away."""
+    name = found.recording.name
+    beats = "to settle it, measure at two levels: a second mode within a bandwidth beats alike"
+    return [f"{name}: free decay: {mode_sentence(m)}; {beats}" for m in found.levels.moving]
 
 
 def _screened(

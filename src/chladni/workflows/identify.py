@@ -11,7 +11,9 @@ from ..case.mended_recordings import with_frf
 from ..ema.finding import Screening
 from ..ema.identification import Identified, noise_source
 from ..ema.identification import identify as identified
-from ..ema.level_shift import level_notes
+from ..ema.level_modes import AtLevel
+from ..ema.level_study import LevelStudy, level_study
+from ..ema.level_words import level_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
@@ -51,11 +53,15 @@ class RecordingModes:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The modes of every recording, what was done, and reasons not to trust them."""
+    """The modes of every recording, what was done, and reasons not to trust them.
+
+    ``levels`` holds a study of each object that was measured at two levels or more.
+    """
 
     recordings: tuple[RecordingModes, ...]
     notes: tuple[str, ...] = ()
     distrust: tuple[str, ...] = ()
+    levels: tuple[LevelStudy, ...] = ()
 
     def trusted(self) -> "Identification":
         """The result itself.
@@ -109,13 +115,14 @@ def identify(
             progress(f"poles of {recording.name}", k / len(held))
             found.append(_modes(recording, band, gaps, averages, () if k else held))
     screenings = [note for r in found for note in r.screening.notes]
+    levels = _levels(found)
     said = [*screenings, *said]
     notes = [
         *said,
         *(note for note in _notes(held, gaps, averages) if note not in said),
-        *_levels(found),
+        *(note for study in levels for note in level_notes(study)),
     ]
-    return Identification(tuple(found), tuple(notes), _doubts(found))
+    return Identification(tuple(found), tuple(notes), _doubts(found), levels)
 
 
 def _has(read: Sequence[Recording]) -> str:
@@ -175,15 +182,17 @@ def _notes(
     return tuple(notes)
 
 
-def _levels(found: Sequence[RecordingModes]) -> list[str]:
-    """Frequencies against level, of each article and state by itself."""
-    alike: dict[tuple[str, str], list[RecordingModes]] = {}
+def _levels(found: Sequence[RecordingModes]) -> tuple[LevelStudy, ...]:
+    """Modes over levels, of each article and state by itself."""
+    alike: dict[tuple[str, str], list[AtLevel]] = {}
     for one in found:
-        alike.setdefault((one.recording.article, one.recording.state), []).append(one)
-    notes = []
-    for group in alike.values():
-        notes += level_notes([(one.recording.level, one.whole) for one in group])
-    return notes
+        r = one.recording
+        assert r.frf is not None
+        alike.setdefault((r.article, r.state), []).append(
+            AtLevel(r.level, r.frf, one.whole, r.control)
+        )
+    studies = [level_study(group) for group in alike.values()]
+    return tuple(s for s in studies if s.modes)
 
 
 def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:

@@ -42,7 +42,8 @@ def question(case: Case) -> Question:
     )
     if frfs:
         first = case.recordings[0]
-        return replace(asked, frf=frfs[0], others=_others(case), level=first.level)
+        return replace(asked, frf=frfs[0], others=_others(case), level=first.level,
+                       control=first.control)  # fmt: skip
     state = poles[0].of(poles[0].states[0])
     return replace(asked, frequency=state.frequency, frequency_sd=state.frequency_sd)
 
@@ -63,7 +64,7 @@ def _others(case: Case) -> tuple[OtherRecording, ...]:
     first = case.recordings[0]
     kinds = [(r, relation(first, r)) for r in case.recordings[1:] if r.frf is not None]
     return tuple(
-        OtherRecording(r.name, kind, r.frf, r.level)
+        OtherRecording(r.name, kind, r.frf, r.level, r.control)
         for r, kind in kinds
         if r.frf is not None and kind != "state"
     )

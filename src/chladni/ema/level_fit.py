@@ -1,0 +1,190 @@
+"""One mode's frequency and damping against amplitude, explained by a nonlinear element.
+
+Single-nonlinear-mode method: about its resonance the mode is one oscillator whose stiffness is
+k (1 + κ(A)), κ the element's describing function (Szemplińska-Stupnicka 1979; Göge, Sinapius,
+Füllekrug and Link 2005, for modal tests at several levels).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import chi2
+
+from .level_elements import ELEMENTS, Element
+from .level_modes import ModeLevels
+
+FLOOR_FREQUENCY = 5e-4  # ln f between runs: what 4 K of temperature do to steel
+FLOOR_DAMPING = 0.05  # ln ζ between runs: what damping of clamped objects repeats to
+STARTS = 4  # fits of an element, from the best of its starts
+LEAST = 3  # levels an element is fitted to
+
+
+@dataclass(frozen=True, eq=False)
+class ElementFit:
+    """An element fitted to levels of one mode.
+
+    Attributes
+    ----------
+    element : Element
+    frequency, damping : of the mode without it [Hz], of critical
+    values, sd : (n,)   its numbers, and the standard deviation of their logarithm (signed: of them)
+    largest : amplitude they refer to [m]
+    chi2, data : weighted squares left, and the count of data
+    """
+
+    element: Element
+    frequency: float
+    damping: float
+    values: np.ndarray
+    sd: np.ndarray
+    largest: float
+    chi2: float
+    data: int
+
+    @property
+    def count(self) -> int:
+        """Numbers that were fitted."""
+        return 2 + len(self.values)
+
+    @property
+    def bic(self) -> float:
+        """χ² + n ln N (Schwarz 1978): smaller is better."""
+        return self.chi2 + self.count * float(np.log(self.data))
+
+    @property
+    def p(self) -> float:
+        """Chance of so large a χ² of the right element; nan where nothing could contradict it."""
+        free = self.data - self.count
+        return float(chi2.sf(self.chi2, free)) if free > 0 else float("nan")
+
+    def at(self, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Natural frequency [Hz] and damping at amplitudes (k,) [m]."""
+        kappa = self.element.kappa(amplitude / self.largest, self.values)
+        f, zeta = _with(kappa, self.damping)
+        return self.frequency * f, zeta
+
+
+def _with(kappa: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+    """f/f_0 = √(1 + κ') and ζ = ζ_0 f_0/f + κ''/2 (f_0/f)²; the viscous part stays as it is."""
+    f = np.sqrt(np.maximum(1 + kappa.real, 1e-6))
+    return f, damping / f + kappa.imag / (2 * f**2)
+
+
+def weights(mode: ModeLevels) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations of ln f and ln ζ (k,), no smaller than runs repeat to."""
+    return (
+        np.hypot(mode.frequency_sd / mode.frequency, FLOOR_FREQUENCY),
+        np.hypot(mode.damping_sd / mode.damping, FLOOR_DAMPING),
+    )
+
+
+def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
+    """Every element that the levels can bear, fitted to them; best (by BIC) first.
+
+    What dissipates is tried where damping moves.
+    """
+    if len(set(mode.level)) < LEAST:
+        return ()
+    count = 2 * len(mode.level)
+    tried = [e for e in ELEMENTS if 2 + len(e.numbers) < count]
+    tried = [e for e in tried if mode.damping_moves or e.kind not in ("friction", "loss")]
+    return tuple(sorted((_fitted(e, mode) for e in tried), key=lambda f: f.bic))
+
+
+def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
+    """The best of fits from the best starts."""
+    largest = float(mode.amplitude.max())
+    s_f, s_z = weights(mode)
+    a, f, z = mode.amplitude / largest, mode.frequency, mode.damping
+    signed = np.array([n.signed for n in element.numbers], bool)
+
+    def values(theta: np.ndarray) -> np.ndarray:
+        return np.where(signed, theta, np.exp(np.where(signed, 0.0, theta)))
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        ratio, zeta = _with(element.kappa(a, values(x[2:])), np.exp(x[1]))
+        return np.concatenate(
+            [(x[0] + np.log(ratio / f)) / s_f, np.log(np.maximum(zeta, 1e-9) / z) / s_z]
+        )
+
+    low, high = _bounds(element, signed)
+    head = [float(np.log(f[0])), float(np.log(z.min()))]
+    starts = [np.where(signed, x, np.log(np.abs(x))) if x else np.zeros(0)
+              for x in element.starts()]  # fmt: skip
+    starts.sort(key=lambda theta: float((residual(np.array([*head, *theta])) ** 2).sum()))
+    scale = np.concatenate([[1e-3, 0.1], np.where(signed, 0.01, 0.3)])
+    best: OptimizeResult | None = None
+    for theta in starts[:STARTS]:
+        found = least_squares(
+            residual, [*head, *theta], x_scale=scale,
+            bounds=([-np.inf, -np.inf, *low], [np.inf, np.inf, *high]),
+        )  # fmt: skip
+        best = found if best is None or found.cost < best.cost else best
+    assert best is not None
+    J = best.jac
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0))[2:]
+    return ElementFit(
+        element, float(np.exp(best.x[0])), float(np.exp(best.x[1])), values(best.x[2:]), sd,
+        largest, float(2 * best.cost), 2 * len(a),
+    )  # fmt: skip
+
+
+def _bounds(element: Element, signed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of θ: logarithms of positive numbers, signed ones as they are."""
+    ends = np.array([n.bounds for n in element.numbers]).reshape(-1, 2)
+    low = np.where(signed, -ends[:, 1] / 2, np.log(np.where(signed, 1.0, ends[:, 0])))
+    return low, np.where(signed, ends[:, 1], np.log(ends[:, 1]))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutLevels:
+    """Levels that no fit saw: what was measured there, and what was foretold.
+
+    Attributes
+    ----------
+    rows : (m,)                    positions among the levels of the mode
+    fit : the best element by the levels that were seen
+    frequency, damping : (m,)      foretold at the measured amplitude [Hz], of critical
+    mean : (f, ζ)                  of the levels that were seen: what one linear model says
+    """
+
+    rows: np.ndarray
+    fit: ElementFit
+    frequency: np.ndarray
+    damping: np.ndarray
+    mean: tuple[float, float]
+
+    def misses(self, mode: ModeLevels) -> tuple[float, float, float, float]:
+        """Rms of ln f and ln ζ foretold over measured, then of the mean over measured."""
+        f, z = mode.frequency[self.rows], mode.damping[self.rows]
+        off = (self.frequency / f, self.damping / z, self.mean[0] / f, self.mean[1] / z)
+        a, b, c, d = (float(np.sqrt((np.log(x) ** 2).mean())) for x in off)
+        return a, b, c, d
+
+
+def foretold(mode: ModeLevels, held: Sequence[int] | None = None) -> HeldOutLevels | None:
+    """The levels between, foretold by an element chosen and fitted on the others.
+
+    Parameters
+    ----------
+    held : positions of the levels to hold out; default every second of those between the lowest and
+        the highest, as long as three are left to fit; None where there are fewer than four
+    """
+    n = len(mode.level)
+    if held is None:
+        held = [*range(1, n - 1, 2)][: max(n - LEAST, 0)]
+    rows = np.array(held, int)
+    seen = np.ones(n, bool)
+    seen[rows] = False
+    fits = fitted_elements(mode.sel(seen)) if len(rows) else ()
+    if not fits:
+        return None
+    f, zeta = fits[0].at(mode.amplitude[rows])
+    s_f, s_z = (1 / s[seen] ** 2 for s in weights(mode))
+    mean = (
+        float(np.exp(np.average(np.log(mode.frequency[seen]), weights=s_f))),
+        float(np.exp(np.average(np.log(mode.damping[seen]), weights=s_z))),
+    )
+    return HeldOutLevels(rows, fits[0], f, zeta, mean)

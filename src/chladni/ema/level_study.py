@@ -1,0 +1,216 @@
+"""What levels of excitation tell: is the object linear, and if not, what its modes are known by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..dynamics.frf import Quantity
+from .identification import DERIVATIVES
+from .level_fit import (
+    FLOOR_DAMPING,
+    FLOOR_FREQUENCY,
+    ElementFit,
+    HeldOutLevels,
+    fitted_elements,
+    foretold,
+    weights,
+)
+from .level_modes import AtLevel, ModeLevels, modes_over_levels
+from .ring_down import RingDown
+
+Signature = Literal[
+    "linear",
+    "runs differ",
+    "overlapped",
+    "friction",
+    "clearance",
+    "stiffening",
+    "softening",
+    "loss",
+]
+MEANING: dict[Signature, str] = {
+    "linear": "frequency and damping stay as the level rises",
+    "runs differ": "it moves by more than its noise, by no more than runs of one test repeat to",
+    "overlapped": "a mode that moves rings into it, so that its own doing cannot be told",
+    "friction": "a joint slips: stiffness goes and damping comes with the level",
+    "clearance": "parts meet once they move far enough: it stiffens from an amplitude on",
+    "stiffening": "it stiffens as it moves and loses no more: sheets stretch, or contact closes",
+    "softening": "it softens as it moves and loses no more: contact opens, or it grew warm",
+    "loss": "its damping moves with the level and no stiffness with it: air, foam, or the exciter",
+}
+CALM: tuple[Signature, ...] = ("linear", "runs differ", "overlapped")  # no sign of anything
+OVERLAP = 4.0  # sums of half-bandwidths: nearer modes ring into each other
+EFFECT: dict[Signature, str] = {"friction": "joint-friction", "clearance": "rattle"}  # public names
+REPEATED = 0.01  # chance of runs that differ so much, below which levels are why they do
+ALIKE = 0.05  # of a drift: as near do modes follow it (E falls with warmth as rho does not)
+POOR = 0.01  # chance of a right element's χ², below which an element explains nothing
+AS_GOOD = 6.0  # of BIC (e^3): elements nearer than that are not told apart (Kass and Raftery 1995)
+SETTLED_BY = (
+    "measure the lowest level once more at the end: other frequencies there are a drift of the "
+    "object (warmth, a bolt that settles), the same are the level's doing"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeStudy:
+    """One mode over levels and what that is a sign of.
+
+    Attributes
+    ----------
+    mode : ModeLevels
+    signature : Signature
+    fits : elements fitted to all levels, best first; none where they are fewer than three
+    held_out : levels between, foretold from the others; None where they are fewer than four
+    """
+
+    mode: ModeLevels
+    signature: Signature
+    fits: tuple[ElementFit, ...] = ()
+    held_out: HeldOutLevels | None = None
+
+    @property
+    def explained(self) -> ElementFit | None:
+        """The best element, where it explains the levels."""
+        best = self.fits[0] if self.fits else None
+        return best if best is not None and not best.p < POOR else None
+
+    @property
+    def as_good(self) -> tuple[str, ...]:
+        """Other elements that the levels do not tell from the best."""
+        best = self.explained
+        others = self.fits[1:] if best is not None else ()
+        return tuple(f.element.name for f in others if best and f.bic < best.bic + AS_GOOD)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelStudy:
+    """All modes that were followed over levels."""
+
+    modes: tuple[ModeStudy, ...] = ()
+    drift: bool = False
+
+    @property
+    def moving(self) -> tuple[ModeStudy, ...]:
+        """Modes whose frequency or damping goes with the level; none where all of them drifted."""
+        return () if self.drift else tuple(m for m in self.modes if m.signature not in CALM)
+
+    @property
+    def nonlinear(self) -> bool:
+        """Whether any mode goes with the level."""
+        return bool(self.moving)
+
+
+def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
+    """Follow the modes over levels, say what moves, and what would move so.
+
+    Parameters
+    ----------
+    recordings : of one object; a study of fewer than two levels is empty
+    """
+    modes = modes_over_levels(recordings)
+    found = [_studied(m) for m in modes]
+    told = [ModeStudy(m.mode, "overlapped") if _overlapped(m, found) else m for m in found]
+    return LevelStudy(tuple(told), _drifts(modes))
+
+
+def _overlapped(one: ModeStudy, every: Sequence[ModeStudy]) -> bool:
+    """Whether a mode moves beside one that moves too and is better explained, or larger."""
+    return one.signature not in CALM and any(
+        other is not one
+        and other.signature not in CALM
+        and abs(_hertz(one)[0] - _hertz(other)[0]) < OVERLAP * (_hertz(one)[1] + _hertz(other)[1])
+        and _weight(other) > _weight(one)
+        for other in every
+    )
+
+
+def _hertz(one: ModeStudy) -> tuple[float, float]:
+    """Frequency and half-bandwidth at the lowest level [Hz]."""
+    f = float(one.mode.frequency[0])
+    return f, float(one.mode.damping[0]) * f
+
+
+def _weight(one: ModeStudy) -> tuple[bool, int, float]:
+    """Whether an element explains it; at how many levels it was found; how far it swings."""
+    return one.explained is not None, len(one.mode.level), float(one.mode.amplitude[0])
+
+
+def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:
+    """The same of free decays: each falls through levels of its own, its amplitudes [m].
+
+    Stretches of a decay are taken to be as well known as runs repeat to. A neighbour that beats
+    moves them as well, so that nothing is a sign of anything but what an element explains.
+
+    Parameters
+    ----------
+    quantity : of the responses
+    """
+    found = [_studied(_falling(d, quantity)) for d in decays]
+    return LevelStudy(
+        tuple(m if m.explained is not None or m.signature == "linear"
+              else ModeStudy(m.mode, "runs differ") for m in found)
+    )  # fmt: skip
+
+
+def _falling(decay: RingDown, quantity: Quantity) -> ModeLevels:
+    """A decay as levels that rise."""
+    rise = np.argsort(decay.amplitude)
+    f, zeta = decay.frequency_at[rise], decay.damping_at[rise]
+    A = decay.amplitude[rise] / (2 * np.pi * decay.frequency) ** DERIVATIVES[quantity]
+    return ModeLevels(decay.output, A, A, f, FLOOR_FREQUENCY * f, zeta, FLOOR_DAMPING * zeta)
+
+
+def _studied(mode: ModeLevels) -> ModeStudy:
+    if not mode.moves:
+        return ModeStudy(mode, "linear")
+    if _p_of_runs(mode) > REPEATED:
+        return ModeStudy(mode, "runs differ")
+    found = ModeStudy(mode, _trend(mode), fitted_elements(mode), foretold(mode))
+    best = found.explained
+    return found if best is None else ModeStudy(mode, _of(best), found.fits, found.held_out)
+
+
+def _p_of_runs(mode: ModeLevels) -> float:
+    """Chance of such differences between runs at one level."""
+    total = 0.0
+    for y, s in zip((np.log(mode.frequency), np.log(mode.damping)), weights(mode), strict=True):
+        total += float((((y - np.average(y, weights=1 / s**2)) / s) ** 2).sum())
+    return float(chi2.sf(total, 2 * (len(mode.level) - 1)))
+
+
+def _of(fit: ElementFit) -> Signature:
+    """What an element is a sign of."""
+    kind = fit.element.kind
+    if kind == "cubic":
+        return "stiffening" if fit.values[0] > 0 else "softening"
+    return kind
+
+
+def _trend(mode: ModeLevels) -> Signature:
+    """What the lowest and the other levels are a sign of, without any element."""
+    f = mode.frequency
+    softer = mode.frequency_moves and f[1:].min() / f[0] < 1 - 5e-4
+    if mode.damping_moves:
+        return "friction" if softer else "loss"
+    return "softening" if f[-1] < f[0] else "stiffening"
+
+
+def _drifts(modes: Sequence[ModeLevels]) -> bool:
+    """Whether all modes move by one factor a level and keep their damping: warmth, not level.
+
+    ln f_r(level) = a_r + d(level) is fitted to the modes seen at every level, and must hold.
+    """
+    most = max((len(m.level) for m in modes), default=0)
+    whole = [m for m in modes if len(m.level) == most]
+    moved = [m for m in whole if m.frequency_moves]
+    if len(moved) < 2 or any(m.damping_moves for m in modes):
+        return False
+    y = np.array([np.log(m.frequency) for m in whole])
+    s = np.hypot([m.frequency_sd / m.frequency for m in whole], ALIKE * np.ptp(y, axis=1).max())
+    y = y - np.average(y, axis=1, weights=1 / s**2)[:, None]
+    d = np.average(y, axis=0, weights=1 / s**2)
+    left = float((((y - d) / s) ** 2).sum())
+    return bool(chi2.sf(left, (len(whole) - 1) * (most - 1)) > POOR)

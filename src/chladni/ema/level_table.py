@@ -1,0 +1,145 @@
+"""A study of levels as plain numbers: what pages show and JSON holds (SI, Hz)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .level_fit import ElementFit
+from .level_study import LevelStudy, ModeStudy
+from .level_words import mode_sentence
+
+DRAWN = 60  # points of a fitted curve
+
+
+@dataclass(frozen=True)
+class LevelRow:
+    """A mode at one level: measured, by the best element, and foretold where it was held out.
+
+    ``stiffness`` and ``loss`` are what the element adds at that amplitude, κ' and κ'' over the
+    stiffness of the mode.
+    """
+
+    level: float
+    amplitude_m: float
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping: float
+    damping_sd: float
+    fitted_hz: float | None = None
+    fitted_damping: float | None = None
+    foretold_hz: float | None = None
+    foretold_damping: float | None = None
+    stiffness: float | None = None
+    loss: float | None = None
+
+
+@dataclass(frozen=True)
+class ElementNumber:
+    """A number of an element with its 95 % interval."""
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class TriedElement:
+    """An element that was fitted to all levels of a mode."""
+
+    name: str
+    chi2: float
+    data: int
+    bic: float
+    p: float | None
+    numbers: tuple[ElementNumber, ...] = ()
+
+
+@dataclass(frozen=True)
+class LevelTable:
+    """One mode over levels.
+
+    Attributes
+    ----------
+    sentence : what it does and what that is a sign of; "" where it does nothing
+    explained : whether the first element explains it
+    rows, elements : levels rising; elements, best first
+    foretold_by : the element chosen and fitted without the levels that were held out
+    mean_hz, mean_damping : of the levels it was fitted to: one linear model
+    curve : (amplitude [m], frequency [Hz], damping) of the first element
+    """
+
+    output: str
+    signature: str
+    sentence: str = ""
+    p_frequency: float | None = None
+    p_damping: float | None = None
+    explained: bool = False
+    rows: tuple[LevelRow, ...] = ()
+    elements: tuple[TriedElement, ...] = ()
+    foretold_by: str = ""
+    mean_hz: float | None = None
+    mean_damping: float | None = None
+    curve: tuple[tuple[float, float, float], ...] = ()
+
+
+def level_tables(study: LevelStudy) -> tuple[LevelTable, ...]:
+    """Every mode that was followed."""
+    return tuple(_table(one, study.drift) for one in study.modes)
+
+
+def _table(one: ModeStudy, drift: bool) -> LevelTable:
+    m, held = one.mode, one.held_out
+    calm = one.signature == "linear"
+    signature = "drift" if drift and not calm else one.signature
+    return LevelTable(
+        m.output,
+        signature,
+        "" if calm or drift else mode_sentence(one),
+        m.p_frequency,
+        m.p_damping,
+        one.explained is not None,
+        _rows(one),
+        tuple(_tried(fit) for fit in one.fits),
+        "" if held is None else held.fit.element.name,
+        None if held is None else held.mean[0],
+        None if held is None else held.mean[1],
+        _curve(one),
+    )
+
+
+def _rows(one: ModeStudy) -> tuple[LevelRow, ...]:
+    m, held = one.mode, one.held_out
+    measured = (m.level, m.amplitude, m.frequency, m.frequency_sd, m.damping, m.damping_sd)
+    columns = [c.tolist() for c in measured]
+    n = len(m.level)
+    fitted: list[list[float | None]] = [[None] * n for _ in range(6)]
+    if one.fits:
+        best = one.fits[0]
+        kappa = best.element.kappa(m.amplitude / best.largest, best.values)
+        fitted[:2] = [x.tolist() for x in best.at(m.amplitude)]
+        fitted[4:] = [kappa.real.tolist(), kappa.imag.tolist()]
+    if held is not None:
+        for k, f, zeta in zip(held.rows, held.frequency, held.damping, strict=True):
+            fitted[2][k], fitted[3][k] = float(f), float(zeta)
+    return tuple(LevelRow(*row) for row in zip(*columns, *fitted, strict=True))
+
+
+def _tried(fit: ElementFit) -> TriedElement:
+    numbers = []
+    for n, value, sd in zip(fit.element.numbers, fit.values, fit.sd, strict=True):
+        ends = (value - 2 * sd, value + 2 * sd) if n.signed else value * np.exp([-2 * sd, 2 * sd])
+        scale = fit.largest**n.metres
+        low, value, high = (float(scale * x) for x in (ends[0], value, ends[1]))
+        numbers.append(ElementNumber(n.name, value, n.unit, low, high))
+    p = float(fit.p) if np.isfinite(fit.p) else None
+    return TriedElement(fit.element.name, fit.chi2, fit.data, fit.bic, p, tuple(numbers))
+
+
+def _curve(one: ModeStudy) -> tuple[tuple[float, float, float], ...]:
+    if not one.fits:
+        return ()
+    low, high = one.mode.amplitude.min(), one.mode.amplitude.max()
+    A = np.geomspace(0.8 * low, 1.1 * high, DRAWN)
+    return tuple(zip(A.tolist(), *(x.tolist() for x in one.fits[0].at(A)), strict=True))

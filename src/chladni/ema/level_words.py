@@ -1,0 +1,77 @@
+"""A study of levels in sentences."""
+
+import numpy as np
+
+from .level_study import CALM, MEANING, SETTLED_BY, LevelStudy, ModeStudy
+
+TINY = 1e-12  # a smaller probability is a word, not a number
+
+
+def level_notes(study: LevelStudy) -> list[str]:
+    """A sentence a mode that moves, else one that none does; nothing where levels are too few."""
+    if not study.modes:
+        return []
+    said = ", ".join(f"{x:g}" for x in sorted({x for m in study.modes for x in m.mode.level}))
+    if study.drift:
+        return [
+            f"every mode moves by one factor from level to level ({said}) and keeps its damping: "
+            f"the object drifted (warmth, mass), it is not nonlinear; to settle it, {SETTLED_BY}"
+        ]
+    moving = [f"nonlinear: {mode_sentence(m)}" for m in study.moving]
+    calm = [mode_sentence(m) for m in study.modes if m.signature in ("runs differ", "overlapped")]
+    if moving:
+        return [*moving, *calm, f"to settle it, {SETTLED_BY}"]
+    return [*calm, f"no natural frequency and no damping moves with level ({said})"]
+
+
+def mode_sentence(study: ModeStudy) -> str:
+    """What a mode does over levels, what that is a sign of, and what was foretold."""
+    m = study.mode
+    at = f"{m.level[0]:g} to {m.level[-1]:g}"
+    what = []
+    if m.frequency_moves:
+        f = ", ".join(f"{x:.5g}" for x in m.frequency)
+        what.append(f"natural frequencies move with level: {f} Hz at level {at}"
+                    f" ({_p(m.p_frequency)})")  # fmt: skip
+    if m.damping_moves:
+        z = ", ".join(f"{100 * x:.3g}" for x in m.damping)
+        near = "" if m.frequency_moves else f" of {m.frequency[0]:.5g} Hz"
+        what.append(f"damping{near} moves with level: {z} % at level {at} ({_p(m.p_damping)})")
+    return f"{'; '.join(what)}: {study.signature}, {MEANING[study.signature]}{_elements(study)}"
+
+
+def _p(p: float) -> str:
+    """A probability, however small."""
+    return f"p = {p:.1g}" if p >= TINY else f"p < {TINY:g}"
+
+
+def _elements(study: ModeStudy) -> str:
+    """What fits, what fits as well, and how levels that no fit saw were foretold."""
+    best = study.explained
+    if study.signature in CALM:
+        return ""
+    if not study.fits:
+        return "; three levels would tell which element does it"
+    if best is None:
+        lead = study.fits[0]
+        said = f"; no element explains it, {lead.element.name} comes nearest ({_p(lead.p)})"
+    else:
+        said = f"; {best.element.name} explains it (p = {best.p:.2g})"
+        said += f", not told apart from {', '.join(study.as_good)}" if study.as_good else ""
+    return said + held_out_sentence(study)
+
+
+def held_out_sentence(study: ModeStudy) -> str:
+    """How well the levels between were foretold, beside what one linear model says."""
+    held = study.held_out
+    if held is None:
+        return ""
+    levels = study.mode.level
+    seen = np.setdiff1d(np.arange(len(levels)), held.rows)
+    f, z, f0, z0 = (100 * x for x in held.misses(study.mode))
+    return (
+        f"; fitted on levels {', '.join(f'{x:g}' for x in levels[seen])} alone, "
+        f"{held.fit.element.name} foretells {', '.join(f'{x:g}' for x in levels[held.rows])} to "
+        f"{f:.2g} % in frequency and {z:.2g} % in damping, where one linear model misses by "
+        f"{f0:.2g} % and {z0:.2g} %"
+    )

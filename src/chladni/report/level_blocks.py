@@ -1,0 +1,161 @@
+"""Modes over levels of excitation: tables and pictures of a page, JSON."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..ema.level_study import CALM
+from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
+from ..ema.level_words import TINY
+from .blocks import Block, Items, Picture, Section, Table
+from .words import interval, number
+
+SHOWN = 6  # modes that are drawn
+_WHAT = (
+    "Measured; 'element': by the first of the elements below, fitted to all levels; 'foretold': by "
+    "one that was chosen and fitted without these levels; 'linear': the mean of the levels it was "
+    "fitted to. The amplitude is the displacement of the output at which the mode was seen."
+)
+
+
+def level_section(tables: Sequence[LevelTable], pictures: Mapping[int, Path]) -> Section:
+    """All modes in one table, then those that move, one by one; nothing without levels.
+
+    Parameters
+    ----------
+    pictures : by the position of the mode
+    """
+    if not tables:
+        return Section("Levels", [])
+    blocks: list[Block] = [_summary(tables)]
+    for k, t in enumerate(tables):
+        if t.signature in CALM:
+            continue
+        blocks += [Items([t.sentence + "."])] if t.sentence else []
+        blocks += [_levels(t)]
+        blocks += [Picture(pictures[k])] if k in pictures else []
+        blocks += [_elements(t)] if t.elements else []
+    return Section("Levels", blocks)
+
+
+def _summary(tables: Sequence[LevelTable]) -> Table:
+    rows = [
+        (
+            number(t.rows[0].frequency_hz, 5),
+            number(t.rows[-1].frequency_hz, 5),
+            number(100 * t.rows[0].damping, 3),
+            number(100 * t.rows[-1].damping, 3),
+            str(len(t.rows)),
+            _p(t.p_frequency),
+            _p(t.p_damping),
+            t.signature,
+        )
+        for t in tables
+    ]
+    heads = ("Hz, lowest level", "highest", "damping [%], lowest", "highest ", "levels",
+             "p of one frequency", "p of one damping", "signature")  # fmt: skip
+    return Table(heads, rows, ("signature",), "Modes over levels; p: chance of such differences "
+                 "of a mode that has one frequency and one damping.")  # fmt: skip
+
+
+def _levels(t: LevelTable) -> Table:
+    held = [r.foretold_hz is not None for r in t.rows]
+    rows = [
+        (
+            number(r.level),
+            number(1e3 * r.amplitude_m, 3),
+            f"{number(r.frequency_hz, 6)} ± {number(r.frequency_sd_hz, 2)}",
+            number(r.fitted_hz, 6),
+            number(r.foretold_hz, 6),
+            number(t.mean_hz, 6) if h else "–",
+            f"{number(100 * r.damping, 3)} ± {number(100 * r.damping_sd, 2)}",
+            number(_percent(r.fitted_damping), 3),
+            number(_percent(r.foretold_damping), 3),
+            number(_percent(t.mean_damping), 3) if h else "–",
+        )
+        for r, h in zip(t.rows, held, strict=True)
+    ]
+    heads = ("level", "amplitude [mm]", "Hz", "element", "foretold", "linear",
+             "damping [%]", "element ", "foretold ", "linear ")  # fmt: skip
+    return Table(heads, rows, caption=f"{t.output}. {_WHAT}")
+
+
+def _elements(t: LevelTable) -> Table:
+    rows = [
+        (
+            e.name,
+            number(e.chi2, 3),
+            str(e.data),
+            number(e.bic, 3),
+            _p(e.p),
+            "; ".join(f"{n.name} {interval(n.value, n.low, n.high, n.unit)}" for n in e.numbers),
+        )
+        for e in t.elements
+    ]
+    heads = ("element", "χ²", "data", "BIC", "p", "numbers (95 %)")
+    return Table(heads, rows, ("element", "numbers (95 %)"),
+                 "Best first. Runs of one level are taken to repeat to 0.05 % in frequency and 5 % "
+                 "in damping. p below 0.01: the element does not explain the levels.")  # fmt: skip
+
+
+def _p(p: float | None) -> str:
+    return number(p, 2) if p is None or p >= TINY else f"< {TINY:g}"
+
+
+def _percent(x: float | None) -> float | None:
+    return None if x is None else 100 * x
+
+
+def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> dict[int, Path]:
+    """Pictures of the modes that move: {position of the mode: path}."""
+    from ..view import level_plots
+
+    made: dict[int, Path] = {}
+    for k, t in enumerate(tables):
+        if t.signature in CALM or len(made) == SHOWN:
+            continue
+        path = folder / f"levels{stem}_{k + 1}.png"
+        column = {name: np.array([_nan(getattr(r, name)) for r in t.rows]) for name in
+                  LevelRow.__dataclass_fields__}  # fmt: skip
+        f, z = (
+            (column[name], column[sd], column[said])
+            for name, sd, said in (
+                ("frequency_hz", "frequency_sd_hz", "foretold_hz"),
+                ("damping", "damping_sd", "foretold_damping"),
+            )
+        )
+        mean = (t.mean_hz, t.mean_damping)
+        made[k] = level_plots.mode_over_levels(
+            path, f"{t.signature}: {number(t.rows[0].frequency_hz)} Hz at {t.output}",
+            column["amplitude_m"], f, z, np.array(t.curve) if t.curve else None,
+            t.elements[0].name if t.elements else "",
+            (float(mean[0]), float(mean[1])) if mean[0] and mean[1] else None,
+        )  # fmt: skip
+    return made
+
+
+def _nan(x: float | None) -> float:
+    return float("nan") if x is None else x
+
+
+def level_json(tables: Sequence[LevelTable]) -> list[dict[str, Any]]:
+    """As plain data."""
+    return [asdict(t) for t in tables]
+
+
+def read_levels(rows: Sequence[Mapping[str, Any]] | None) -> tuple[LevelTable, ...]:
+    """From their JSON."""
+    return tuple(_read(d) for d in rows or ())
+
+
+def _read(d: Mapping[str, Any]) -> LevelTable:
+    elements = tuple(
+        TriedElement(**{**e, "numbers": tuple(ElementNumber(**n) for n in e.get("numbers") or ())})
+        for e in d.get("elements") or ()
+    )
+    rows = tuple(LevelRow(**r) for r in d.get("rows") or ())
+    curve = tuple((float(a), float(f), float(z)) for a, f, z in d.get("curve") or ())
+    return LevelTable(**{**d, "rows": rows, "elements": elements, "curve": curve})

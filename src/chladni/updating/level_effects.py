@@ -1,0 +1,144 @@
+"""What levels of excitation name: friction and clearance, and what the deck says of the place."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.estimate import Estimate, Location
+from ..ema.level_study import EFFECT, LevelStudy, ModeStudy
+from ..ema.level_table import level_tables
+from ..fem.energy import part_energies
+from ..fem.modelled import Modelled
+from .result import NamedEffect
+
+CLAIM = {
+    "joint-friction": "a joint slips as it moves: less stiffness and more damping at higher levels",
+    "rattle": "two parts meet once they move far enough: a clearance that closes",
+}
+NEAR = 0.2  # of ln f: a mode of the deck farther away is not the one that was measured
+HOLDS = 0.05  # of the strain energy: parts with less are not named
+NOWHERE = "levels alone do not say where"
+
+
+def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]:
+    """Friction or clearance, one effect for all modes that show it; none for other signatures.
+
+    Parameters
+    ----------
+    model : the deck, calibrated: its modes say what bends where
+    """
+    out = []
+    for name in dict.fromkeys(EFFECT.get(m.signature, "") for m in study.moving):
+        modes = [m for m in study.moving if EFFECT.get(m.signature) == name]
+        if name:
+            out.append(NamedEffect(name, CLAIM[name], None, _where(modes, model), _numbers(modes)))
+    return tuple(out)
+
+
+def _numbers(modes: Sequence[ModeStudy]) -> tuple[Estimate, ...]:
+    """The numbers of the element that explains each mode."""
+    told = level_tables(LevelStudy(tuple(modes)))
+    return tuple(
+        Estimate(f"{n.name}, {t.rows[0].frequency_hz:.4g} Hz", n.value, n.unit, n.low, n.high)
+        for t in told
+        if t.explained
+        for n in t.elements[0].numbers
+    )
+
+
+def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
+    """Parts and joints that hold the strain energy of these modes, in the deck's own."""
+    f = [float(m.mode.frequency[0]) for m in modes]
+    said, parts = [], []
+    for hertz in f:
+        shares = energy_shares(model, hertz)
+        kept = {name: x for name, x in shares.items() if x >= HOLDS}
+        if kept:
+            each = ", ".join(f"{100 * x:.0f} % in {name}" for name, x in kept.items())
+            said.append(f"the mode at {hertz:.4g} Hz has its strain energy {each}")
+            parts += [name for name in kept if name != JOINTS]
+    low = min(float(m.mode.frequency.min()) for m in modes)
+    high = max(float(m.mode.frequency.max()) for m in modes)
+    text = "; ".join([NOWHERE, *said])
+    return Location(text, tuple(dict.fromkeys(parts)), band_hz=(low, high))
+
+
+JOINTS = "springs and bushes"
+
+
+@dataclass(frozen=True)
+class LinearJoint:
+    """What springs and bushes alike would be given to have a mode as it is at one level.
+
+    Attributes
+    ----------
+    mode_hz, level : of the mode at its lowest level [Hz], [N] or [m/s²]
+    stiffness : factor on K of the deck, which is that of the level that was fitted
+    loss : GE, with what the mode loses otherwise left in the damping of the mode
+    share : of the strain energy of the mode that they hold
+    """
+
+    mode_hz: float
+    level: float
+    stiffness: float
+    loss: float
+    share: float
+
+
+def linear_joints(
+    study: LevelStudy, model: Modelled, fitted: float | None
+) -> tuple[LinearJoint, ...]:
+    """K and GE of springs and bushes at each level, where friction or clearance may sit in them.
+
+    The element's κ is a share of the mode's stiffness; joints that hold the share e of its strain
+    energy make it by K (1 + κ'/e), GE = κ''/(e + κ') (modal strain energy, to first order).
+
+    Parameters
+    ----------
+    fitted : the level the deck was compared with
+    """
+    out = []
+    for one, t in zip(study.modes, level_tables(study), strict=True):
+        if one not in study.moving or one.signature not in EFFECT or one.explained is None:
+            continue
+        hertz = t.rows[0].frequency_hz
+        e = energy_shares(model, hertz).get(JOINTS, 0.0)
+        kappa = [(r.level, e + (r.stiffness or 0.0), r.loss or 0.0) for r in t.rows]
+        if e < HOLDS or min(real for _, real, _ in kappa) <= 0:
+            continue
+        base = next((real for level, real, _ in kappa if level == fitted), kappa[0][1])
+        out += [LinearJoint(hertz, level, real / base, loss / real, e)
+                for level, real, loss in kappa]  # fmt: skip
+    return tuple(out)
+
+
+def joint_comment(joints: Sequence[LinearJoint]) -> str:
+    """The same as comments of a deck."""
+    lines = ["Joints over levels of excitation: what a linear deck has in every spring and bush."]
+    for j in joints:
+        lines.append(
+            f"mode near {j.mode_hz:.5g} Hz, level {j.level:g}: K times {j.stiffness:.4f}, "
+            f"GE {j.loss:.4f}"
+        )
+    return "\n".join(lines)
+
+
+def energy_shares(model: Modelled, frequency: float) -> dict[str, float]:
+    """Shares of the strain energy of the deck's nearest mode, largest first; none if none is near.
+
+    Parameters
+    ----------
+    frequency : [Hz]
+    """
+    f = model.modes.frequency
+    away = np.abs(np.log(np.maximum(f, 1e-9) / frequency))
+    k = int(away.argmin())
+    if away[k] > NEAR:
+        return {}
+    share = part_energies(model.structure, model.modes.shapes[:, [k]])[:, 0]
+    if not np.isfinite(share).all():
+        return {}
+    named = {p.name: float(x) for p, x in zip(model.assembly.parts, share, strict=True)}
+    named[JOINTS] = 1.0 - float(share.sum())
+    return dict(sorted(named.items(), key=lambda pair: -pair[1]))

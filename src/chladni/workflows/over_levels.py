@@ -1,0 +1,51 @@
+"""What levels of excitation change in a diagnosis: verdict, effects, comments of the deck."""
+
+from dataclasses import replace
+
+from ..ema.level_table import level_tables
+from ..io.nastran.edit.changes import Add
+from ..updating.level_effects import LinearJoint, joint_comment, level_effects, linear_joints
+from ..updating.question import Prepared, Question
+from .diagnosis_result import ChangedDeck, DiagnosisResult, UpdatedModels
+
+
+def over_levels(
+    asked: Question, prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult,
+    diagnosing: bool,
+) -> DiagnosisResult:  # fmt: skip
+    """The result with the modes over levels; nonlinear where they move and no effect is named.
+
+    An effect of the catalogue is linear: it can explain one level, never that levels differ. Where
+    one was named from the level that is fitted it stays, and a note says that levels differ.
+    """
+    study = prepared.levels
+    result = replace(result, levels=level_tables(study))
+    if not (diagnosing and study.nonlinear):
+        return result
+    if result.effects:
+        note = (
+            f"modes move with level, which {result.effects[0].name} does not explain: it is that "
+            "of the level that was fitted"
+        )
+        return replace(result, notes=(*result.notes, note))
+    kept = () if result.verdict == "nothing missing" else result.calibrated
+    note = (
+        f"of the level that was fitted alone the verdict would be {result.verdict!r}; no linear "
+        "effect makes modes move with level, so it is 'nonlinear'"
+    )
+    model = stages.final.model
+    joints = linear_joints(study, model, asked.level)
+    return replace(
+        result, verdict="nonlinear", effects=level_effects(study, model), joints=joints,
+        models=_with_comment(stages, joints), calibrated=kept, notes=(*result.notes, note),
+    )  # fmt: skip
+
+
+def _with_comment(stages: UpdatedModels, joints: tuple[LinearJoint, ...]) -> UpdatedModels:
+    """The updated deck with joints over levels as comments."""
+    if not joints or stages.final.changes is None:
+        return stages
+    changes = (*stages.final.changes, Add((), joint_comment(joints)))
+    final = ChangedDeck(stages.final.model, changes)
+    calibrated = final if stages.calibrated is stages.final else stages.calibrated
+    return replace(stages, calibrated=calibrated, final=final)
