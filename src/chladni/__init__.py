@@ -29,6 +29,7 @@ from .workflows.loaded_model import load_model as load_model
 from .workflows.working_model import WorkingModel as WorkingModel
 from .workflows.working_model import load as load
 from .workflows.recordings_of import load_recordings as load_recordings
+from .workflows.map import map_formed as map_formed
 from .workflows.modes import modes as modes
 from .workflows.frf import frf as frf
 from .workflows.case_check import check as check
@@ -58,6 +59,7 @@ __all__ = [
     "load_model",
     "load_recordings",
     "mac",
+    "map_formed",
     "modes",
     "normal_modes",
     "plan",

@@ -10,9 +10,11 @@ from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
+from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
+from .map_page import map_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
 from .study_page import study_json
@@ -32,6 +34,11 @@ def _(result: DiagnosisResult) -> dict[str, Any]:
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
     return plan_json(summary(result))
+
+
+@to_json.register
+def _(result: MappedDeck) -> dict[str, Any]:
+    return map_json(result)
 
 
 @to_json.register
