@@ -13,6 +13,7 @@ from ..updating.result import Alternative, NamedEffect, Scores
 from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
+from .words import hertz
 
 _GRID = 8  # channels in the overview
 CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
@@ -33,6 +34,7 @@ class Shown:
     fitted, excluded : bands [Hz]
     outputs, inputs : sensors and shakers as markers
     mac : (test modes, model modes) after, with their frequencies [Hz], or None
+    pairs : (test, model) positions of what is paired in it
     """
 
     seen: Surface
@@ -46,6 +48,7 @@ class Shown:
     outputs: Sequence[scene.Marker] = ()
     inputs: Sequence[scene.Marker] = ()
     mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    pairs: Sequence[tuple[int, int]] = ()
 
 
 def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
@@ -151,9 +154,10 @@ def mac_picture(folder: Path, shown: Shown) -> dict[str, Path]:
     if shown.mac is None:
         return {}
     mac, test, model = shown.mac
-    rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
-    title = "MAC: test (rows), model (columns)"
-    return {"mac": plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)}
+    rows, columns = ([hertz(f) for f in side] for side in (test, model))
+    title = "MAC [%]: test (rows), model (columns)" + (", pairs framed" if shown.pairs else "")
+    path = folder / "mac.png"
+    return {"mac": plots.mac_matrix(path, mac, rows, columns, title, shown.pairs)}
 
 
 def curves(folder: Path, shown: Shown) -> dict[str, Path]:

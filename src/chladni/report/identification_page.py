@@ -10,7 +10,7 @@ from ..io.tables.write_tables import write_poles
 from ..workflows.identify import Identification, RecordingModes, firm
 from .blocks import Block, PageParts, Picture, Section, Table
 from .screening_blocks import screening_section
-from .words import number
+from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
 
@@ -33,7 +33,7 @@ def _table(modal: Identified) -> Table:
     sure = firm(modal)
     columns = (modal.frequency, modal.frequency_sd, 100 * modal.damping, 100 * modal.damping_sd)
     rows = [
-        (str(k + 1), number(f, 5), number(sf, 2), number(z, 3), number(sz, 2))
+        (str(k + 1), hertz(f), number(sf, 2), number(z, 3), number(sz, 2))
         for k, (f, sf, z, sz) in enumerate(zip(*(c[sure] for c in columns), strict=True))
     ]
     heads = ("mode", "Hz", "± Hz", "damping [%]", "± %")

@@ -21,7 +21,7 @@ from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
-from .words import number
+from .words import hertz, number
 
 PICTURES = {
     "sensors.png": "the layout",
@@ -170,7 +170,7 @@ def _modes(
     rows = [
         (
             str(m.mode),
-            number(m.frequency_hz, 5),
+            hertz(m.frequency_hz),
             number(m.visibility, 2),
             "yes" if m.seen else "hardly",
             "yes" if m.seen_by_normals else "no, moves along the sheets",

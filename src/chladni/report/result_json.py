@@ -125,7 +125,13 @@ def _(result: Correlation) -> dict[str, Any]:
     p, q, f, test = result.pairs, result.quality, result.f_model, result.f_test
     held: dict[str, Any] = {
         "modes": [
-            {"test_hz": test[j], "model_hz": f[i], "deviation": f[i] / test[j] - 1, "mac": value}
+            {
+                "test_hz": test[j],
+                "model_hz": f[i],
+                "model_mode": result.numbers[i],
+                "deviation": f[i] / test[j] - 1,
+                "mac": value,
+            }
             for i, j, value in zip(p.model, p.test, p.mac, strict=True)
         ],
         "alone_test_hz": test[p.alone_test],
@@ -139,6 +145,8 @@ def _(result: Correlation) -> dict[str, Any]:
         held["Q"] = {
             "mean": q.Q,
             "total": q.total,
+            "magnitude": q.magnitude,
+            "phase": q.phase,
             "channel": dict(zip(result.channels, q.channel.ravel(), strict=True)),
             "band": [{"band_hz": b, "Q": x} for b, x in zip(q.bands, q.band, strict=True)],
         }
