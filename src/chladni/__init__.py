@@ -37,6 +37,7 @@ from .workflows.plan import plan as plan
 from .workflows.evaluation import evaluate_recordings as evaluate_recordings
 from .workflows.identify import identify as identify
 from .workflows.correlate import correlate as correlate
+from .workflows.other_modes import other_modes as other_modes
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
 from .studies.parameter_study import study as study
@@ -62,6 +63,7 @@ __all__ = [
     "map_formed",
     "modes",
     "normal_modes",
+    "other_modes",
     "plan",
     "read_deck",
     "structure",

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ..view import scene
 from ..view.surface import surface
 from ..workflows.loaded_model import on_faces
 from ..workflows.map import MappedDeck
@@ -29,6 +28,8 @@ _GUESS = (
 
 def map_page(folder: Path, found: MappedDeck) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
+    from ..view import scene
+
     seen, t = surface(found.after), found.after.thickness()
     change = 100 * (t / found.before.thickness() - 1)
     after = scene.thickness_map(folder / "thickness.png", seen, on_faces(seen, t))

@@ -12,9 +12,11 @@ from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
+from ..workflows.other_modes import OtherModes
 from .check_page import check_json
 from .diagnosis_json import diagnosis_json
 from .map_page import map_json
+from .other_modes_page import other_modes_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
 from .study_page import study_json
@@ -34,6 +36,11 @@ def _(result: DiagnosisResult) -> dict[str, Any]:
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
     return plan_json(summary(result))
+
+
+@to_json.register
+def _(result: OtherModes) -> dict[str, Any]:
+    return other_modes_json(result)
 
 
 @to_json.register
