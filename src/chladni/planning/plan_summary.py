@@ -45,6 +45,7 @@ class PlannedSensor:
     rank: int
     at: PlannedPlace
     for_mode: int | None
+    mass_kg: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +173,7 @@ def _place(found: Plan, i: int) -> PlannedPlace:
 def _sensors(found: Plan) -> tuple[PlannedSensor, ...]:
     moved = {m.into: found.first + 1 + m.mode for m in found.moves}
     return tuple(
-        PlannedSensor(k + 1, _place(found, i), moved.get(i))
+        PlannedSensor(k + 1, _place(found, i), moved.get(i), found.settings.mass)
         for k, i in enumerate(found.layout.tolist())
     )
 

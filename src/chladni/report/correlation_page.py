@@ -15,6 +15,7 @@ from .figures import Shown, curves, frequencies, mac_picture, setup
 from .screening_blocks import screening_section
 from .words import criterion, hertz, number, percent
 
+_SAME = 1e-6  # Q of responses that nobody could tell apart
 _DRAWN = 8  # pairs of shapes
 _WORST = 10  # sensors in the table
 _MEANING = (
@@ -71,6 +72,8 @@ def _lead(found: Correlation) -> str:
 
 def _off_by(q: Quality) -> str:
     """Q in words: the rms factor of |H| and the rms angle."""
+    if q.Q < _SAME:
+        return "next to nothing"
     factor, angle = 10 ** np.sqrt(q.magnitude), np.degrees(np.log(10) * np.sqrt(q.phase))
     return f"a factor of {number(float(factor), 3)} and {angle:.0f}° of phase (rms)"
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
+from ..updating.detectable import Detectable
 from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
@@ -14,6 +15,7 @@ from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
 from .check_page import check_json
+from .detectable_page import detectable_json
 from .diagnosis_json import diagnosis_json
 from .map_page import map_json
 from .other_modes_page import other_modes_json
@@ -41,6 +43,11 @@ def _(result: Plan) -> dict[str, Any]:
 @to_json.register
 def _(result: OtherModes) -> dict[str, Any]:
     return other_modes_json(result)
+
+
+@to_json.register
+def _(result: Detectable) -> dict[str, Any]:
+    return detectable_json(result)
 
 
 @to_json.register
