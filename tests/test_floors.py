@@ -48,7 +48,7 @@ LIBRARIES = {
     "progress": {"rich"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pyyeti", "pyuff", "trimesh"},
+    "io": {"meshio", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},

@@ -10,7 +10,8 @@ A model and a recording: ``load_case(folder)`` goes into ``check``, ``correlate`
 ``identify`` and ``evaluate_recordings`` need a recording alone (``load_recordings``).
 
 Data: ``Assembly`` (the structure), ``ModalModel``, ``FRF``; all in SI, frequencies in Hz, labels
-as ``412:+Z`` or ``412:n``. Decks come in by ``read_deck`` and go out changed by ``write_deck``.
+as ``412:+Z`` or ``412:n``. Decks come in by ``read_deck`` and go out changed by ``write_deck``,
+an ``FRF`` to and from xarray by ``to_xarray`` and ``from_xarray``.
 What is wrong with an input is told by a ``chladni.errors.ChladniError`` in one sentence.
 """
 
@@ -21,6 +22,8 @@ from .dynamics.frf import synthesise as synthesise
 from .dynamics.modes import ModalModel as ModalModel
 from .io.nastran import read_deck as read_deck
 from .io.nastran import write_deck as write_deck
+from .io.labelled_arrays import from_xarray as from_xarray
+from .io.labelled_arrays import to_xarray as to_xarray
 from .fem.assemble import structure as structure
 from .ema.correlation import mac as mac
 from .planning import effective_independence as effective_independence
@@ -54,6 +57,7 @@ __all__ = [
     "effective_independence",
     "evaluate_recordings",
     "frf",
+    "from_xarray",
     "identify",
     "load",
     "load_case",
@@ -69,5 +73,6 @@ __all__ = [
     "structure",
     "study",
     "synthesise",
+    "to_xarray",
     "write_deck",
 ]
