@@ -9,7 +9,7 @@ from ..errors import FileError
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.correlate import correlate
-from ..workflows.loaded_model import load_model
+from ..workflows.loaded_model import is_case, load_model
 from ..workflows.other_modes import other_modes
 from .run import Allow, Out, Run, Units, opened, started
 
@@ -43,6 +43,11 @@ def run(
 def _with_test(job: Run, source: Path) -> None:
     from ..report.correlation_page import correlation_page
 
+    if source.is_file() and not is_case(source):
+        raise FileError(
+            f"{source} is a deck; give a case that names a recording, or with --modes the modes "
+            "another program found"
+        )
     case = opened(source)
     found = correlate(case, within(job.progress, 0.0, 0.8))
     job.json("correlation.json", to_json(found))
