@@ -22,6 +22,7 @@ from .preparation import (
     carrying,
     equalised_lines,
     freed_by,
+    measured_on,
     nuisances,
     updating_problem,
 )
@@ -83,7 +84,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
         noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
     ).over(reduced.model)  # fmt: skip
-    nuisance = nuisances(reduced, nominal, f_max, with_discrepancy=False)
+    nuisance = nuisances(reduced, nominal, f_max, measured_on(asked))
     problem = updating_problem(asked, reduced, unit, nuisance, f_max)
     x = problem.mean()
     state = evaluate(reduced.model, problem.base, x)
