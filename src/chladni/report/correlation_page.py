@@ -8,7 +8,7 @@ import numpy as np
 from ..case import Case
 from ..ema.correlation import Quality
 from ..view.surface import surface
-from ..workflows.case_model import markers
+from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
 from .blocks import Block, Facts, PageParts, Picture, Section, Table, Text
 from .figures import Shown, curves, frequencies, mac_picture, setup
@@ -94,6 +94,7 @@ def _shown(case: Case, found: Correlation) -> Shown:
         excluded=case.exclude,
         outputs=markers(case.outputs),
         inputs=markers(case.inputs),
+        cords=cords(case),
         mac=mac_of,
         pairs=list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True)),
     )

@@ -32,7 +32,7 @@ class Shown:
     held_out : labels of outputs that were not fitted
     compared : False where the responses are only shown, because frequencies were compared
     fitted, excluded : bands [Hz]
-    outputs, inputs : sensors and shakers as markers
+    outputs, inputs, cords : sensors, shakers and hangers as markers
     mac : (test modes, model modes) after, with their frequencies [Hz], or None
     pairs : (test, model) positions of what is paired in it
     """
@@ -47,6 +47,7 @@ class Shown:
     excluded: Bands = ()
     outputs: Sequence[scene.Marker] = ()
     inputs: Sequence[scene.Marker] = ()
+    cords: Sequence[scene.Marker] = ()
     mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
     pairs: Sequence[tuple[int, int]] = ()
 
@@ -73,8 +74,8 @@ def setup(folder: Path, shown: Shown) -> dict[str, Path]:
     """Where sensors and shakers sit."""
     if not (shown.outputs or shown.inputs):
         return {}
-    path = folder / "setup.png"
-    return {"setup": scene.sensors(path, shown.seen, shown.outputs, shown.inputs)}
+    path, ends = folder / "setup.png", (shown.outputs, shown.inputs)
+    return {"setup": scene.sensors(path, shown.seen, *ends, cords=shown.cords)}
 
 
 def _where(path: Path, effect: NamedEffect, shown: Shown) -> Path | None:

@@ -23,6 +23,7 @@ from .surface import Surface
 _MOTION = "viridis"
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
 _GHOST = 70.0  # degrees of a fold that the undeformed outline shows
+_CORD = "#009e73"
 _LONG = 0.35  # part of the structure's size that a line of that outline must reach
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # above so many faces element edges would only blacken the picture
@@ -185,9 +186,13 @@ def sensors(
     outputs: Sequence[Marker],
     inputs: Sequence[Marker] = (),
     names: tuple[str, str] = ("sensor", "shaker"),
+    cords: Sequence[Marker] = (),
 ) -> Path:
-    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things."""
-    focus = np.array([m.point for m in (*outputs, *inputs)]).reshape(-1, 3)
+    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things.
+
+    Cords are green and point nowhere.
+    """
+    focus = np.array([m.point for m in (*outputs, *inputs, *cords)]).reshape(-1, 3)
     seen = seen.without_joints()
     figure, (ax,) = _sheets([camera := best_view(seen, focus)])
     draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
@@ -196,10 +201,11 @@ def sensors(
     for markers, colour, name in (
         (outputs, paper.AFTER, names[0]),
         (inputs, paper.BEFORE, names[1]),
+        (cords, _CORD, "cord"),
     ):
         _arrows(ax, camera, markers, colour, reach, name)
-    if outputs or inputs:
-        ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=2, **paper.LEGEND)
+    if outputs or inputs or cords:
+        ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=3, **paper.LEGEND)
     _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
@@ -340,7 +346,8 @@ def _arrows(
     for place, arrow, marker in zip(uv, tip, markers, strict=True):
         style = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
         ends = (tuple(place + arrow), tuple(place))  # a place on the rim has its arrow, too
-        ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)
+        if any(marker.direction):
+            ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)
         paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
 
 
