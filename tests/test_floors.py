@@ -48,7 +48,7 @@ LIBRARIES = {
     "progress": {"rich"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
-    "io": {"meshio", "pyyeti", "pyuff", "trimesh"},
+    "io": {"meshio", "pyyeti", "pyuff", "trimesh", "xarray"},
     "view": {"pyvista", "matplotlib", "PIL"},
     "report": {"jinja2"},
     "workflows": {"threadpoolctl"},
@@ -59,7 +59,6 @@ LIBRARIES = {
 }
 WAITING_FOR = {  # module no command, environment or public name reaches: what will
     "chladni/ema/realisation": "an identified model as a state space",
-    "chladni/geometry/thickness_prior": "thickness mapping",
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
 SOURCES = sorted(

@@ -10,6 +10,7 @@ from chladni.errors import ShapeError
 from chladni.planning import best_layout, rattle_margin, shaking
 
 from . import drawing
+from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step, of_case
 from .small_specimens import ModalSpecimen, plate
 
@@ -44,6 +45,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     quantity : what the sensors measure
     case : folder or deck     whose mesh gives candidates and modes
     modes : int               number of target modes of a case
+    units : str               unit system of a bare deck, as mm-t-s; a case says its own
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -61,10 +63,11 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         quantity: Quantity = "receptance",
         case: str | None = None,
         modes: int = 24,
+        units: str | None = None,
         render_mode: str | None = None,
     ) -> None:
         if specimen is None:
-            specimen = plate(7, 7, 6) if case is None else of_case(case, modes)
+            specimen = plate(7, 7, 6) if case is None else of_case(case, modes, units)
         s = self.specimen = specimen
         n, r = s.phi.shape
         access = s.access if access is None else access
@@ -107,7 +110,8 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         return self._observation(), self.score - before, terminated, truncated, self._info()
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (n,) bool."""
+        """Legal actions (n,) bool; known from the first reset on."""
+        refuse_before_reset(self, "chosen", "action_masks()")
         if self.chosen.sum() == self.n_actuators:
             return np.zeros_like(self.allowed)
         return self.allowed & ~self.chosen
@@ -116,6 +120,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         """The places as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
+        refuse_before_reset(self, "chosen", "render()")
         s = self.specimen
         xy, lines = drawing.places(len(self.allowed), s.points, s.outline)
         title = f"{int(self.chosen.sum())} actuators, condition {10**-self.score:.1f}"

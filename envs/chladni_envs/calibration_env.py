@@ -7,6 +7,7 @@ import numpy as np
 
 from . import drawing
 from .calibration_questions import CalibrationQuestion, plate_question
+from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step
 
 DONE = 1e-5  # Q at which model and recording are one
@@ -97,6 +98,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         """Recording and model at the first output (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
+        refuse_before_reset(self, "delta", "render()")
         model = self.recorded * 10**self.delta
         pairs = [(np.abs(self.recorded[:, 0]), "recorded"), (np.abs(model[:, 0]), "model")]
         return drawing.curves(self.question.frequency, pairs, f"Q = {self.Q:.2e}")

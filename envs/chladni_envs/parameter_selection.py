@@ -8,6 +8,7 @@ import numpy as np
 from chladni.planning import Linearised
 
 from . import drawing
+from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step
 
 
@@ -79,13 +80,15 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         return self._observation(), self.score - before, self.over, truncated, self._info()
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (p + 1,) bool."""
+        """Legal actions (p + 1,) bool; known from the first reset on."""
+        refuse_before_reset(self, "over", "action_masks()")
         return np.zeros(self.p + 1, bool) if self.over else np.r_[~self.freed, True]
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Estimates of the parameters as bars (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
+        refuse_before_reset(self, "over", "render()")
         title = f"{int(self.freed.sum())} freed, score {self.score:.2f} decades"
         return drawing.bars(self.problem.fitted(self.freed), self.freed, title)
 

@@ -10,17 +10,18 @@ from chladni.errors import LabelError
 from chladni.planning import Candidates, Rules, Walk, candidates
 
 from . import drawing
+from .reset_first import refuse_before_reset
 from .small_specimens import ModalSpecimen, plate
 
 Reset = tuple[np.ndarray, dict[str, Any]]
 Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 
 
-def of_case(case: str, modes: int) -> ModalSpecimen:
+def of_case(case: str, modes: int, units: str | None = None) -> ModalSpecimen:
     """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
     from .environment_cases import specimen  # loads the finite element part of the package only now
 
-    return specimen(case, modes)
+    return specimen(case, modes, units=units)
 
 
 class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
@@ -53,6 +54,9 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
                                   not to be usable
     case : folder or deck         whose mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case
+    units : str                   unit system of a bare deck, as mm-t-s; a case says its own
+
+    A frame of ``render_mode="rgb_array"`` is 256 pixels high and 320 wide.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -70,11 +74,12 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         unusable: float = 0.0,
         case: str | None = None,
         modes: int = 24,
+        units: str | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.outline: np.ndarray | None = None
         if phi is None:
-            specimen = plate() if case is None else of_case(case, modes)
+            specimen = plate() if case is None else of_case(case, modes, units)
             phi, points, self.outline = specimen.phi, specimen.points, specimen.outline
         self.candidates = candidates(phi, noise, prior)
         n = len(self.candidates)
@@ -112,13 +117,15 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         return self.walk.worth.copy(), float(reward), bool(terminated), bool(truncated), info
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (n,) bool."""
+        """Legal actions (n,) bool; known from the first reset on."""
+        refuse_before_reset(self, "mask", "action_masks()")
         return self.mask.copy()
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """The layout as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
+        refuse_before_reset(self, "mask", "render()")
         xy, lines = drawing.places(len(self.candidates), self.points, self.outline)
         title = f"{int(self.walk.kept.sum())} sensors, log det {self.walk.log_det:.2f}"
         return drawing.layout(xy, self.walk.kept, self.mask, title, lines)

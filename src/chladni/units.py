@@ -46,14 +46,16 @@ UNITS = {
 }
 
 
-def units(name: str) -> Units:
-    """The unit system of this name.
+def units(name: str | Units) -> Units:
+    """The unit system of this name; a system as it is.
 
     Raises
     ------
     FileError
         If there is none of this name; the sentence lists those there are.
     """
+    if isinstance(name, Units):
+        return name
     if name not in UNITS:
         raise FileError(f"no unit system {name!r}; there are {', '.join(UNITS)}")
     return UNITS[name]

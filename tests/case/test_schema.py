@@ -15,6 +15,8 @@ from chladni.effects.effect import Effect
 from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
+from chladni.geometry.formed_mesh import FormedMesh
+from chladni.io.dyna import write_keyword
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.csv_table import read_table
 from chladni.io.tables.sensor_table import _OPTIONAL
@@ -33,6 +35,9 @@ units = "mm-t-s"
 damping = 0.01
 allow = ["CWELD"]
 outside = false
+thickness = "formed.k"
+thickness_units = "mm-t-s"
+thickness_place = "as it lies"
 [test]
 recordings = ["a.npz", "b.npz"]
 use = "a.npz"
@@ -74,8 +79,11 @@ label,grid,x,y,z,direction,nx,ny,nz,role,mass,position_sd,gain,use
 8:+Z,8,,,,+Z,,,,input,,,,
 """
 OTHER = {  # another accepted value of every word
-    ("model", "deck"): '"thicker.bdf"',
+    ("model", "deck"): '"softer.bdf"',
     ("model", "units"): '"mm-kg-ms"',
+    ("model", "thickness"): '"thinner.k"',
+    ("model", "thickness_units"): '"SI"',
+    ("model", "thickness_place"): '"aligned"',
     ("model", "damping"): "0.02",
     ("model", "allow"): '["CGAP"]',
     ("model", "outside"): "true",
@@ -144,7 +152,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("case")
     spring = deck().replace("ENDDATA", "CELAS2,99,0.1,17,3\nENDDATA")
     (place / "plate.bdf").write_text(spring)
-    (place / "thicker.bdf").write_text(spring.replace("PSHELL,1,1,1.0", "PSHELL,1,1,1.1"))
+    (place / "softer.bdf").write_text(spring.replace("210000.", "200000."))
+    made = assembly(read_deck(place / "plate.bdf"), "mm-t-s")
+    for name, t in (("formed.k", 0.95e-3), ("thinner.k", 0.9e-3)):
+        write_keyword(place / name, pressed(made, t))
     (place / "sensors.csv").write_text(SENSORS)
     (place / "others.csv").write_text(SENSORS.replace("0.31,0.07", "0.33,0.07"))
     built = structure(assembly(read_deck(place / "plate.bdf"), UNITS["mm-t-s"]))
@@ -152,6 +163,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, factor in (("a.npz", 1.01), ("b.npz", 1.03)):
         write_npz(place / name, measured(built, modal, factor))
     return place
+
+
+def pressed(made, t: float) -> FormedMesh:
+    """The sheet after forming: t at its left edge, a tenth more at its right one [m]."""
+    nodes, x = made.shells.nodes, made.points[:, 0]
+    thickness = t * (1 + 0.1 * x / x.max())
+    return FormedMesh(made.ids, made.points, nodes, np.ones(len(nodes), int), thickness[nodes])
 
 
 def measured(built, modal, factor: float) -> FRF:

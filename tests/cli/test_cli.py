@@ -153,14 +153,17 @@ def test_frf_is_symmetric_with_the_normal(deck, tmp_path):
 
 
 def test_render(deck, tmp_path):
-    """Modes are counted from the first elastic one, so the plate's first is no rigid motion."""
+    """Modes are counted with the rigid ones, as everywhere, so the plate's seventh is elastic."""
     out = tmp_path / "out"
     options = ["--modes", "7-9", "--gif", 7, "--thickness", "--energy", 8]
     done = call("render", deck, *options, "--units", "SI", "--out", out)
     assert done.exit_code == 0, done.output
     due = {"structure.png", "modes.png", "mode_7.gif", "thickness.png", "energy_8.png"}
     assert {p.name for p in out.iterdir()} == due | {"report.html", "run.json"}
-    assert "6 rigid motions are not counted" in (out / "report.html").read_text()
+    assert "the first elastic is 7" in (out / "report.html").read_text()
+    done = call("render", deck, "--energy", 3, "--units", "SI", "--out", tmp_path / "rigid")
+    assert (done.exit_code, (tmp_path / "rigid").exists()) == (2, False)
+    assert "mode 3 is a rigid motion" in done.output
 
 
 def plates(heights):
@@ -182,7 +185,7 @@ def test_clearance_of_two_plates(tmp_path):
     """Two plates of 1 mm at a distance of 3 mm leave 2 mm, and a force that closes them."""
     deck, out = tmp_path / "two.bdf", tmp_path / "out"
     deck.write_text(plates([0.0, 0.003]))
-    options = ["--clearance", "--modes", 1, "--units", "SI", "--out", out]
+    options = ["--clearance", "--modes", 7, "--units", "SI", "--out", out]
     done = call("render", deck, *options)
     assert done.exit_code == 0, done.output
     (pair,) = json.loads((out / "clearance.json").read_text())

@@ -159,3 +159,14 @@ def test_sync_and_async_vectors_are_identical(id, options):
         stories.append(story)
     for a, b in zip(*stories, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_before_the_first_reset_a_sentence_says_what_is_due(id):
+    env = gym.make(id, render_mode="rgb_array").unwrapped
+    asked = [env.render, *([env.action_masks] if hasattr(env, "action_masks") else [])]
+    for ask in asked:
+        with pytest.raises(gym.error.ResetNeeded, match="call reset"):
+            ask()
+    env.reset(seed=0)
+    assert env.render().shape == (256, 320, 3)

@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
-from chladni.errors import ShapeError
+from chladni.errors import ChladniError, ShapeError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
@@ -147,3 +147,17 @@ def test_calibration_of_a_case(ready, case):
     found = ready.mean[0] + cases.REACH * ready.sd[0] * end["x"][0]
     assert found == pytest.approx(np.log(SOFT), rel=0.25)
     assert end["score"] > 0.1
+
+
+def test_a_bare_deck_takes_its_units(case, tmp_path):
+    """The panel in millimetres and tonnes is the panel; a wrong name is refused."""
+    deck = write_assembly(folded_panel(), tmp_path / "panel.bdf", "mm-t-s")
+    of = {str(deck): "mm-t-s", f"{case}/panel.bdf": "SI"}
+    first, second = (
+        gym.make("chladni_envs:chladni/SensorPlacement-v0", case=path, modes=4, units=units)
+        for path, units in of.items()
+    )
+    np.testing.assert_allclose(first.unwrapped.points, second.unwrapped.points, atol=1e-6)
+    for id in (i for i in IDS if "Placement" in i):
+        with pytest.raises(ChladniError, match="mm-t-s"):
+            gym.make(f"chladni_envs:{id}", case=str(deck), units="mm")

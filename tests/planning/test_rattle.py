@@ -1,11 +1,13 @@
 """Which shaker places rattle, foretold from the mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chladni.model.properties import Isotropic, Part, ShellSection
 from chladni.planning import rattle_margin
-from chladni.planning.rattle import first_rattle, openings
+from chladni.planning.rattle import TAKE_UP, all_gaps, first_rattle, openings
 from chladni_specimens.mesher.flat_regions import grid
 from chladni_specimens.mesher.pressed_sheets import MAIN, PressedSheet
 from chladni_specimens.tailgate.tailgate import of_sheets
@@ -58,12 +60,35 @@ def test_it_is_the_margin_of_the_core_at_one_newton():
     np.testing.assert_allclose(force, due)
 
 
-def test_sheets_that_touch_are_named_not_foretold():
+def test_sheets_that_lie_on_each_other_rattle_at_little():
+    """Flat sheets leave no doubt: what is taken up is all there is."""
     assembly = sheets(0.0, 0.001)
-    found = openings(assembly, opening_modes(assembly))
+    motion = opening_modes(assembly)
+    motion[assembly.points[:, 2] > 5e-4, 2, 0] = 1.0
+    found = openings(assembly, motion)
     assert found.touching == (("s1", "s2"),)
-    assert len(found.clearance) == 0
-    assert np.all(np.isinf(first_rattle(FREQUENCY, DAMPING, np.ones((4, 2)), found).force))
+    assert not found.known.any()
+    np.testing.assert_allclose(found.clearance, TAKE_UP)
+    phi = np.array([[1.0, 0.0], [0.1, 0.0], [0.0, 1.0]])
+    force = first_rattle(FREQUENCY, DAMPING, phi, found).force
+    np.testing.assert_allclose(force[:2], TAKE_UP * 0.02 * (2 * np.pi * 20) ** 2 / phi[:2, 0])
+    assert force[2] == np.inf, "what moves together does not rattle"
+
+
+def test_a_gap_in_doubt_is_half_of_the_doubt():
+    """Facets of a curved sheet lie up to h² κ / 8 inside of it, and so does the gap."""
+    assembly = sheets(0.0, 0.0011)
+    x = assembly.points[:, 0]
+    points = assembly.points + np.outer(0.5 * 1.0 * (x - 0.1) ** 2, [0, 0, 1.0])
+    bent = replace(assembly, points=points)
+    (g,) = all_gaps(bent, within=0.01)
+    found = openings(bent, opening_modes(assembly))
+    doubt = g.touching[g.free]
+    assert doubt.any()
+    low = np.maximum(g.clearance - g.uncertainty, 0)[g.free][doubt]
+    high = (g.clearance + g.uncertainty)[g.free][doubt]
+    np.testing.assert_array_equal(found.known, ~doubt)
+    np.testing.assert_allclose(found.clearance[doubt], np.maximum((low + high) / 2, TAKE_UP))
 
 
 @pytest.mark.parametrize("gap", [0.003, 0.006])

@@ -174,3 +174,11 @@ def test_a_dead_channel_is_named(copied):
     (said,) = (f for f in found.findings if dead in f.text)
     assert "zero throughout and left out" in said.text
     assert dead not in [d.label for d in found.dofs if d.role == "output"]
+
+
+def test_a_case_without_a_recording_is_told_what_that_means(copied):
+    """It may be planned and drawn; what compares needs a recording."""
+    text = (copied / "case.toml").read_text()
+    (copied / "case.toml").write_text(text[: text.index("[test]")])
+    facts = dict(chladni.check(chladni.load_case(copied)).facts)
+    assert "all other commands do" in facts["recording"]

@@ -21,6 +21,7 @@ WORKFLOW = {  # command: the function it calls
     "test": "chladni.workflows.evaluation.evaluate_recordings",
     "bench": "chladni.workflows.virtual_test.virtual_test",
     "identify": "chladni.workflows.identify.identify",
+    "map": "chladni.workflows.map.map_formed",
     "modes": "chladni.workflows.modes.modes",
     "frf": "chladni.workflows.frf.frf",
     "plan": "chladni.workflows.plan.plan",
@@ -47,7 +48,7 @@ def test_every_command_has_a_function_that_a_notebook_can_call(command):
     assert callable(function)
     assert function.__doc__
     if module == f"chladni.workflows.{command}" or command == "study":
-        assert getattr(chladni, command) is function
+        assert getattr(chladni, name) is function
 
 
 @pytest.mark.parametrize(

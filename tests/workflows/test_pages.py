@@ -102,3 +102,35 @@ def test_no_curve_no_picture(case, diagnosed, tmp_path):
     bare = replace(diagnosed, models=replace(diagnosed.models, curves={}))
     write_diagnosis(tmp_path, case, bare)
     assert not list(tmp_path.glob("frf*"))
+
+
+def test_a_correlation_explains_itself(folder, case, tmp_path):
+    """Pairs with the model's own mode numbers, CoMAC, shapes side by side, Q in words."""
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), ["correlate", str(folder), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    page = (out / "report.html").read_text()
+    found = json.loads((out / "correlation.json").read_text())
+    f = chladni.modes(case, 20).modal.frequency
+    for pair in found["modes"]:
+        assert f[pair["model_mode"] - 1] == pytest.approx(pair["model_hz"], rel=1e-6)
+        assert f"<td>{pair['test_hz']:.2f}</td>" in page.replace(' class="word"', "")
+    assert (out / "shapes.png").is_file()
+    q = found["Q"]
+    assert q["magnitude"] + q["phase"] == pytest.approx(q["mean"])
+    assert f"a factor of {10 ** q['magnitude'] ** 0.5:.3g}" in page
+    worst = min(found["comac"], key=found["comac"].get)
+    sensors = page[page.index("<h2>Sensors</h2>") :]
+    assert sensors.index(worst) == min(sensors.index(s) for s in found["comac"] if s in sensors)
+    assert "e^" not in page
+
+
+def test_pairs_of_shapes_agree_where_model_and_test_are_one(case):
+    """Scaled onto the model at the sensors: of a pair with MAC 1 both are the same numbers."""
+    pairs = chladni.correlate(case).shapes
+    for k in range(len(pairs.f_test)):
+        test, model = pairs.test[:, k], pairs.model[:, k]
+        assert abs(model).max() == pytest.approx(1)
+        alike = (test @ model) ** 2 / ((test @ test) * (model @ model))
+        assert alike == pytest.approx(pairs.mac[k], abs=0.01)
+        assert ((test - model) ** 2).sum() <= (1.001 - pairs.mac[k]) * (model @ model)

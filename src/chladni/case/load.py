@@ -15,7 +15,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, TestSetup
-from ..errors import FileError, LabelError, named
+from ..errors import ChladniError, FileError, LabelError, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
@@ -26,6 +26,7 @@ from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
 from ..units import UNITS, Units
 from .free_parameters import free_parameter
+from .mapped_thickness import PLACES, formed_thickness
 from .mended_recordings import mended, with_frf
 from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
@@ -44,6 +45,7 @@ class Case:
     ----------
     path : Path               of case.toml
     deck, assembly, units     the model, SI
+    as_deck : Assembly        the deck's own, where `assembly` has other thickness, or the same
     damping : float           fraction of critical the model is given, where nothing else says
     recordings : tuple        one per file, article and level; FRFs share labels and quantity
     setup : TestSetup         sensors as the user describes them, hangers, weighed mass
@@ -62,6 +64,7 @@ class Case:
     path: Path
     deck: Deck
     assembly: Assembly
+    as_deck: Assembly
     units: Units
     damping: float | None
     recordings: tuple[Recording, ...]
@@ -132,12 +135,13 @@ def load_case(path: str | Path) -> Case:
     outside = model.flag("outside")
     allow = model.list("allow", str) or []
     deck = read_deck(_file(model, "deck", str(model.text("deck", due=True)), outside), allow)
-    made = assembly(deck, units)
+    as_deck = assembly(deck, units)
+    made, notes = _thickness(model, as_deck, units, outside)
     setup = _setup(test, made, outside)
     sensors = (*setup.outputs, *setup.inputs)
     more = keys.sections("recording", known("recording"))
     recordings = _recordings(test, more, sensors, outside)
-    notes = notes_of(recordings, "use" in test)
+    notes += notes_of(recordings, "use" in test)
     notes += left_out(deck, STRUCTURAL)
     if allow:
         notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
@@ -155,6 +159,7 @@ def load_case(path: str | Path) -> Case:
         path=path,
         deck=deck,
         assembly=made,
+        as_deck=as_deck,
         units=units,
         damping=model.number("damping", low=0.0, high=0.5),
         recordings=recordings,
@@ -194,6 +199,26 @@ def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
             f"{section.at(key)}: there is no file {name!r}; {hint}there are {named(there, 8)}"
         )
     return path
+
+
+def _thickness(
+    model: TomlSection, made: Assembly, units: Units, outside: bool
+) -> tuple[Assembly, list[str]]:
+    """The deck's structure with the thickness of a file, where the case names one."""
+    name = model.text("thickness")
+    own = model.text("thickness_units", among=tuple(UNITS))
+    place = model.text("thickness_place", among=PLACES)
+    if name is None:
+        for word, value in (("thickness_units", own), ("thickness_place", place)):
+            if value is not None:
+                raise FileError(f"{model.at(word)} is of a file of thickness, but none is named")
+        return made, []
+    path = _file(model, "thickness", name, outside)
+    try:
+        found = formed_thickness(made, path, UNITS[own] if own else units, place or PLACES[0])
+    except ChladniError as error:
+        raise type(error)(f"{model.at('thickness')}: {error}") from error
+    return found.mapped.assembly, found.said()
 
 
 def _recordings(

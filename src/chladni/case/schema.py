@@ -11,6 +11,7 @@ from typing import get_args
 from ..dynamics.frf import Quantity
 from ..ema.setup import Control
 from ..units import UNITS
+from .mapped_thickness import PLACES
 
 COMMANDS = ("test", "identify", "correlate", "calibrate", "diagnose",
             "frf", "modes", "render", "plan", "study", "bench")  # fmt: skip
@@ -62,6 +63,15 @@ SCHEMA = (
     Key("model", "deck", "file", "", "needed", "The Nastran deck.", '"tailgate.bdf"', COMMANDS),
     Key("model", "units", "word", "", "needed", "The deck's unit system.", '"mm-t-s"', COMMANDS,
         tuple(UNITS)),
+    Key("model", "thickness", "file", "", "the deck's own",
+        "Thickness after forming: LS-DYNA keyword file, VTU or CSV, or a scan of both faces (STL, "
+        "PLY, OBJ). It is mapped onto the shells before anything is asked, and stands in every "
+        "deck that is written.", '"formed.k"', COMMANDS),
+    Key("model", "thickness_units", "word", "", "the deck's", "The unit system of that file.",
+        '"mm-t-s"', COMMANDS, tuple(UNITS)),
+    Key("model", "thickness_place", "word", "", "as it lies",
+        "Whether its sheets lie on the deck's, or are brought onto them first, as a mirror image "
+        "if need be.", '"aligned"', COMMANDS, PLACES),
     Key("model", "damping", "number, 0 to 0.5", "of critical", "0.01",
         "Damping the model is given where its responses are drawn or scored.", "0.01", _FRF),
     Key("model", "allow", "list of cards", "", "none",

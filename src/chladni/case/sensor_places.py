@@ -43,11 +43,16 @@ def places(
     axes = {n: A for r in recorded for n, A in r.axes.items()}
     spoken = [label for label in labels if label not in table]
     known = {**table, **{label: _spoken(label, test, made, nodes, axes) for label in spoken}}
-    rows = [_place(test, known[label], made) for label in labels]
     notes += _nodes_said(made, spoken, nodes, axes)
-    notes += _off_said(made, role, [r[3].place for r in rows if r[3].place is not None])
+    notes += _off_said(made, role, [x for n in labels if (x := known[n].place) is not None])
+    return placed(made, [known[label] for label in labels], test.at("recordings"))
+
+
+def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDofs:
+    """Sensors (or exciters) on the structure; ``where`` begins the sentence of what is refused."""
+    rows = [_place(f"{where}: label {s.label!r}", s, made) for s in sensors]
     return MeasuredDofs(
-        labels=tuple(labels),
+        labels=tuple(s.label for s in sensors),
         grids=np.array([r[0] for r in rows], dtype=np.int64),
         points=np.array([r[1] for r in rows]).reshape(-1, 3),
         directions=np.array([r[2] for r in rows]).reshape(-1, 3),
@@ -161,10 +166,9 @@ def _same_place(points: np.ndarray, before: np.ndarray, k: int) -> bool:
 
 
 def _place(
-    test: TomlSection, sensor: Sensor, made: Assembly
+    where: str, sensor: Sensor, made: Assembly
 ) -> tuple[int, np.ndarray, np.ndarray, Sensor]:
     """(grid or 0, place, direction, sensor) of one dof."""
-    where = f"{test.at('recordings')}: label {sensor.label!r}"
     if sensor.grid is None and sensor.place is None:
         return 0, np.full(3, np.nan), _base(made, sensor, where), sensor
     if sensor.grid is None:

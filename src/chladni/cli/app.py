@@ -29,6 +29,7 @@ COMMANDS = (  # each a module here with a function ``run``
     "identify",
     "modes",
     "frf",
+    "map",
     "render",
     "plan",
     "study",

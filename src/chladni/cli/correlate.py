@@ -5,22 +5,61 @@ from typing import Annotated
 
 import typer
 
+from ..errors import FileError
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.correlate import correlate
-from .run import Out, opened, started
+from ..workflows.loaded_model import is_case, load_model
+from ..workflows.other_modes import other_modes
+from .run import Allow, Out, Run, Units, opened, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE")],
+    source: Annotated[Path, typer.Argument(metavar="CASE_or_DECK")],
+    modes: Annotated[
+        Path | None,
+        typer.Option(
+            help="Modes another program found: OP2, punch, universal file (55); in place of a test."
+        ),
+    ] = None,
+    units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
-    """Paired modes, MAC, and the deviation Q by channel and band, nothing calibrated."""
+    """Paired modes, MAC, and the deviation Q by channel and band, nothing calibrated.
+
+    A case is compared with its recording; with --modes a case or a bare deck with the modes of
+    another program.
+    """
+    with started("correlate", source, out) as job:
+        if modes is not None:
+            _beside(job, source, modes, units, allow or [])
+            return
+        if units is not None or allow:
+            raise FileError("--units and --allow are of a bare deck, which needs --modes")
+        _with_test(job, source)
+
+
+def _with_test(job: Run, source: Path) -> None:
     from ..report.correlation_page import correlation_page
 
-    with started("correlate", source, out) as job:
-        case = opened(source)
-        found = correlate(case, within(job.progress, 0.0, 0.8))
-        job.json("correlation.json", to_json(found))
-        job.progress("pictures", 0.8)
-        job.show(correlation_page(job.folder, case, found))
+    if source.is_file() and not is_case(source):
+        raise FileError(
+            f"{source} is a deck; give a case that names a recording, or with --modes the modes "
+            "another program found"
+        )
+    case = opened(source)
+    found = correlate(case, within(job.progress, 0.0, 0.8))
+    job.json("correlation.json", to_json(found))
+    job.progress("pictures", 0.8)
+    job.show(correlation_page(job.folder, case, found))
+
+
+def _beside(job: Run, source: Path, modes: Path, units: str | None, allow: list[str]) -> None:
+    from ..report.other_modes_page import other_modes_page
+
+    model = load_model(source, units, allow, command="correlate")
+    found = other_modes(model, modes, within(job.progress, 0.0, 0.8))
+    job.json("correlation.json", to_json(found))
+    job.progress("pictures", 0.8)
+    job.show(other_modes_page(job.folder, model, found))

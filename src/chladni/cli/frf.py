@@ -9,11 +9,12 @@ import typer
 from ..case import Case, load_case
 from ..dynamics.frf import FRF, UNIT, Quantity
 from ..errors import FileError, LabelError
+from ..fem.measured_dofs import MeasuredDofs
 from ..io.tables.write_tables import write_csv, write_npz
 from ..io.uff.write_uff import write_uff
 from ..progress import within
 from ..report.response_page import response_json, response_page
-from ..workflows.frf import frf
+from ..workflows.frf import Side, frf, placed_layout
 from ..workflows.loaded_model import (
     DeckModels,
     Model,
@@ -35,11 +36,16 @@ def run(
     quantity: Kind = "accelerance",
     units: Units = None,
     allow: Allow = None,
+    sensors: Annotated[
+        Path | None,
+        typer.Option(help="Where it is driven and answers: plan.json, or a table of sensors."),
+    ] = None,
     out: Out = None,
 ) -> None:
     """Frequency responses between degrees of freedom.
 
-    Without --input those the deck asks for, or of a case those its first recording holds.
+    Without --input and --sensors those the deck asks for, or of a case those its first recording
+    holds.
     """
     low, high = limits(band)
     per_force = [name for name in UNIT if name != "transmissibility"]
@@ -47,20 +53,29 @@ def run(
         raise LabelError(f"no quantity {quantity!r}; there are {', '.join(per_force)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
-        given = _source(source, bool(input), units, allow or [])
-        f = np.linspace(low, high, lines) if input else None
+        if sensors is not None and (input or output):
+            raise FileError("--sensors says where it is driven and answers; leave out the others")
+        driven = bool(input) or sensors is not None
+        given = _source(source, driven, units, allow or [])
+        f = np.linspace(low, high, lines) if driven else None
         stage = within(job.progress, 0.1, 0.9)
-        found = frf(given, output or (), input or (), f, damping, stage)
+        ends: tuple[Side, Side] = (output or (), input or ())
+        if sensors is not None:
+            given, *placed = placed_layout(as_model(given, "frf"), sensors)
+            ends = (placed[0], placed[1])
+        found = frf(given, *ends, f, damping, stage)
         job.notes.extend(found.notes)
         for k, one in enumerate(found.frfs):
             if one.quantity != "transmissibility":
                 one = one.to(cast(Quantity, quantity))
             stem = f"frf_{k + 1}" if k else "frf"
-            _written(job, stem, one, given)
+            _written(job, stem, one, given, ends)
             job.show(response_page(job.folder, one))
 
 
-def _written(job: Run, stem: str, one: FRF, given: Case | Model | DeckModels) -> None:
+def _written(
+    job: Run, stem: str, one: FRF, given: Case | Model | DeckModels, ends: tuple[Side, Side]
+) -> None:
     """The responses in every format that can hold them."""
     write_npz(job.keep(f"{stem}.npz", "the responses as arrays"), one)
     write_csv(job.keep(f"{stem}.csv", "the same as a table"), one)
@@ -73,6 +88,10 @@ def _written(job: Run, stem: str, one: FRF, given: Case | Model | DeckModels) ->
     nodes = dict(zip(model.assembly.ids.tolist(), model.assembly.points, strict=True))
     named = [text.partition(":")[0] for text in (*one.outputs, *one.inputs)]
     places = {int(n): nodes[int(n)] for n in named if n.isdecimal() and int(n) in nodes}
+    for side in ends:
+        if isinstance(side, MeasuredDofs):
+            nodes_of = (label.partition(":")[0] for label in side.labels)
+            places |= {int(n): x for n, x in zip(nodes_of, side.points, strict=True)}
     path = job.folder / f"{stem}.uff"
     try:
         write_uff(path, one, places, title=job.source.name)

@@ -6,10 +6,12 @@ from typing import Annotated
 import typer
 
 from ..planning import PlanSettings
+from ..planning.plan_summary import durations
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
 from ..workflows.plan import plan
+from ..workflows.smallest_findings import smallest_findings
 from .run import Out, Units, started
 
 
@@ -36,6 +38,13 @@ def run(
     drawn: Annotated[
         int, typer.Option(help="Models with drawn thickness the layout must serve.", min=0)
     ] = 20,
+    detect: Annotated[
+        bool,
+        typer.Option("--detect", help="Also the smallest mass, softening and thinning it finds."),
+    ] = False,
+    noise: Annotated[
+        float, typer.Option(help="Noise expected, of |H|, for --detect.", min=1e-5, max=0.5)
+    ] = 0.01,
     units: Units = None,
     out: Out = None,
 ) -> None:
@@ -53,13 +62,20 @@ def run(
         mass=mass,
         draws=drawn,
     )
+    from ..report.detectable_page import detectable_section
     from ..report.plan_page import plan_page
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units, command="plan")
         job.notes += model.notes
-        found = plan(model, settings, within(job.progress, 0.1, 0.8))
+        found = plan(model, settings, within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))
-        job.progress("pictures", 0.8)
+        job.progress("pictures", 0.7)
         job.show(plan_page(job.folder, model, found))
+        if detect:
+            band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
+            smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
+            job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
+            job.files.append(("smallest_mass.png", "smallest mass that would be found"))
+            job.sections.append(detectable_section(job.folder, model, smallest, noise))

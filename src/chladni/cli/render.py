@@ -45,8 +45,8 @@ def run(
 ) -> None:
     """Pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
 
-    The first mode is the first elastic one: rigid motions are not counted. A scan without --align
-    lies where the model lies.
+    Modes are numbered as by ``chladni modes``, from 1 with the rigid motions. A scan without
+    --align lies where the model lies.
     """
     chosen = numbers(modes)
     with started("render", source, out) as job:
@@ -54,7 +54,8 @@ def run(
         model = load_model(source, units, command="render")
         job.notes += model.notes
         count = max([0, *chosen, *(gif or []), *(energy or [])])
-        modal = _modal(job, model, count)
+        shown = sorted({*chosen, *(gif or []), *(energy or [])})
+        modal = _modal(job, model, count, shown if clearance else energy or [])
         job.progress("pictures", 0.6)
         _still(job, model, thickness)
         if modal is not None:
@@ -65,7 +66,7 @@ def run(
         if scan is not None:
             against_scan(job, model, scan, align)
         if clearance:
-            _clearance(job, model, modal, sorted({*chosen, *(gif or []), *(energy or [])}))
+            _clearance(job, model, modal, shown)
         job.lead = f"{len(job.files)} pictures of {source.name}."
         job.say(job.lead)
 
@@ -88,24 +89,26 @@ def numbers(text: str) -> list[int]:
     return found
 
 
-def _modal(job: Run, model: Model, count: int) -> ModalModel | None:
+def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> ModalModel | None:
+    """The modes; refuses rigid ones among those that must deform."""
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(count + _RIGID)
-    if (rigid := int(rigid_modes(modal).sum())) > _RIGID:
-        modal = model.modes(count + rigid)
-    modal = modal.sel(slice(rigid, rigid + count))
+    modal = model.modes(max(count, _LEAST))
     if len(modal) < count:
-        raise FileError(f"{job.source} has {len(modal)} elastic modes, number {count} was asked")
-    if rigid:
-        job.notes.append(
-            f"{rigid} rigid motions are not counted: mode 1 here is number {rigid + 1} of all."
+        raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
+    rigid = int(rigid_modes(modal).sum())
+    if still := [k for k in deforming if k <= rigid]:
+        raise FileError(
+            f"{job.source}: mode {still[0]} is a rigid motion, which strains nothing and closes no "
+            f"gap; the first elastic mode is {rigid + 1}"
         )
+    if rigid:
+        job.notes.append(f"Modes 1 to {rigid} are rigid motions; the first elastic is {rigid + 1}.")
     return modal
 
 
-_RIGID = 6  # of a free structure in one piece
+_LEAST = 7  # with them the six rigid motions of a free structure are told from the first elastic
 
 
 def _still(job: Run, model: Model, thickness: bool) -> None:
@@ -217,20 +220,21 @@ def _mm(x: float) -> str:
 
 def _rattle(model: Model, modal: ModalModel, chosen: list[int], found: Sequence[Gaps]) -> Table:
     """Where each mode closes a gap first, and the force at its liveliest point that does it."""
-    motion, f = model.motion(modal.shapes), modal.frequency
+    at = np.array(chosen, int) - 1
+    motion, f = model.motion(modal.shapes[:, at]), modal.frequency[at]
     drive = np.linalg.norm(motion, axis=1).max(axis=0)
     force = [g.first_contact(motion, f, _DAMPING, drive) for g in found]
     for g, value in zip(found, force, strict=True):
         value[~g.free | g.touching] = np.inf
     rows = []
-    for k in chosen:
-        least = [float(value[:, k - 1].min()) for value in force]
-        at = int(np.argmin(least))
-        g, row = found[at], int(force[at][:, k - 1].argmin())
+    for k, mode in enumerate(chosen):
+        least = [float(value[:, k].min()) for value in force]
+        worst = int(np.argmin(least))
+        g, row = found[worst], int(force[worst][:, k].argmin())
         place = ", ".join(f"{1e3 * x:.0f}" for x in model.assembly.points[g.rows[row]])
         pair = " – ".join(g.parts)
-        size = (_mm(g.clearance[row]), number(least[at], 2))
-        rows.append((str(k), number(f[k - 1]), pair, place, *size))
+        size = (_mm(g.clearance[row]), number(least[worst], 2))
+        rows.append((str(mode), number(f[k]), pair, place, *size))
     head = ("mode", "Hz", "first contact", "at x, y, z [mm]", "gap [mm]", "force [N]")
     return Table(head, rows, words=("first contact", "at x, y, z [mm]"), caption=_RATTLE)
 

@@ -21,6 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from .finding import Finding, Severity
+from .odds import evidence_in_words
 
 LEAST_CHANNELS, LEAST_MODES = 5, 4
 MIX = (0.02, 0.06, 0.2)  # ε
@@ -197,7 +198,7 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
         )
         mend = f"in sensors.csv give {label} the gain {g:.3g}"
     unless = "" if g == -1.0 else _UNLESS
-    text += f" (e^{gain:.0f} times more likely){unless}."
+    text += f" ({evidence_in_words(gain)}){unless}."
     severity: Severity = "fault" if g == -1.0 else "warning"
     return _Fault(gain, Finding(kind, text, severity, (label,), mend, g))
 
@@ -223,7 +224,7 @@ def _exchanges(
     names = (labels[a], labels[b])
     text = (
         f"outputs {names[0]} and {names[1]} are exchanged: each fits the other's place "
-        f"(e^{gain:.0f} times more likely)."
+        f"({evidence_in_words(gain)})."
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
     return _Fault(gain, Finding("swapped channels", text, "fault", names, mend))
@@ -295,20 +296,20 @@ def _replaced(
     label = labels[i]
     if kind == "copy":
         text = (
-            f"output {label} shows what {names[k]} shows (e^{gain:.0f} times more likely), as if "
+            f"output {label} shows what {names[k]} shows ({evidence_in_words(gain)}), as if "
             f"both were at one place{_UNLESS}."
         )
         mend = f'in sensors.csv give {label} the cell use = "no"'
         both = (label, names[k])
         finding = Finding("duplicated channels", text, "warning", both, mend)
     elif kind == "turned":
-        text = f"output {label} points along {names[k]} (e^{gain:.0f} times more likely){_UNLESS}."
+        text = f"output {label} points along {names[k]} ({evidence_in_words(gain)}){_UNLESS}."
         mend = f"in sensors.csv give {label} the direction {names[k]}"
         finding = Finding("turned sensor", text, "warning", (label,), mend)
     else:
         text = (
-            f"output {label} seems to sit elsewhere, near {names[k]} (e^{gain:.0f} times more "
-            f"likely){_UNLESS}."
+            f"output {label} seems to sit elsewhere, near {names[k]} "
+            f"({evidence_in_words(gain)}){_UNLESS}."
         )
         mend = f"look where {label} sits and put that place into sensors.csv"
         finding = Finding("misplaced sensor", text, "warning", (label,), mend)

@@ -36,7 +36,7 @@ class PartMapping:
     distance_95 : float      95th percentile of the distance to it [m]
     mean : float             area mean of the mapped thickness [m]
     mass_before, mass_after : float  [kg]
-    round_trip : float       rms of formed -> mesh -> formed, relative to t
+    round_trip : float       rms of formed -> mesh -> formed, relative to t; nan of points, scans
     """
 
     part: str
@@ -83,6 +83,13 @@ def shell_mass(assembly: Assembly) -> np.ndarray:
     part = assembly.shells.part
     mean = _cell_mean(assembly.shells.nodes, assembly.shells.thickness)
     return shell_area(assembly) * (rho[part] * mean + extra[part])
+
+
+def area_mean(assembly: Assembly, rows: np.ndarray) -> float:
+    """Mean thickness over the area of these shells [m]."""
+    area, shells = shell_area(assembly)[rows], assembly.shells
+    mean = _cell_mean(shells.nodes[rows], shells.thickness[rows])
+    return float((mean * area).sum() / area.sum())
 
 
 def _cell_mean(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -247,10 +254,10 @@ def _sampled(
     at, normal = samples(assembly.points, assembly.shells.nodes[rows])
     t, far = values_at(formed, at.reshape(-1, 3), np.repeat(normal, 4, axis=0), reach, facing)
     t, far = t.reshape(-1, 4), far.reshape(-1, 4)
-    return _completed(t), far
+    return completed(t), far
 
 
-def _completed(t: np.ndarray) -> np.ndarray:
+def completed(t: np.ndarray) -> np.ndarray:
     """Shells of which some samples found a partner take the mean of these for the others."""
     known = np.isfinite(t)
     count = known.sum(axis=1)
@@ -272,14 +279,13 @@ def _report(
     rows = np.flatnonzero(before.shells.part == part)
     area = shell_area(before)[rows]
     found = (far <= reach).sum(axis=1) >= 2
-    mean = _cell_mean(after.shells.nodes[rows], after.shells.thickness[rows])
     close = far[np.isfinite(far)]
     return PartMapping(
         before.parts[part].name,
         name,
         float(area[found].sum() / area.sum()),
         float(np.percentile(close, 95)) if len(close) else float("inf"),
-        float((mean * area).sum() / area.sum()),
+        area_mean(after, rows),
         float(shell_mass(before)[rows].sum()),
         float(shell_mass(after)[rows].sum()),
         round_trip(after, rows, source, facing),

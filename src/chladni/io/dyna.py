@@ -198,7 +198,7 @@ def read_keyword(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
         Naming file and line where a number cannot be read, a node is missing or a shell has no
         thickness.
     """
-    path, unit = Path(path), units_named(units) if isinstance(units, str) else units
+    path, unit = Path(path), units_named(units)
     blocks = list(_blocks(path))
     ids, places = _nodes(blocks)
     shells, t = _shells(blocks)
@@ -234,7 +234,7 @@ def _with_sections(
 
 def write_keyword(path: Path | str, mesh: FormedMesh, units: str | Units = "mm-t-s") -> Path:
     """Write *NODE, *PART and *ELEMENT_SHELL_THICKNESS, to 0.1 µm in mm."""
-    unit = units_named(units) if isinstance(units, str) else units
+    unit = units_named(units)
     return write_text(path, "\n".join(_keyword_lines(mesh, unit)) + "\n")
 
 
@@ -263,7 +263,7 @@ def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     columns node, x, y, z, thickness and no cells.
     """
     path = Path(path)
-    unit = units_named(units) if isinstance(units, str) else units
+    unit = units_named(units)
     if path.is_file():
         refuse_large(path)
     if path.suffix.lower() == ".csv":

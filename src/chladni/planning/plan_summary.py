@@ -45,6 +45,7 @@ class PlannedSensor:
     rank: int
     at: PlannedPlace
     for_mode: int | None
+    mass_kg: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,7 @@ class PlannedActuator:
     rattles_from_n: float | None
     rattles_between: tuple[str, str] | None
     rattles_in_mode: int | None
+    rattle_gap_known: bool | None
     vetoed: bool
     is_sensor: bool
 
@@ -95,6 +97,7 @@ class RattleOverview:
     without_a_straight_way: int
     open_places: int
     least_clearance_m: float | None
+    touching_places: int
     touching_pairs: tuple[tuple[str, str], ...]
 
 
@@ -172,7 +175,7 @@ def _place(found: Plan, i: int) -> PlannedPlace:
 def _sensors(found: Plan) -> tuple[PlannedSensor, ...]:
     moved = {m.into: found.first + 1 + m.mode for m in found.moves}
     return tuple(
-        PlannedSensor(k + 1, _place(found, i), moved.get(i))
+        PlannedSensor(k + 1, _place(found, i), moved.get(i), found.settings.mass)
         for k, i in enumerate(found.layout.tolist())
     )
 
@@ -188,19 +191,21 @@ def _actuator(found: Plan, i: int) -> PlannedActuator:
         rattles_from_n=None if quiet else float(found.rattle.force[i]),
         rattles_between=None if quiet else found.openings.pairs[found.openings.pair[place]],
         rattles_in_mode=None if quiet else found.first + 1 + int(found.rattle.mode[i]),
+        rattle_gap_known=None if quiet else bool(found.openings.known[place]),
         vetoed=not bool(found.actuators.allowed[i]),
         is_sensor=bool(i in found.layout),
     )
 
 
 def _rattle(found: Plan) -> RattleOverview:
-    clearance = found.openings.clearance
+    clearance, known = found.openings.clearance, found.openings.known
     return RattleOverview(
         force_n=found.settings.force,
         places_vetoed=int((found.rattle.force < found.settings.force).sum()),
         without_a_straight_way=int((~found.places.straight).sum()),
-        open_places=len(clearance),
-        least_clearance_m=float(clearance.min()) if len(clearance) else None,
+        open_places=int(known.sum()),
+        least_clearance_m=float(clearance[known].min()) if known.any() else None,
+        touching_places=int((~known).sum()),
         touching_pairs=found.openings.touching,
     )
 

@@ -1,4 +1,9 @@
-"""Which shaker places rattle: the force at which two sheets first meet, from the mesh's gaps."""
+"""Which shaker places rattle: the force at which two sheets first meet, from the mesh's gaps.
+
+Where sheets touch as far as the mesh can tell, the gap is somewhere between nothing and what its
+facets leave in doubt. The middle of that is taken, so that such pairs take part in the veto; where
+two sheets lie on each other without doubt it is ``TAKE_UP``.
+"""
 
 from dataclasses import dataclass
 
@@ -8,28 +13,29 @@ from ..geometry.clearance import Gaps, all_gaps
 from ..model.assembly import Assembly
 
 WITHIN = 0.010  # sheets farther apart than this do not meet [m]
+TAKE_UP = 2e-5  # [m]: roughness and paint, of sheets that lie on each other
 
 
 @dataclass(frozen=True, eq=False)
 class Openings:
-    """Places where two sheets stand apart and may meet, all pairs of parts together.
+    """Places where two sheets may meet, all pairs of parts together.
 
     Attributes
     ----------
     pairs : ((str, str), ...)       parts
     pair : (g,) int                 position of the pair of each place
     points : (g, 3)                 [m]
-    clearance : (g,)                [m]
+    clearance : (g,)                [m]; of places that touch the middle of what it may be
+    known : (g,) bool               False where the sheets touch as far as the mesh can tell
     motion : (g, r)                 opening in each mode [1/√kg]
-    touching : ((str, str), ...)    pairs that touch somewhere away from joints as the mesh has it:
-                                    they rub or rattle at any force, or are nearer than the mesh
-                                    can tell
+    touching : ((str, str), ...)    pairs that touch somewhere away from joints as the mesh has it
     """
 
     pairs: tuple[tuple[str, str], ...]
     pair: np.ndarray
     points: np.ndarray
     clearance: np.ndarray
+    known: np.ndarray
     motion: np.ndarray
     touching: tuple[tuple[str, str], ...]
 
@@ -51,23 +57,31 @@ class Rattle:
 
 
 def openings(assembly: Assembly, motion: np.ndarray) -> Openings:
-    """Gaps away from joints whose clearance is more than the mesh's facets leave in doubt.
+    """Gaps away from joints.
 
     Parameters
     ----------
     motion : (n_points, 3, r)   shapes at all points, mass-normalised [1/√kg]
     """
     found = all_gaps(assembly, within=WITHIN)
-    open_ = [g.free & ~g.touching for g in found]
+    open_ = [g.free for g in found]
     r = motion.shape[2]
     return Openings(
         tuple(g.parts for g in found),
         np.concatenate([np.zeros(0, int), *(np.full(m.sum(), k) for k, m in enumerate(open_))]),
         _joined([assembly.points[g.rows[m]] for g, m in _zip(found, open_)], 3),
-        np.concatenate([np.zeros(0), *(g.clearance[m] for g, m in _zip(found, open_))]),
+        np.concatenate([np.zeros(0), *(_likely(g)[m] for g, m in _zip(found, open_))]),
+        np.concatenate([np.zeros(0, bool), *(~g.touching[m] for g, m in _zip(found, open_))]),
         _joined([g.relative_motion(motion)[m] for g, m in _zip(found, open_)], r),
         tuple(g.parts for g in found if (g.free & g.touching).any()),
     )
+
+
+def _likely(g: Gaps) -> np.ndarray:
+    """The clearance, or where it is within its doubt the middle of [c - u, c + u] from zero up."""
+    least = np.maximum(g.clearance - g.uncertainty, 0.0)
+    most = np.maximum(g.clearance + g.uncertainty, 2 * TAKE_UP)
+    return np.where(g.touching, (least + most) / 2, g.clearance)
 
 
 def _zip(found: tuple[Gaps, ...], masks: list[np.ndarray]) -> list[tuple[Gaps, np.ndarray]]:

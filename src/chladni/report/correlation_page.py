@@ -6,13 +6,36 @@ from pathlib import Path
 import numpy as np
 
 from ..case import Case
+from ..ema.correlation import Quality
 from ..view.surface import surface
-from ..workflows.case_model import markers
+from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
-from .blocks import Block, Facts, PageParts, Picture, Section, Table
+from .blocks import Block, Facts, PageParts, Picture, Section, Table, Text
 from .figures import Shown, curves, frequencies, mac_picture, setup
 from .screening_blocks import screening_section
-from .words import number, percent
+from .words import criterion, hertz, number, percent
+
+_SAME = 1e-6  # Q of responses that nobody could tell apart
+_DRAWN = 8  # pairs of shapes
+_WORST = 10  # sensors in the table
+_MEANING = (
+    "δ = log10(H model / H test), a complex number at every line of every channel: its real part "
+    "is 0.3 where the model moves twice as much as the test, its imaginary part 0.68 where its "
+    "phase is 90° off. Q is the mean of |δ|²: 0 is perfect, resonances and anti-resonances count "
+    "alike. Here the model is {off} off. A resonance a few per cent off costs more than a level."
+)
+_COMAC = (
+    "CoMAC, over all paired modes: 1 where the sensor moves as the model does there. One that is "
+    "much below the others may sit elsewhere, point elsewhere, or see what the model lacks."
+)
+_CAPTIONS = {
+    "mac": "Modal assurance criterion in per cent; framed: the pairs of the table.",
+    "shapes": "Each pair twice: what the test's sensors saw, and the model's shape with what it "
+    "says at the same sensors. Arrows are shares of the largest; orange along, blue against the "
+    "sensor's direction.",
+    "setup": "Where sensors and shaker sit.",
+    "frequencies": "Deviation of each frequency from the test.",
+}
 
 
 def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
@@ -20,14 +43,15 @@ def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
     p, shown = found.pairs, _shown(case, found)
     rows = [(found.f_test[j], found.f_model[i], None) for i, j in zip(p.model, p.test, strict=True)]
     drawn = frequencies(folder, rows) | mac_picture(folder, shown)
-    drawn |= curves(folder, shown) | setup(folder, shown)
+    drawn |= curves(folder, shown) | setup(folder, shown) | _shapes(folder, shown, found)
     return PageParts(
         _lead(found),
         [
             screening_section(found.screening),
             Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies", "mac"))]),
+            Section("Shapes", _pictures(drawn, ("shapes",))),
+            Section("Sensors", [*_sensors(found), *_pictures(drawn, ("setup",))]),
             Section("Responses", [*_scores(found), *_pictures(drawn, ("frf", "frf_grid"))]),
-            Section("The test", _pictures(drawn, ("setup",))),
         ],
         found.notes,
         [(path.name, path.stem.replace("_", " ")) for path in drawn.values()],
@@ -38,11 +62,20 @@ def _lead(found: Correlation) -> str:
     p = found.pairs
     off = np.abs(found.f_model[p.model] / found.f_test[p.test] - 1)
     mean = f"{number(100 * float(off.mean()), 2)} %" if len(off) else "–"
-    q = "" if found.quality is None else f", Q = {number(found.quality.Q, 3)}"
+    q = found.quality
+    said = "" if q is None else f" Responses are {_off_by(q)} off (Q = {number(q.Q, 3)})."
     return (
         f"{len(off)} of {len(found.f_test)} test modes have a partner in the model, "
-        f"{mean} off on average{q}."
+        f"{mean} off in frequency on average.{said}"
     )
+
+
+def _off_by(q: Quality) -> str:
+    """Q in words: the rms factor of |H| and the rms angle."""
+    if q.Q < _SAME:
+        return "next to nothing"
+    factor, angle = 10 ** np.sqrt(q.magnitude), np.degrees(np.log(10) * np.sqrt(q.phase))
+    return f"a factor of {number(float(factor), 3)} and {angle:.0f}° of phase (rms)"
 
 
 def _shown(case: Case, found: Correlation) -> Shown:
@@ -61,28 +94,63 @@ def _shown(case: Case, found: Correlation) -> Shown:
         excluded=case.exclude,
         outputs=markers(case.outputs),
         inputs=markers(case.inputs),
+        cords=cords(case),
         mac=mac_of,
+        pairs=list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True)),
     )
 
 
 def _pictures(drawn: dict[str, Path], names: Sequence[str]) -> list[Block]:
-    return [Picture(drawn[name]) for name in names if name in drawn]
+    return [Picture(drawn[name], _CAPTIONS.get(name, "")) for name in names if name in drawn]
+
+
+def _shapes(folder: Path, shown: Shown, found: Correlation) -> dict[str, Path]:
+    """The first pairs, test and model side by side."""
+    from ..view.shape_pairs import shape_pairs
+
+    pairs = found.shapes
+    if pairs is None or not len(pairs.f_test):
+        return {}
+    return {"shapes": shape_pairs(folder / "shapes.png", shown.seen, pairs.first(_DRAWN))}
 
 
 def _modes(found: Correlation) -> Table:
     p = found.pairs
     rows = [
         (
-            number(found.f_test[j], 5),
-            number(found.f_model[i], 5),
+            hertz(found.f_test[j]),
+            hertz(found.f_model[i]),
+            str(found.numbers[i]) if found.numbers else "–",
             percent(found.f_model[i], found.f_test[j]),
-            number(value, 3),
+            criterion(value),
         )
         for i, j, value in zip(p.model, p.test, p.mac, strict=True)
     ]
-    alone = [f"{number(f, 4)} Hz" for f in found.f_test[p.alone_test]]
-    caption = f"Without a partner in the model: {', '.join(alone)}." if alone else ""
-    return Table(("test [Hz]", "model [Hz]", "off", "MAC"), rows, caption=caption)
+    return Table(("test [Hz]", "model [Hz]", "its mode", "off", "MAC"), rows, caption=_alone(found))
+
+
+def _alone(found: Correlation) -> str:
+    """What has no partner, on either side, and how modes are counted."""
+    said = ["Modes of the model are numbered with its rigid motions, as `chladni modes` does."]
+    p, top = found.pairs, found.f_test.max(initial=0.0)
+    test = [hertz(f) for f in found.f_test[p.alone_test]]
+    model = [hertz(f) for f in found.f_model[p.alone_model] if f <= top]
+    if test:
+        said.append(f"Test modes without a partner in the model: {', '.join(test)} Hz.")
+    if model:
+        said.append(f"Model modes the test did not show: {', '.join(model)} Hz.")
+    return " ".join(said)
+
+
+def _sensors(found: Correlation) -> list[Block]:
+    """CoMAC of every output, the worst first."""
+    if found.comac is None:
+        return []
+    order = np.argsort(found.comac, kind="stable")[:_WORST]
+    rows = [(found.sensors[k], criterion(float(found.comac[k]))) for k in order]
+    more = len(found.comac) - len(rows)
+    rest = f" The other {more} have no less than {rows[-1][1]}." if more else ""
+    return [Table(("sensor", "CoMAC"), rows, ("sensor",), caption=_COMAC + rest)]
 
 
 def _scores(found: Correlation) -> list[Block]:
@@ -92,12 +160,17 @@ def _scores(found: Correlation) -> list[Block]:
     channels = zip(found.channels, q.channel.ravel().tolist(), strict=True)
     worst = sorted(channels, key=lambda item: -item[1])[:8]
     bands = [
-        (f"{number(low)} to {number(high)}", number(x, 3))
+        (f"{low:.0f} to {high:.0f}", number(x, 3))
         for (low, high), x in zip(q.bands, q.band, strict=True)
     ]
-    meaning = "Q: mean over channels and lines of |log10(H model / H test)|²; lower is better."
+    facts = [
+        ("Q", number(q.Q)),
+        ("of it size, phase", f"{number(q.magnitude, 3)}, {number(q.phase, 3)}"),
+        ("Σ|δ|², not averaged", number(q.total)),
+    ]
     return [
-        Facts([("Q", number(q.Q)), ("Σ|δ|², the thesis' own", number(q.total))]),
-        Table(("band [Hz]", "Q"), bands, caption=meaning),
+        Facts(facts),
+        Text([_MEANING.format(off=_off_by(q))]),
+        Table(("band [Hz]", "Q"), bands),
         Table(("worst channels", "Q"), [(c, number(x, 3)) for c, x in worst], ("worst channels",)),
     ]

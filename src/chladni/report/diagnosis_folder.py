@@ -11,7 +11,7 @@ from ..io.nastran.edit.changes import Change
 from ..output import write_json
 from ..progress import Progress, silent
 from ..view.surface import surface
-from ..workflows.case_model import markers
+from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import DiagnosisResult
 from .diagnosis_json import diagnosis_json
 from .figures import Shown, figures
@@ -97,4 +97,5 @@ def shown(case: Case, result: DiagnosisResult) -> Shown:
         list(case.exclude),
         markers(case.outputs),
         markers(case.inputs),
+        cords(case),
     )

@@ -14,6 +14,7 @@ from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
 from .level_blocks import draw_levels
+from .words import hertz
 
 _GRID = 8  # channels in the overview
 CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
@@ -32,8 +33,9 @@ class Shown:
     held_out : labels of outputs that were not fitted
     compared : False where the responses are only shown, because frequencies were compared
     fitted, excluded : bands [Hz]
-    outputs, inputs : sensors and shakers as markers
+    outputs, inputs, cords : sensors, shakers and hangers as markers
     mac : (test modes, model modes) after, with their frequencies [Hz], or None
+    pairs : (test, model) positions of what is paired in it
     """
 
     seen: Surface
@@ -46,7 +48,9 @@ class Shown:
     excluded: Bands = ()
     outputs: Sequence[scene.Marker] = ()
     inputs: Sequence[scene.Marker] = ()
+    cords: Sequence[scene.Marker] = ()
     mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    pairs: Sequence[tuple[int, int]] = ()
 
 
 def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
@@ -72,8 +76,8 @@ def setup(folder: Path, shown: Shown) -> dict[str, Path]:
     """Where sensors and shakers sit."""
     if not (shown.outputs or shown.inputs):
         return {}
-    path = folder / "setup.png"
-    return {"setup": scene.sensors(path, shown.seen, shown.outputs, shown.inputs)}
+    path, ends = folder / "setup.png", (shown.outputs, shown.inputs)
+    return {"setup": scene.sensors(path, shown.seen, *ends, cords=shown.cords)}
 
 
 def _where(path: Path, effect: NamedEffect, shown: Shown) -> Path | None:
@@ -153,9 +157,10 @@ def mac_picture(folder: Path, shown: Shown) -> dict[str, Path]:
     if shown.mac is None:
         return {}
     mac, test, model = shown.mac
-    rows, columns = ([f"{f:.4g}" for f in side] for side in (test, model))
-    title = "MAC: test (rows), model (columns)"
-    return {"mac": plots.mac_matrix(folder / "mac.png", mac, rows, columns, title)}
+    rows, columns = ([hertz(f) for f in side] for side in (test, model))
+    title = "MAC [%]: test (rows), model (columns)" + (", pairs framed" if shown.pairs else "")
+    path = folder / "mac.png"
+    return {"mac": plots.mac_matrix(path, mac, rows, columns, title, shown.pairs)}
 
 
 def curves(folder: Path, shown: Shown) -> dict[str, Path]:

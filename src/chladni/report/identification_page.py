@@ -12,7 +12,7 @@ from ..workflows.identify import Identification, RecordingModes, firm
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
 from .screening_blocks import screening_section
-from .words import number
+from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
 
@@ -40,7 +40,7 @@ def _table(modal: Identified) -> Table:
     sure = firm(modal)
     columns = (modal.frequency, modal.frequency_sd, 100 * modal.damping, 100 * modal.damping_sd)
     rows = [
-        (str(k + 1), number(f, 5), number(sf, 2), number(z, 3), number(sz, 2))
+        (str(k + 1), hertz(f), number(sf, 2), number(z, 3), number(sz, 2))
         for k, (f, sf, z, sz) in enumerate(zip(*(c[sure] for c in columns), strict=True))
     ]
     heads = ("mode", "Hz", "± Hz", "damping [%]", "± %")

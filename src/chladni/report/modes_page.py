@@ -7,7 +7,7 @@ import numpy as np
 from ..workflows.loaded_model import Model
 from ..workflows.modes import NormalModes
 from .blocks import Facts, PageParts, Picture, Section, Table
-from .words import number
+from .words import hertz, number
 
 _SHOWN = 12  # modes in the picture
 _NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
@@ -60,7 +60,11 @@ def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:
     centre = ", ".join(number(x) for x in found.centre_of_gravity)
     facts = [("Mass", f"{number(found.mass, 6)} {kg}"), ("Centre of gravity", f"({centre}) {m}")]
     rows = [
-        (str(k + 1), number(f[k], 6), *(_share(e) for e in found.strain_energy[:, k]))
+        (
+            str(k + 1),
+            hertz(f[k]),
+            *(_share(e) for e in found.strain_energy[:, k]),
+        )
         for k in range(len(f))
     ]
     heads = ("mode", "Hz", *(name for name, _ in found.parts))

@@ -21,7 +21,7 @@ from ..view import plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
-from .words import number
+from .words import hertz, number
 
 PICTURES = {
     "sensors.png": "the layout",
@@ -102,7 +102,8 @@ def _rattle_notes(found: Plan) -> list[str]:
         pairs = ", ".join(f"{a} and {b}" for a, b in found.openings.touching)
         out.append(
             f"Away from their joints the mesh lets touch: {pairs}. Their gap is less than the "
-            "facets leave in doubt, so when they rattle is not foretold: listen to them first."
+            "facets leave in doubt; half of that doubt was taken for it, so the force at which "
+            "they rattle is a guess (marked ~): listen to them first."
         )
     return out
 
@@ -170,7 +171,7 @@ def _modes(
     rows = [
         (
             str(m.mode),
-            number(m.frequency_hz, 5),
+            hertz(m.frequency_hz),
             number(m.visibility, 2),
             "yes" if m.seen else "hardly",
             "yes" if m.seen_by_normals else "no, moves along the sheets",
@@ -245,7 +246,8 @@ def _rattling(actuator: PlannedActuator) -> str:
     if actuator.rattles_between is None or actuator.rattles_from_n is None:
         return "none foretold"
     a, b = actuator.rattles_between
-    return f"{number(actuator.rattles_from_n, 2)} N: {a} / {b}"
+    about = "" if actuator.rattle_gap_known else "~"
+    return f"{about}{number(actuator.rattles_from_n, 2)} N: {a} / {b}"
 
 
 def _hanger(found: Plan, grid: int) -> scene.Marker:

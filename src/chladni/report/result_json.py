@@ -6,17 +6,23 @@ from typing import Any
 from ..ema.level_table import level_tables
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
+from ..updating.detectable import Detectable
 from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from ..workflows.identify import Identification, RecordingModes, firm
+from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
+from ..workflows.other_modes import OtherModes
 from ..workflows.virtual_test import BenchResult
 from .bench_page import bench_json
 from .check_page import check_json
+from .detectable_page import detectable_json
 from .diagnosis_json import diagnosis_json
 from .level_blocks import level_json
+from .map_page import map_json
+from .other_modes_page import other_modes_json
 from .plan_json import plan_json
 from .screening_blocks import screening_json
 from .study_page import study_json
@@ -36,6 +42,21 @@ def _(result: DiagnosisResult) -> dict[str, Any]:
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
     return plan_json(summary(result))
+
+
+@to_json.register
+def _(result: OtherModes) -> dict[str, Any]:
+    return other_modes_json(result)
+
+
+@to_json.register
+def _(result: Detectable) -> dict[str, Any]:
+    return detectable_json(result)
+
+
+@to_json.register
+def _(result: MappedDeck) -> dict[str, Any]:
+    return map_json(result)
 
 
 @to_json.register
@@ -131,7 +152,13 @@ def _(result: Correlation) -> dict[str, Any]:
     p, q, f, test = result.pairs, result.quality, result.f_model, result.f_test
     held: dict[str, Any] = {
         "modes": [
-            {"test_hz": test[j], "model_hz": f[i], "deviation": f[i] / test[j] - 1, "mac": value}
+            {
+                "test_hz": test[j],
+                "model_hz": f[i],
+                "model_mode": result.numbers[i],
+                "deviation": f[i] / test[j] - 1,
+                "mac": value,
+            }
             for i, j, value in zip(p.model, p.test, p.mac, strict=True)
         ],
         "alone_test_hz": test[p.alone_test],
@@ -145,6 +172,8 @@ def _(result: Correlation) -> dict[str, Any]:
         held["Q"] = {
             "mean": q.Q,
             "total": q.total,
+            "magnitude": q.magnitude,
+            "phase": q.phase,
             "channel": dict(zip(result.channels, q.channel.ravel(), strict=True)),
             "band": [{"band_hz": b, "Q": x} for b, x in zip(q.bands, q.band, strict=True)],
         }

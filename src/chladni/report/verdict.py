@@ -11,7 +11,7 @@ from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
 from .states_table import states_table
-from .words import interval, number, percent, quantity
+from .words import criterion, hertz, interval, number, percent, quantity
 
 HEADING = {
     "missing physics": "Missing physics found",
@@ -234,7 +234,7 @@ def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
         rows = [(p.name, _interval(p)) for p in effect.parameters]
         place = [(name, text) for name, text in _place(effect.where) if text]
         if rows:
-            blocks.append(Table(("parameter", "value (interval)"), rows, ("parameter",)))
+            blocks.append(Table(("parameter", "value (95 % interval)"), rows, ("parameter",)))
         if place:
             blocks.append(Table(("where", ""), place, ("where", "")))
     return blocks
@@ -274,7 +274,7 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
         )
         for c in result.calibrated
     ]
-    heads = ("parameter", "deck", "updated deck (interval)", "change")
+    heads = ("parameter", "deck", "updated deck (95 % interval)", "change")
     return [Table(heads, rows, ("parameter",), _REACHED)]
 
 
@@ -320,13 +320,13 @@ _MEANING = {
 def _frequencies(result: DiagnosisResult) -> list[Block]:
     rows = [
         (
-            number(r.test_hz),
-            number(r.before_hz),
+            hertz(r.test_hz),
+            hertz(r.before_hz),
             percent(r.before_hz, r.test_hz),
-            number(r.after_hz),
+            hertz(r.after_hz),
             percent(r.after_hz, r.test_hz),
-            number(r.mac_before, 3),
-            number(r.mac_after, 3),
+            criterion(r.mac_before),
+            criterion(r.mac_after),
         )
         for r in result.frequencies
     ]

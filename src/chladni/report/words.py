@@ -20,6 +20,26 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits}g}"
 
 
+def hertz(f: float | None) -> str:
+    """A frequency in Hz: digits that a test can mean, the same in a column.
+
+    >>> hertz(41.936), hertz(120.0), hertz(1234.5678), hertz(None)
+    ('41.94', '120.00', '1234.6', '–')
+    """
+    if f is None or not math.isfinite(f):
+        return _NONE
+    return f"{f:.{2 if abs(f) < 999.995 else 1}f}"
+
+
+def criterion(value: float | None) -> str:
+    """MAC or CoMAC, three digits after the point.
+
+    >>> criterion(1.0), criterion(0.7049), criterion(None)
+    ('1.000', '0.705', '–')
+    """
+    return _NONE if value is None or not math.isfinite(value) else f"{value:.3f}"
+
+
 def unit_text(unit: str) -> str:
     """A unit with raised digits.
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ..effects.registry import family
+from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .ties import TIED
 
@@ -21,11 +22,8 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     if len(names) < 2:
         return diagnosis
     check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)
-    odds = ", ".join(f"e^{behind[name]:.0f} times {name}" for name in names[1:])
-    note = (
-        f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
-        f"probable as {odds})"
-    )
+    odds = "; ".join(f"{evidence_in_words(behind[name])} against {name}" for name in names[1:])
+    note = f"{best.effect.name} is not told apart by these data: {odds}"
     if not check:
         return replace(diagnosis, one_of=names, notes=(*diagnosis.notes, note))
     note = f"{note}; what would settle it: {check}"

@@ -54,10 +54,10 @@ def left_where(
     if not isinstance(data, Responses) or data.error is None or not len(groups):
         return None
     base = baseline(hypothesis.model, fit.effects, data, mass_measurement, fit.x)
-    bumps = _bumps(groups)
+    local = bumps(groups)
     gain = np.full(len(groups), np.nan)
     for field in ("E", "rho"):
-        columns = field_slopes(base, hypothesis.model, data, field) @ bumps
+        columns = field_slopes(base, hypothesis.model, data, field) @ local
         score = direction_scores(base, columns)[1]
         gained = base.score(base.residual[:, None])[0] - score
         known = (columns**2).sum(axis=0) - ((base.Z @ columns) ** 2).sum(axis=0)
@@ -68,7 +68,7 @@ def left_where(
     return _told(groups, gain)
 
 
-def _bumps(groups: ShellGroups) -> np.ndarray:
+def bumps(groups: ShellGroups) -> np.ndarray:
     """A smooth change round each group, on its own sheet (g, g): one column each."""
     sheet = groups.connected
     area = np.bincount(sheet, groups.area)[sheet]

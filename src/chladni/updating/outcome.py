@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.registry import families
+from ..ema.odds import evidence_in_words
 from ..model.assembly import Assembly
 from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, threshold, verdict
@@ -119,8 +120,8 @@ def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str
     """Calibration alone is refuted by some data, and what refuted it is refused by others."""
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = (
-        f"{lead.effect.name} explains {of} e^{gain / 2:.0f} times better than calibration "
-        "alone, yet not the data that no fit saw"
+        f"{of}: {evidence_in_words(gain / 2)} for {lead.effect.name} against calibration alone; "
+        "the data that no fit saw speak against it"
     )
     fits = FitTest(False, p, what, lead.effect.text)
     note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"

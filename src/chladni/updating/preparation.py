@@ -85,7 +85,7 @@ def _by_responses(question: Question) -> Prepared:
     measured = measured_on(question)
     reduced = reduced_problem(nominal, f_max, measured(built), base=question.base)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
-    lines = [_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
+    lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)
     data, spreads = [], []
@@ -182,7 +182,7 @@ def _upper_part(question: Question, low: float, high: float) -> tuple[float, flo
     return high - 0.2 * (high - low), high
 
 
-def _lines(
+def equalised_lines(
     band: tuple[float, float], exclude: Sequence[tuple[float, float]], zeta: float
 ) -> np.ndarray:
     """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis, threshold
 from .hypothesis_fit import HypothesisFit
 from .joint_fit import JointFit
@@ -48,7 +49,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     ]
     if found is not None:
         gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
-        reason = f"E, rho and t alone are e^{gap:.0f} times less probable"
+        reason = f"{evidence_in_words(gap)} against E, rho and t alone"
         out.append(Alternative("calibration only", -diagnosis.null.neg2_log_evidence / 2, reason))
     return tuple(sorted(out, key=lambda a: -(a.log_evidence or 0.0)))
 
@@ -67,7 +68,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
         return f"as it was fitted it is {best.effect.name} for all these data can tell"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
-        f"e^{gap:.0f} times less probable than {best.effect.name}; leaves "
+        f"{evidence_in_words(gap)} for {best.effect.name} against it; leaves "
         f"{hypothesis.fit.misfit:.0f} of weighted squares, {best.effect.name} "
         f"{best.fit.misfit:.0f}"
     )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from ..errors import ShapeError
@@ -128,9 +129,10 @@ def frequency_ladder(
 
 
 def mac_matrix(
-    path: Path | str, mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str = ""
-) -> Path:
-    """MAC (r, c) in [0, 1] as shaded squares with their values."""
+    path: Path | str, mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str = "",
+    pairs: Sequence[tuple[int, int]] = (),
+) -> Path:  # fmt: skip
+    """MAC (r, c) in [0, 1] as shaded squares with their values; pairs (row, column) are framed."""
     if mac.shape != (len(rows), len(columns)):
         raise ShapeError(f"MAC is {mac.shape}, the labels say {(len(rows), len(columns))}")
     size = 0.42 * max(len(rows), len(columns)) + 1.9
@@ -141,6 +143,8 @@ def mac_matrix(
         if value >= 0.05:
             colour = "white" if value > 0.6 else "#333333"
             ax.text(j, i, f"{100 * value:.0f}", ha="center", va="center", fontsize=7, color=colour)
+    for i, j in pairs:
+        ax.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, fill=False, ec=BEFORE, lw=1.8))
     ax.set_xticks(range(len(columns)), columns, rotation=60, fontsize=8)
     ax.set_yticks(range(len(rows)), rows, fontsize=8)
     ax.set_title(title, loc="left", **TITLE)

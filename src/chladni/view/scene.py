@@ -23,6 +23,7 @@ from .surface import Surface
 _MOTION = "viridis"
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
 _GHOST = 70.0  # degrees of a fold that the undeformed outline shows
+_CORD = "#009e73"
 _LONG = 0.35  # part of the structure's size that a line of that outline must reach
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # above so many faces element edges would only blacken the picture
@@ -48,11 +49,11 @@ def mode_shape(
     frequency :      [Hz]
     """
     seen = seen.without_joints()
-    camera, phi = _for_mode(seen, _real(shape))
+    camera, phi = for_mode(seen, _real(shape))
     figure, (ax,) = _sheets([camera])
-    _swung(ax, seen, phi, camera)
+    swung(ax, seen, phi, camera)
     ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
-    _triad(ax, camera)
+    triad(ax, camera)
     _scale_bar(ax, camera, seen.unit)
     paper.motion_bar(figure, 0.45, 0.15 / figure.get_size_inches()[1], 0.22, _MOTION)
     return paper.save(figure, path)
@@ -73,17 +74,17 @@ def montage(
     seen, r = seen.without_joints(), shapes.shape[2]
     names, columns = list(numbers or range(1, r + 1)), min(columns, r)
     rows, tile = -(-r // columns), 12.0 / columns
-    chosen = [_for_mode(seen, _real(shapes[:, :, k])) for k in range(r)]
-    front = _framed(seen, both_views(seen)[0])
+    chosen = [for_mode(seen, _real(shapes[:, :, k])) for k in range(r)]
+    front = framed(seen, both_views(seen)[0])
     height = rows * (tile / max(front.aspect, 0.7) + 0.32) + 0.5
     figure = Figure(figsize=(12.0, height))
     for k, (camera, phi) in enumerate(chosen):
-        ax = figure.add_axes(_cell(k, rows, columns, 0.5 / height))
-        _swung(ax, seen, phi, camera, edges=len(seen.faces) < _CLUTTER)
+        ax = figure.add_axes(cell(k, rows, columns, 0.5 / height))
+        swung(ax, seen, phi, camera, edges=len(seen.faces) < _CLUTTER)
         ax.set_anchor("N")
         behind = "" if camera.toward @ front.toward > 0 else "  (from behind)"
         ax.set_title(f"{names[k]}    {hertz(frequency[k])}{behind}", fontsize=10)
-        _triad(ax, camera, small=True)
+        triad(ax, camera, small=True)
     paper.motion_bar(figure, 0.42, 0.2 / height, 0.16, _MOTION)
     return paper.save(figure, path, dpi=140)
 
@@ -98,12 +99,12 @@ def mode_gif(
 ) -> Path:
     """One period Re(φ e^{iωt}) that loops without a jump."""
     seen, phi, images = seen.without_joints(), np.asarray(shape), []
-    camera, _ = _for_mode(seen, _real(phi))
+    camera, _ = for_mode(seen, _real(phi))
     for angle in 2 * np.pi * np.arange(frames) / frames:
         figure, (ax,) = _sheets([camera], width=5.0)
-        _swung(ax, seen, np.real(phi * np.exp(1j * angle)), camera, peak=_peak(phi))
+        swung(ax, seen, np.real(phi * np.exp(1j * angle)), camera, peak=_peak(phi))
         ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
-        _triad(ax, camera)
+        triad(ax, camera)
         images.append(paper.pixels(figure))
     return paper.save_gif(images, path)
 
@@ -131,7 +132,7 @@ def scalar_map(
     for ax, camera in zip(axes, cameras, strict=True):
         draw(ax, seen, camera, Paint(values, (low, high), cmap, len(seen.faces) < _MANY))
         ax.set_anchor("S")
-        _triad(ax, camera)
+        triad(ax, camera)
         _scale_bar(ax, camera, seen.unit)
     if where is not None:
         _circle(axes[0], cameras[0], *where)
@@ -185,21 +186,26 @@ def sensors(
     outputs: Sequence[Marker],
     inputs: Sequence[Marker] = (),
     names: tuple[str, str] = ("sensor", "shaker"),
+    cords: Sequence[Marker] = (),
 ) -> Path:
-    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things."""
-    focus = np.array([m.point for m in (*outputs, *inputs)]).reshape(-1, 3)
+    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things.
+
+    Cords are green and point nowhere.
+    """
+    focus = np.array([m.point for m in (*outputs, *inputs, *cords)]).reshape(-1, 3)
     seen = seen.without_joints()
     figure, (ax,) = _sheets([camera := best_view(seen, focus)])
     draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
-    _triad(ax, camera)
+    triad(ax, camera)
     reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
     for markers, colour, name in (
         (outputs, paper.AFTER, names[0]),
         (inputs, paper.BEFORE, names[1]),
+        (cords, _CORD, "cord"),
     ):
         _arrows(ax, camera, markers, colour, reach, name)
-    if outputs or inputs:
-        ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=2, **paper.LEGEND)
+    if outputs or inputs or cords:
+        ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=3, **paper.LEGEND)
     _scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
@@ -248,25 +254,26 @@ def _sheets(
     ]
 
 
-def _cell(k: int, rows: int, columns: int, foot: float) -> tuple[float, float, float, float]:
+def cell(k: int, rows: int, columns: int, foot: float) -> tuple[float, float, float, float]:
+    """Place (left, low, width, height) of picture k of a grid above a foot, in the figure."""
     i, j = divmod(k, columns)
     row = (1 - foot) / rows
     return (j / columns, 1 - (i + 0.97) * row, 1 / columns, 0.85 * row)
 
 
-def _framed(seen: Surface, camera: Camera) -> Camera:
+def framed(seen: Surface, camera: Camera) -> Camera:
     """The view with room for the swing of a mode."""
     points, swing = seen.points[seen.used], _SWING * seen.size
     reach = [swing * d * s for d in (camera.right, camera.up) for s in (0.5, -0.5)]
     return camera.framing(np.concatenate([points + r for r in reach]), margin=0.02)
 
 
-def _for_mode(seen: Surface, phi: np.ndarray) -> tuple[Camera, np.ndarray]:
+def for_mode(seen: Surface, phi: np.ndarray) -> tuple[Camera, np.ndarray]:
     """The view that shows more of ∫ |u|² dA, and the sign that moves the larger part to the eye.
 
     A sheet that moves away from the eye would vanish behind the one after it.
     """
-    front, back = (_framed(seen, camera) for camera in both_views(seen))
+    front, back = (framed(seen, camera) for camera in both_views(seen))
     if not len(seen.faces):
         return front, phi
     u, middle = phi[seen.faces].mean(axis=1), seen.points[seen.faces].mean(axis=1)
@@ -276,7 +283,7 @@ def _for_mode(seen: Surface, phi: np.ndarray) -> tuple[Camera, np.ndarray]:
     return camera, phi if weight @ camera.depth(u) >= 0 else -phi
 
 
-def _swung(
+def swung(
     ax: Axes,
     seen: Surface,
     shape: np.ndarray,
@@ -338,7 +345,9 @@ def _arrows(
     ax.plot(*uv.T, "o", ms=5, mfc=colour, mec="white", mew=0.7, zorder=6, label=name, clip_on=False)
     for place, arrow, marker in zip(uv, tip, markers, strict=True):
         style = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
-        ax.annotate("", place + arrow, place, arrowprops=style, zorder=6)  # type: ignore[arg-type]
+        ends = (tuple(place + arrow), tuple(place))  # a place on the rim has its arrow, too
+        if any(marker.direction):
+            ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)
         paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
 
 
@@ -356,7 +365,7 @@ def _scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
     ax.set(xlim=(u0, u1), ylim=(v0, v1))
 
 
-def _triad(ax: Axes, camera: Camera, small: bool = False) -> None:
+def triad(ax: Axes, camera: Camera, small: bool = False) -> None:
     """The basic axes as three short lines below the lower right corner."""
     u0, u1, v0, v1 = camera.window
     reach = (0.05 if small else 0.06) * min(u1 - u0, v1 - v0)

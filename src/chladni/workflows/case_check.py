@@ -91,6 +91,9 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 
 
+_NO_RECORDING = "none yet: modes, plan, render and study need none, all other commands do"
+
+
 def _facts(case: Case) -> list[tuple[str, str]]:
     made, mass = case.assembly, mass_properties(case.assembly)[0]
     count = {
@@ -106,6 +109,7 @@ def _facts(case: Case) -> list[tuple[str, str]]:
         ("size", f"{size} m"),
         ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
         *(("recording", said_of(r)) for r in case.recordings),
+        *([] if case.recordings else [("recording", _NO_RECORDING)]),
         ("sensors", f"{len(case.outputs.labels)} outputs, {len(case.inputs.labels)} inputs"),
     ]
     band = "all the recording holds" if case.band is None else "{:g} to {:g} Hz".format(*case.band)

@@ -38,6 +38,14 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
     return FRF(T, f, test.outputs, test.inputs, "transmissibility")
 
 
+def cords(case: Case) -> list["Marker"]:
+    """Hangers for a picture: places without a direction."""
+    from ..view.scene import Marker
+
+    places = case.assembly.points[case.assembly.rows(list(case.setup.hangers))].tolist()
+    return [Marker((x[0], x[1], x[2]), (0.0, 0.0, 0.0)) for x in places]
+
+
 def markers(dofs: MeasuredDofs) -> list["Marker"]:
     """Sensors and shakers for a picture; the base has no place."""
     from ..view.scene import Marker

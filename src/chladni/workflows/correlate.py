@@ -1,6 +1,6 @@
 """Test and model side by side, nothing calibrated: paired modes, MAC, COMAC, Q."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,6 +17,7 @@ from ..ema.shapes import driven_shapes
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
+from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
@@ -43,6 +44,8 @@ class Correlation:
     quality : Q by channel and band, or None
     model : responses of the model on the lines of the recording, or None
     screening : what the recording says of its own faults, alone and against the model
+    numbers : of the model's modes, the rigid ones counted, as in ``f_model``
+    shapes : of the pairs at the sensors, with the model's whole motion; None without FRFs
     """
 
     channels: tuple[str, ...]
@@ -57,6 +60,8 @@ class Correlation:
     model: FRF | None = None
     notes: tuple[str, ...] = ()
     screening: Screening | None = None
+    numbers: tuple[int, ...] = ()
+    shapes: PairedShapes | None = None
 
 
 def correlate(case: Case, progress: Progress = silent) -> Correlation:
@@ -80,8 +85,9 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     f = model.modes.frequency
     inside = ~rigid_modes(model.modes) & (f > RIGID * f_max) & (f <= 1.3 * f_max)
     near = model.modes.sel(np.flatnonzero(inside))
+    numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
-        return _by_poles(case, near)
+        return replace(_by_poles(case, near), numbers=numbers)
     progress("modes of the test", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
@@ -98,7 +104,28 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     return Correlation(
         tuple(f"{o} from {i}" for o in case.outputs.labels for i in case.inputs.labels),
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
-        responses, (*screening.notes, *case.said("correlate"), *notes), screening,
+        responses, (*screening.notes, *case.said("correlate"), *notes), screening, numbers,
+        _paired_shapes(case, model, near, (phi, psi), pairs, found.frequency, numbers),
+    )  # fmt: skip
+
+
+def _paired_shapes(
+    case: Case, model: Modelled, near: ModalModel, at_sensors: tuple[np.ndarray, np.ndarray],
+    pairs: ModePairs, f_test: np.ndarray, numbers: tuple[int, ...],
+) -> PairedShapes:  # fmt: skip
+    """Model shapes of largest entry 1, test shapes turned real and scaled onto them."""
+    phi, psi = at_sensors[0][:, pairs.model], at_sensors[1][:, pairs.test]
+    scale = np.maximum(np.abs(phi).max(axis=0, initial=0.0), 1e-300)
+    phi = phi / scale
+    factor = (psi.conj() * phi).sum(axis=0) / np.maximum((np.abs(psi) ** 2).sum(axis=0), 1e-300)
+    s, q = model.structure, near.shapes[:, pairs.model] / scale
+    motion = (s.T @ q).reshape(len(s.assembly.points), 6, -1)[:, :3]
+    middle, base = s.assembly.points.mean(axis=0), case.outputs.base[:, None]
+    place = np.where(base, middle, case.outputs.points)
+    return PairedShapes(
+        place, case.outputs.directions, (psi * factor).real, phi, np.asarray(motion),
+        f_test[pairs.test], near.frequency[pairs.model], [numbers[i] for i in pairs.model],
+        pairs.mac,
     )  # fmt: skip
 
 

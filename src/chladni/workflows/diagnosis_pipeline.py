@@ -174,10 +174,10 @@ def _deck(
     case: Case, asked: Question, nominal: Modelled, changed: Assembly
 ) -> tuple[ChangedDeck, list[str]]:
     """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
-    if changed is case.assembly:
+    if changed is case.as_deck:
         return ChangedDeck(nominal, ()), []
     try:
-        edits = tuple(changes(case.deck, case.assembly, changed, case.units))
+        edits = tuple(changes(case.deck, case.as_deck, changed, case.units))
         written = written_assembly(case.deck, edits, case.units)
     except (FileError, LabelError, ModelError) as error:
         known = modelled(asked.tested(changed), nominal.band)

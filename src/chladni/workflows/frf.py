@@ -2,22 +2,28 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
+from ..case.sensor_places import ROLES, carried, placed
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift
 from ..errors import FileError
+from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, modelled, node_points
 from ..fem.solve import base_response, inertia_load
+from ..io.tables.sensor_table import read_layout
 from ..model.analysis import Analysis, Subcase
+from ..model.point_masses import with_masses
 from ..progress import Progress, silent
 from .case_model import REACH, model_frf
-from .loaded_model import DeckModels, Model, as_model
+from .loaded_model import DeckModels, Model, as_model, beside
 
+Side = Sequence[str] | MeasuredDofs  # outputs, or inputs
 MOST, NAMED = 1200, 12  # dofs a deck may ask for at once; loaded ones taken in their stead
 
 
@@ -31,8 +37,8 @@ class FrequencyResponses:
 
 def frf(
     source: Case | Model | DeckModels,
-    outputs: Sequence[str] = (),
-    inputs: Sequence[str] = (),
+    outputs: Side = (),
+    inputs: Side = (),
     frequency: np.ndarray | None = None,
     damping: float = 0.01,
     progress: Progress = silent,
@@ -42,7 +48,8 @@ def frf(
     Parameters
     ----------
     source : a case (lines and places of its recording), a deck (its own loads), or a model
-    outputs, inputs : labels as 55:+Z, 12:n or base:+Z; without inputs those of the source
+    outputs, inputs : labels as 55:+Z, 12:n or base:+Z, or places as ``placed_layout`` makes them;
+        without inputs those of the source
     frequency : (n_f,) [Hz]     with inputs
     damping : ratio of every mode, where the case gives none
 
@@ -51,8 +58,8 @@ def frf(
     FileError
         If there is nothing to tell where it is driven and where it answers.
     """
-    if inputs:
-        if frequency is None or not outputs:
+    if _labels(inputs):
+        if frequency is None or not _labels(outputs):
             raise FileError("--input needs at least one --output, as --output 55:+Z")
         model = as_model(source)
         found = _between(model, outputs, inputs, np.asarray(frequency, float), damping, progress)
@@ -60,7 +67,7 @@ def frf(
     if isinstance(source, Case):
         return _of_recording(source, damping, progress)
     if isinstance(source, DeckModels):
-        return _of_deck(source, outputs, progress)
+        return _of_deck(source, _labels(outputs), progress)
     raise FileError(f"{source.source}: give --input and --output, as --input 12:+Z")
 
 
@@ -77,8 +84,40 @@ def _of_recording(case: Case, damping: float, progress: Progress) -> FrequencyRe
     return FrequencyResponses((model_frf(case, model, ratio, test),), (note, *case.said("frf")))
 
 
+def _labels(side: Side) -> tuple[str, ...]:
+    return side.labels if isinstance(side, MeasuredDofs) else tuple(side)
+
+
+def placed_layout(model: Model, path: Path) -> tuple[Model, MeasuredDofs, MeasuredDofs]:
+    """The model with the sensors of a layout on it, its outputs and its inputs.
+
+    Parameters
+    ----------
+    path : a table of sensors, or ``plan.json``
+
+    Raises
+    ------
+    FileError, LabelError
+        If it is no layout, or a place is not on the model.
+    """
+    if not path.is_file():
+        raise FileError(f"no file {path}{beside(path)}")
+    sensors = read_layout(path)
+    outputs, inputs = (
+        placed(model.assembly, [s for s in sensors if s.role == role], path.name) for role in ROLES
+    )
+    if outputs.base.any() or inputs.base.any():
+        raise FileError(f"{path}: give a moving base as --input base:+Z")
+    if not (masses := carried(model.assembly, outputs, inputs)):
+        return model, outputs, inputs
+    grids, m = zip(*masses, strict=True)
+    said = f"Sensors of {1e3 * sum(m):.3g} g in all ({path.name}) are on the model."
+    loaded = with_masses(model.assembly, grids, np.array(m))
+    return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
+
+
 def _between(
-    model: Model, outputs: Sequence[str], inputs: Sequence[str], frequency: np.ndarray,
+    model: Model, outputs: Side, inputs: Side, frequency: np.ndarray,
     damping: float, progress: Progress,
 ) -> FrequencyResponses:  # fmt: skip
     """Receptance by modes up to ``REACH`` times the band and the static rest of the others."""
@@ -94,30 +133,35 @@ def _between(
     return FrequencyResponses((found,), (note,))
 
 
-def refuse_unknown(model: Model, outputs: Sequence[str], inputs: Sequence[str]) -> None:
+def refuse_unknown(model: Model, outputs: Side, inputs: Side) -> None:
     """Refuse ends the model does not have, and a moving base beside other inputs."""
-    bases = [text for text in inputs if text.startswith("base:")]
-    if bases and len(inputs) > 1:
+    bases = [text for text in _labels(inputs) if text.startswith("base:")]
+    if bases and len(_labels(inputs)) > 1:
         raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
     for side in (outputs,) if bases else (outputs, inputs):
-        model.directions(side)
+        if not isinstance(side, MeasuredDofs):
+            model.directions(side)
 
 
 def superposed(
-    model: Model, made: Modelled, outputs: Sequence[str], inputs: Sequence[str],
+    model: Model, made: Modelled, outputs: Side, inputs: Side,
     frequency: np.ndarray, damping: float,
 ) -> FRF:  # fmt: skip
     """Receptance of solved modes, up to ``REACH`` times the band, and the static rest of others."""
-    if inputs[0].startswith("base:"):
-        return _from_base(made, outputs, inputs, frequency, damping)
+    names_o, names_i = _labels(outputs), _labels(inputs)
+    if names_i[0].startswith("base:"):
+        return _from_base(made, names_o, names_i, frequency, damping)
     s, modal = made.structure, made.modes.with_damping(damping)
-    pick, load = (model.directions(side).T.toarray() for side in (outputs, inputs))
+    pick, load = (
+        (side.rows(s) if isinstance(side, MeasuredDofs) else model.directions(side)).T.toarray()
+        for side in (outputs, inputs)
+    )
     shift = residual_shift(modal, frequency[-1])
     rest = residual_flexibility(s.system, modal, pick, load, points=model.places, shift=shift)
     phi_o, phi_i = pick.T @ modal.shapes, load.T @ modal.shapes
     loss = sp.csr_array(s.hysteretic().K.imag)
     H = coupled_receptance(modal, phi_o, phi_i, frequency, V=s.system.V, loss=loss, residual=rest)
-    return FRF(H, frequency, tuple(outputs), tuple(inputs))
+    return FRF(H, frequency, names_o, names_i)
 
 
 def _from_base(

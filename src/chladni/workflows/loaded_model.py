@@ -84,8 +84,8 @@ class Model:
 
 
 def load_model(
-    source: Path,
-    units: str | None = None,
+    source: str | Path,
+    units: str | Units | None = None,
     allow: Sequence[str] = (),
     subcase: int | None = None,
     command: str = "modes",
@@ -97,6 +97,7 @@ def load_model(
     FileError
         If there is no such file, or it is no deck and no case.
     """
+    source = Path(source)
     if not source.exists():
         raise FileError(f"no file or folder {source}{beside(source)}")
     if is_case(source):
@@ -143,7 +144,9 @@ def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Mod
     return Model(source.path, source.assembly, "m", notes, units.length, units, source.deck)
 
 
-def load_deck(source: Path, units: str | None = None, allow: Sequence[str] = ()) -> DeckModels:
+def load_deck(
+    source: Path, units: str | Units | None = None, allow: Sequence[str] = ()
+) -> DeckModels:
     """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
     from ..io.nastran import read_deck
 

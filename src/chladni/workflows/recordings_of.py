@@ -7,7 +7,7 @@ from ..errors import FileError
 from .loaded_model import beside, is_case
 
 
-def load_recordings(source: Path, quantity: str | None = None) -> tuple[Recording, ...]:
+def load_recordings(source: str | Path, quantity: str | None = None) -> tuple[Recording, ...]:
     """The recordings of a file, or all of a case.
 
     Raises
@@ -17,6 +17,7 @@ def load_recordings(source: Path, quantity: str | None = None) -> tuple[Recordin
     """
     from ..io.tables.read_tables import read_recordings
 
+    source = Path(source)
     if not source.exists():
         raise FileError(f"no file or folder {source}{beside(source)}")
     if is_case(source):

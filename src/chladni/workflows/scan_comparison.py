@@ -1,15 +1,14 @@
 """How far the sheets of a model are from a scan of the part."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import FileError
-from ..geometry.cells import point_means
-from ..geometry.facets import cell_areas, point_normals
-from ..geometry.formed_mesh import FormedMesh
+from ..geometry.facets import cell_areas
 from ..geometry.nearest import ShellSurface
-from ..geometry.thickness_alignment import Alignment, align, moved
+from ..geometry.scan_alignment import align_scan, as_sheet
+from ..geometry.thickness_alignment import Alignment, moved
 from ..io.scanned_surface import ScannedSurface
 from ..model.assembly import Assembly
 
@@ -61,8 +60,8 @@ def compare_with_scan(
     """
     if not len(assembly.shells):
         raise FileError("the model has no shells to compare with a scan")
-    formed = _as_formed(scan)
-    fit = _aligned(assembly, formed) if aligned else None
+    formed = as_sheet(scan.points, scan.cells)
+    fit = align_scan(assembly, formed) if aligned else None
     points = scan.points if fit is None else moved(formed, fit).points
     middle = assembly.points[assembly.shells.nodes].mean(axis=1)
     away = ShellSurface.over("the scan", points, scan.cells).feet(middle).distance
@@ -77,15 +76,6 @@ def compare_with_scan(
     return ScanComparison(off, _by_part(assembly, middle, off), fit)
 
 
-def _aligned(assembly: Assembly, scan: FormedMesh) -> Alignment:
-    """The best of three: the scan lies on one face of the sheets, on the other, or on both."""
-    shells, n = assembly.shells, len(assembly.points)
-    t = np.nan_to_num(point_means(shells.nodes, shells.thickness, n))[:, None]
-    face = t / 2 * point_normals(assembly.points, shells.nodes)
-    sides = (replace(assembly, points=assembly.points + s * face) for s in (0.0, 1.0, -1.0))
-    return min((align(side, scan) for side in sides), key=lambda fit: fit.residual)
-
-
 def _by_part(assembly: Assembly, middle: np.ndarray, off: np.ndarray) -> tuple[PartDistance, ...]:
     area, out = cell_areas(assembly.points, assembly.shells.nodes), []
     for part in np.unique(assembly.shells.part[np.isfinite(off)]):
@@ -98,10 +88,3 @@ def _by_part(assembly: Assembly, middle: np.ndarray, off: np.ndarray) -> tuple[P
         covered, name = float(area[rows].sum() / area[own].sum()), assembly.parts[part].name
         out.append(PartDistance(name, covered, half, most, float(off[rows[-1]]), (x, y, z)))
     return tuple(sorted(out, key=lambda p: (-round(p.covered, 3), p.most)))
-
-
-def _as_formed(scan: ScannedSurface) -> FormedMesh:
-    """A scan as the mesh of a sheet whose thickness is not known."""
-    n, m = len(scan.points), len(scan.cells)
-    unknown = np.full((m, 4), np.nan)
-    return FormedMesh(np.arange(1, n + 1), scan.points, scan.cells, np.ones(m, int), unknown)

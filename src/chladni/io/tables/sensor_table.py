@@ -1,7 +1,8 @@
 """The table of sensors and exciters: where each sits, which way it points, what it weighs (SI)."""
 
+import json
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -36,6 +37,42 @@ def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
             )
         seen[key] = table.line[k]
     return sensors
+
+
+def read_layout(path: Path) -> tuple[Sensor, ...]:
+    """Sensors and exciters of a table, or of ``plan.json``: its sensors and its shakers.
+
+    Raises
+    ------
+    FileError
+        If it is neither, or names no exciter or no sensor.
+    """
+    found = _planned(path) if path.suffix.lower() == ".json" else read_sensors(path)
+    for role in get_args(Role):
+        if not any(s.role == role for s in found):
+            raise FileError(f"{path} names no {role}; a layout has sensors and what drives them")
+    return found
+
+
+def _planned(path: Path) -> tuple[Sensor, ...]:
+    try:
+        plan = json.loads(path.read_text(encoding="utf-8"))
+        shakers = plan["actuators_together"] or plan["actuators"][:1]
+        outputs = [_of_plan(at, "output") for at in plan["sensors"]]
+        return (*outputs, *(_of_plan(at, "input") for at in shakers))
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise FileError(f"{path} is no plan.json of chladni plan ({error})") from error
+
+
+def _of_plan(at: dict[str, Any], role: Role) -> Sensor:
+    """A place of a plan; where it is no grid its point counts."""
+    label, grid, mass = str(at["label"]), at["grid"], float(at.get("mass_kg", 0.0))
+    way = direction(np.array(at["direction"], dtype=float).reshape(3), label)
+    if grid is not None:
+        return Sensor(label, int(grid), None, way, role, mass)
+    return Sensor(label, None, np.array(at["point_m"], dtype=float).reshape(3), way, role, mass)
 
 
 def _sensor(table: CsvTable, k: int) -> Sensor:

@@ -9,7 +9,8 @@ import numpy as np
 from ....errors import ModelError
 from ....model.assembly import Assembly, Shells
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
-from ....units import UNITS, Units
+from ....units import Units
+from ....units import units as unit_system
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .added_elements import added_cards, free_system
 from .changes import Change
@@ -20,7 +21,9 @@ from .split_properties import section_changes, split_changes, with_new_propertie
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
 
-def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) -> list[Change]:
+def changes(
+    deck: Deck, before: Assembly, after: Assembly, units: Units | str | None
+) -> list[Change]:
     """Edits of the deck: materials, properties, thickness, joints and masses that differ.
 
     Raises
@@ -28,7 +31,7 @@ def changes(deck: Deck, before: Assembly, after: Assembly, units: Units | None) 
     ModelError
         If the two differ in something no card here can say.
     """
-    units = units or UNITS["SI"]
+    units = unit_system(units or "SI")
     out: list[Change] = []
     before, after, split = with_new_properties(deck, before, after)
     free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))

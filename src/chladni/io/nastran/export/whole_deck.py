@@ -7,7 +7,8 @@ import numpy as np
 
 from ....model.assembly import Assembly, Scalars
 from ....output import write_text
-from ....units import UNITS, Units
+from ....units import Units
+from ....units import units as unit_system
 from ..text.format import card
 from . import part_cards, tie_cards
 from .numbering import Ids, Systems
@@ -17,13 +18,13 @@ _SHELL = ("CQUAD4", "CTRIA3")
 
 
 def write_assembly(
-    assembly: Assembly, path: Path | str, units: Units | None = None, count: int = 40
+    assembly: Assembly, path: Path | str, units: Units | str | None = None, count: int = 40
 ) -> Path:
     """Write a deck (SOL 103, ``count`` modes) in a unit system, SI unless given.
 
     Part names stand in ANSA's comments; element ids that occur twice are numbered anew.
     """
-    units = UNITS["SI"] if units is None else units
+    units = unit_system("SI" if units is None else units)
     ids, systems = Ids(assembly), Systems(assembly)
     body = [
         *_points(assembly, units, systems),

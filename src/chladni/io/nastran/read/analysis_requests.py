@@ -35,7 +35,7 @@ STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the fr
 )  # fmt: skip
 
 
-def analysis(deck: Deck, units: Units | None = None) -> Analysis:
+def analysis(deck: Deck, units: Units | str | None = None) -> Analysis:
     """Everything in the deck beside the structure, in SI (or its own numbers, without units)."""
     ctx = context(deck, units)
     static, moved = loads(ctx), motions(ctx)

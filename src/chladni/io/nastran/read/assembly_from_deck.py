@@ -24,13 +24,13 @@ _ELEMENTS = """CQUAD4 CQUADR CQUAD1 CQUAD2 CTRIA3 CTRIAR CTRIA1 CTRIA2 CHEXA CPE
 
 
 def assembly(
-    deck: Deck, units: Units | None = None, subcase: int | None = None, loose: bool = False
+    deck: Deck, units: Units | str | None = None, subcase: int | None = None, loose: bool = False
 ) -> Assembly:
     """The structure a deck describes.
 
     Parameters
     ----------
-    units : the deck's unit system; None keeps its numbers as they are
+    units : the deck's unit system or its name; None keeps its numbers as they are
     subcase : whose SPC and MPC sets hold; the first that selects any unless given
     loose : accept parts that hang on nothing
 

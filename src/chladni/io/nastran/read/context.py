@@ -6,6 +6,7 @@ import numpy as np
 
 from ....errors import FileError
 from ....units import Units
+from ....units import units as unit_system
 from ..text.deck import Deck
 from ..text.numbers import parse_real
 from ..text.table import Cards
@@ -130,14 +131,15 @@ def real_parameter(deck: Deck, name: str, default: float) -> float:
     return value
 
 
-def context(deck: Deck, units: Units | None) -> Context:
+def context(deck: Deck, units: Units | str | None) -> Context:
     """Points and factors of a deck; without units its numbers are kept."""
     weight = real_parameter(deck, "WTMASS", 1.0)
     if not weight > 0:
         raise FileError(f"{deck.path}: PARAM,WTMASS is {weight:g}; it scales mass, so it is > 0")
     scale = Scale(weight=weight)
     if units is not None:
-        scale = Scale(units.length, units.mass, units.time, weight)
+        system = unit_system(units)
+        scale = Scale(system.length, system.mass, system.time, weight)
     default = deck["GRDSET"]
     cp, cd = (int(default.integers(k, 0)[0]) if len(default) else 0 for k in (2, 6))
     return _points(deck, scale, Frames(deck, cp), cp, cd)

@@ -19,8 +19,8 @@ def read_op2_modes(path: Path | str) -> PunchModes:
     FileError
         If pyYeti is absent, or the file holds no eigenvectors it can read.
     """
-    tables = _read(path, "op2")["mats"].get("ougv1") or []
-    modal = [t for t in tables if "lambda" in t]
+    tables = (_read(path, "op2").get("mats") or {}).get("ougv1") or []
+    modal = [t for t in tables if t is not None and "lambda" in t]
     if not modal:
         raise FileError(f"{path} holds no eigenvectors (OUGV1)")
     dofs, phi = np.asarray(modal[0]["dof"], np.int64), np.asarray(modal[0]["ougv1"])

@@ -1,0 +1,93 @@
+"""Thickness of sheets from a scan of both their faces.
+
+From a place x of the shells, half a gauge or more inside of neither face, the upper face is looked
+for from x + t₀ n and the lower from x - t₀ n (t₀ the gauge, n the shell's normal): the thickness is
+the distance of the two feet along n. Where the shells lie between the faces does not matter as long
+as they are less than t₀ off the middle.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.assembly import Assembly
+from .nearest import ShellSurface
+from .thickness_mapping import (
+    FACING,
+    Mapped,
+    PartMapping,
+    area_mean,
+    completed,
+    samples,
+    shell_area,
+    shell_mass,
+)
+
+THINNEST, THICKEST = 0.3, 1.7  # of the gauge: what lies outside is another face, or none
+LEAST_COVERED = 0.05  # of the area: an open scan finds hardly two faces
+
+
+def thickness_of_scan(assembly: Assembly, points: np.ndarray, cells: np.ndarray) -> Mapped:
+    """The assembly with the thickness of a scan (n, 3), (m, 4) at its shells' corners [m].
+
+    A part's ``distance_95`` is how far its shells are from the middle of the sheet. What has no
+    two faces keeps its thickness.
+
+    Raises
+    ------
+    ModelError
+        If hardly any shell lies between two faces of the scan.
+    """
+    shells = assembly.shells
+    at, normal = samples(assembly.points, shells.nodes)
+    gauge = np.repeat(assembly.thickness(), 4)
+    surface = ShellSurface.over("the scan", points, cells)
+    found, off = _between(surface, at.reshape(-1, 3), np.repeat(normal, 4, axis=0), gauge)
+    corner = completed(found.reshape(-1, 4))
+    seen = np.isfinite(corner).all(axis=1)
+    area = shell_area(assembly)
+    if area[seen].sum() < LEAST_COVERED * area.sum():
+        raise ModelError(
+            f"{100 * area[seen].sum() / area.sum():.1f} % of the shells lie between two faces of "
+            "the scan; a thickness needs a scan of both faces, aligned with the deck and in its "
+            "unit of length"
+        )
+    t = np.where(seen[:, None], corner, shells.thickness)
+    after = replace(assembly, shells=replace(shells, thickness=t))
+    present = np.unique(shells.part[seen]).tolist()
+    parts = (_report(assembly, after, p, seen, off.reshape(-1, 4)) for p in present)
+    return Mapped(after, tuple(parts))
+
+
+def _between(
+    surface: ShellSurface, at: np.ndarray, normal: np.ndarray, gauge: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Thickness at each place, NaN where there are no two faces, and the middle's distance."""
+    height = []
+    for side in (1.0, -1.0):
+        start = at + side * gauge[:, None] * normal
+        foot = surface.feet(start, normal, FACING)
+        away = np.einsum("nk,nk->n", foot.place - at, normal)
+        height.append(np.where(foot.distance <= gauge, away, np.nan))
+    t, off = height[0] - height[1], np.abs(height[0] + height[1]) / 2
+    ok = (THINNEST * gauge < t) & (t < THICKEST * gauge)
+    return np.where(ok, t, np.nan), np.where(ok, off, np.nan)
+
+
+def _report(
+    before: Assembly, after: Assembly, part: int, seen: np.ndarray, off: np.ndarray
+) -> PartMapping:
+    rows = np.flatnonzero(before.shells.part == part)
+    area = shell_area(before)[rows]
+    close = off[rows][np.isfinite(off[rows])]
+    return PartMapping(
+        before.parts[part].name,
+        "both faces",
+        float(area[seen[rows]].sum() / area.sum()),
+        float(np.percentile(close, 95)),
+        area_mean(after, rows),
+        float(shell_mass(before)[rows].sum()),
+        float(shell_mass(after)[rows].sum()),
+        float("nan"),
+    )

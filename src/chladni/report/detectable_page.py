@@ -1,0 +1,74 @@
+"""The smallest findings of a layout: a table, a map, JSON."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..updating.detectable import Detectable
+from ..workflows.loaded_model import Model, on_faces
+from .blocks import Block, Picture, Section, Table
+from .words import number, quantity
+
+_HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")
+_CAPTION = (
+    "Predicted from the model alone: the smallest mass at one place, softening (share of E) and "
+    "thinning (share of t) over a tenth of the sheet's size that a diagnosis would name, with E, "
+    "rho and t of the parts free, an error of the model's form of 1 % and noise of {noise:.2g} % "
+    "of |H|. A finding must lower -2 ln p by {due:.0f}: the threshold of a diagnosis and the "
+    "places tried. Nowhere found: share of the places where 30 % of the mass, or 90 % of E or t, "
+    "would not do."
+)
+
+
+def detectable_section(folder: Path, model: Model, found: Detectable, noise: float) -> Section:
+    """The section of the page; its picture ``smallest_mass.png`` is written into the folder."""
+    from ..view import scene
+
+    rows = [
+        ("mass", *_row(found.mass, lambda x: quantity(x, "kg"))),
+        ("softening", *_row(found.softer, _percent)),
+        ("thinning", *_row(found.thinner, _percent)),
+    ]
+    caption = _CAPTION.format(noise=100 * noise, due=found.due)
+    blocks: list[Block] = [Table(_HEADS, rows, ("what",), caption=caption)]
+    grams = on_faces(model.seen, 1e3 * _of_shells(model, found))
+    name = "smallest mass that would be found"
+    limits = scene.usual_limits(model.seen, grams)
+    path = scene.scalar_map(
+        folder / "smallest_mass.png", model.seen, grams, name, "g", "YlOrRd", limits
+    )
+    return Section("What this layout would find", [*blocks, Picture(path)])
+
+
+def detectable_json(found: Detectable) -> dict[str, Any]:
+    """``smallest.json``: place by place."""
+    return {
+        "due": found.due,
+        "mass": [
+            {"grid": g, "point_m": x, "mass_kg": m}
+            for g, x, m in zip(found.grids, found.points, found.mass, strict=True)
+        ],
+        "softening": found.softer,
+        "thinning": found.thinner,
+    }
+
+
+def _row(values: np.ndarray, said: Any) -> tuple[str, ...]:
+    known = values[np.isfinite(values)]
+    share = f"{100 * (1 - len(known) / max(len(values), 1)):.0f} %"
+    if not len(known):
+        return "–", "–", "–", share
+    return (*(said(float(np.quantile(known, q))) for q in (0, 0.5, 1)), share)
+
+
+def _percent(x: float) -> str:
+    return f"{number(100 * x, 2)} %"
+
+
+def _of_shells(model: Model, found: Detectable) -> np.ndarray:
+    """Smallest mass of the place nearest to each shell (m,) [kg]."""
+    middle = model.assembly.points[model.assembly.shells.nodes].mean(axis=1)
+    near = cKDTree(found.points).query(middle, min(3, len(found.points)))[1]
+    return np.asarray(found.mass[near].reshape(len(middle), -1).mean(axis=1))

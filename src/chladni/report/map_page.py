@@ -1,0 +1,116 @@
+"""A mapped thickness as a page: what each part became, how well it is known, where it changed."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..view.surface import surface
+from ..workflows.loaded_model import on_faces
+from ..workflows.map import MappedDeck
+from .blocks import Block, Facts, PageParts, Picture, Section, Table
+from .words import number
+
+_HEADS = ("part", "taken from", "covered [%]", "95 % within [mm]", "mean t [mm]", "mass [kg]",
+          "was [kg]", "error of t [%]")  # fmt: skip
+_CAPTION = (
+    "Covered: share of the area that found its sheet; 95 % within: how far that sheet was; error "
+    "of t: thickness mapped onto the deck and back, against what the file holds, rms. Shells that "
+    "found nothing keep the deck's thickness."
+)
+_GUESS = (
+    "Thinning guessed from curvature. Left out and guessed from the others, a part's thickness is "
+    "off by so much; the last column is what keeping the gauge would have cost. A part drawn "
+    "deeper than all of them thins more than they let expect."
+)
+
+
+def map_page(folder: Path, found: MappedDeck) -> PageParts:
+    """Sections of the page; its pictures are written into the folder."""
+    from ..view import scene
+
+    seen, t = surface(found.after), found.after.thickness()
+    change = 100 * (t / found.before.thickness() - 1)
+    after = scene.thickness_map(folder / "thickness.png", seen, on_faces(seen, t))
+    changed = scene.scalar_map(
+        folder / "change.png", seen, on_faces(seen, change), "change of thickness", "%", "YlGnBu_r",
+        scene.usual_limits(seen, on_faces(seen, change)),
+    )  # fmt: skip
+    was, now = found.mass
+    facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]
+    blocks: list[Block] = [Facts(facts), Picture(after), Picture(changed), _parts(found)]
+    sections = [Section("Thickness", blocks)]
+    if found.thinning is not None:
+        sections.append(Section("Parts the file lacks", _guessed(found)))
+    files = [("thickness.png", "thickness"), ("change.png", "change of thickness")]
+    return PageParts(_lead(found), sections, found.notes, files)
+
+
+def _lead(found: MappedDeck) -> str:
+    parts, (was, now) = found.found.mapped.parts, found.mass
+    errors = [p.round_trip for p in parts if np.isfinite(p.round_trip)]
+    known = f"; error of the mapping {100 * max(errors):.2g} % rms at most" if errors else ""
+    return (
+        f"{found.found.source.name} mapped onto {len(parts)} parts: the sheets go from "
+        f"{number(was)} to {number(now)} kg ({100 * (now / was - 1):+.1f} %){known}."
+    )
+
+
+def _parts(found: MappedDeck) -> Table:
+    rows = [
+        (
+            p.part,
+            p.source,
+            f"{100 * p.coverage:.1f}",
+            f"{1e3 * p.distance_95:.2f}",
+            f"{1e3 * p.mean:.3f}",
+            number(p.mass_after),
+            number(p.mass_before),
+            f"{100 * p.round_trip:.2f}" if np.isfinite(p.round_trip) else "–",
+        )
+        for p in found.found.mapped.parts
+    ]
+    return Table(_HEADS, rows, words=("part", "taken from"), caption=_CAPTION)
+
+
+def _guessed(found: MappedDeck) -> list[Block]:
+    model = found.thinning
+    assert model is not None
+    known = [
+        (name, f"{100 * model.left_out[name]:.1f}", f"{100 * model.trivial[name]:.1f}")
+        for name in model.left_out
+    ]
+    guessed = [(name, f"{100 * sd:.1f}") for name, sd in (found.guessed or {}).items()]
+    out: list[Block] = []
+    if guessed:
+        out.append(Table(("guessed part", "standard deviation [%]"), guessed, ("guessed part",)))
+    heads = ("part", "guess is off [%]", "gauge is off [%]")
+    return [*out, Table(heads, known, ("part",), caption=_GUESS)]
+
+
+def map_json(found: MappedDeck) -> dict[str, Any]:
+    """``mapping.json``."""
+    fit, model = found.found.alignment, found.thinning
+    return {
+        "source": found.found.source.name,
+        "parts": [asdict(p) for p in found.found.mapped.parts],
+        "mass_before_kg": found.mass[0],
+        "mass_after_kg": found.mass[1],
+        "alignment": None
+        if fit is None
+        else {
+            "rotation": fit.rotation,
+            "shift_m": fit.shift,
+            "residual_m": fit.residual,
+            "mirrored": fit.mirrored,
+            "start": fit.start,
+        },
+        "guessed": None
+        if model is None
+        else {
+            "relative_sd": dict(found.guessed or {}),
+            "left_out_rms": model.left_out,
+            "gauge_rms": model.trivial,
+        },
+    }

@@ -1,0 +1,97 @@
+"""Modes of a model beside those of another program, as a page."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..workflows.loaded_model import Model
+from ..workflows.other_modes import OtherModes
+from .blocks import Block, PageParts, Picture, Section, Table
+from .words import criterion, hertz
+
+_SHOWN = 12  # shapes in a picture
+_MOST = 60  # modes of a MAC matrix that can be read
+_HEADS = ("its mode", "its [Hz]", "model's mode", "model's [Hz]", "off", "MAC", "in the span")
+_CAPTION = (
+    "In the span: share of its shape that the model's modes within 1 % of its frequency can make "
+    "up. Modes of one frequency may mix, so that each MAC is low and this is 1."
+)
+
+
+def other_modes_page(folder: Path, model: Model, found: OtherModes) -> PageParts:
+    """Sections of the page; its pictures are written into the folder."""
+    from ..view import plots
+    from ..view.scene import montage
+
+    blocks: list[Block] = [_table(found)]
+    files = []
+    if max(found.mac.shape) <= _MOST:
+        rows, columns = ([hertz(f) for f in side] for side in (found.f_other, found.f_model))
+        title = f"MAC [%]: {found.source.name} (rows), model (columns), pairs framed"
+        pairs = list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True))
+        path = plots.mac_matrix(folder / "mac.png", found.mac.T, rows, columns, title, pairs)
+        blocks.append(Picture(path))
+        files.append(("mac.png", "MAC"))
+    sections, notes = [Section("Modes", blocks)], list(found.notes)
+    if found.whole:
+        path, count = folder / "shapes.png", slice(_SHOWN)
+        f, names = found.f_other[count], found.numbers_other[count]
+        montage(path, model.seen, found.shapes[:, :, count], f, numbers=names)
+        sections.append(Section(f"Shapes of {found.source.name}", [Picture(path)]))
+        files.append(("shapes.png", f"shapes of {found.source.name}"))
+    else:
+        notes.append("The file does not move every grid of the model, so its shapes are not drawn.")
+    return PageParts(_lead(found), sections, notes, files)
+
+
+def _lead(found: OtherModes) -> str:
+    p, count = found.pairs, len(found.f_other)
+    if not len(p):
+        return f"None of the {count} elastic modes of {found.source.name} has a partner."
+    off = np.abs(found.f_model[p.model] / found.f_other[p.test] - 1)
+    alike = np.maximum(p.mac, found.in_span[p.test])
+    return (
+        f"{len(p)} of {count} elastic modes of {found.source.name} have a partner in the model; "
+        f"frequencies are {100 * float(off.max()):.2g} % off at most, MAC is "
+        f"{criterion(alike.min())} at least, close modes taken together."
+    )
+
+
+def _table(found: OtherModes) -> Table:
+    """Every elastic mode of the file, and its partner where it has one."""
+    p = found.pairs
+    found_for = zip(p.model.tolist(), p.mac.tolist(), strict=True)
+    partner = dict(zip(p.test.tolist(), found_for, strict=True))
+    rows = []
+    for j, (number, f) in enumerate(zip(found.numbers_other, found.f_other, strict=True)):
+        i, value = partner.get(j, (None, None))
+        own = ("–", "–", "–")
+        if i is not None:
+            off = f"{100 * (found.f_model[i] / f - 1):+.2g} %"
+            own = (str(found.numbers_model[i]), hertz(found.f_model[i]), off)
+        rows.append((str(number), hertz(f), *own, criterion(value), criterion(found.in_span[j])))
+    return Table(_HEADS, rows, caption=_CAPTION)
+
+
+def other_modes_json(found: OtherModes) -> dict[str, Any]:
+    """``correlation.json`` of two sets of normal modes."""
+    p, f, other = found.pairs, found.f_model, found.f_other
+    return {
+        "source": found.source.name,
+        "grids": found.grids,
+        "modes": [
+            {
+                "other_mode": found.numbers_other[j],
+                "other_hz": other[j],
+                "model_mode": found.numbers_model[i],
+                "model_hz": f[i],
+                "deviation": f[i] / other[j] - 1,
+                "mac": value,
+                "in_span": found.in_span[j],
+            }
+            for i, j, value in zip(p.model, p.test, p.mac, strict=True)
+        ],
+        "alone_other_hz": other[p.alone_test],
+        "alone_model_hz": f[p.alone_model],
+    }

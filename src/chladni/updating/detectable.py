@@ -1,0 +1,125 @@
+"""The smallest mass, softening and thinning a layout would find, before anything is measured.
+
+The recording is taken to be the model's own responses. A change is found when it lowers -2 ln p by
+more than naming asks of a finding: the threshold of a diagnosis and, because its place is unknown,
+2 ln of the places tried. -2 ln p is that of a diagnosis, with E, rho and t of the parts, scatter
+within them, the error of the model's form and the weighing in the covariance (``scan``), so that
+what calibration could take up is not counted. Held-out data are counted with the rest.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.modelled import modelled
+from .diagnosis import threshold
+from .left_where import bumps
+from .likelihood import LN10, Responses
+from .preparation import (
+    SOLVED,
+    ZETA,
+    carrying,
+    equalised_lines,
+    freed_by,
+    measured_on,
+    nuisances,
+    updating_problem,
+)
+from .question import Question
+from .reduced_model import evaluate
+from .reduced_problem import reduced_problem
+from .scan import baseline, field_slopes, point_scores
+
+NOISE = 0.01  # of |H|, at every line that is compared
+MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
+MOST = 0.9  # of stiffness or thickness: what takes more is not found
+
+
+@dataclass(frozen=True, eq=False)
+class Detectable:
+    """Smallest findings, place by place; NaN where nothing of a sensible size would be found.
+
+    Attributes
+    ----------
+    grids : (k,) int       places of the mass
+    points : (k, 3) [m]
+    mass : (k,) [kg]
+    softer, thinner : (g,) share of E and of t, over a tenth of the sheet round each group of shells
+    group : (m,) int       group of each shell
+    due : float            drop of -2 ln p at which something is found
+    lines, weight : lines that are compared, mass of the structure [kg]
+    """
+
+    grids: np.ndarray
+    points: np.ndarray
+    mass: np.ndarray
+    softer: np.ndarray
+    thinner: np.ndarray
+    group: np.ndarray
+    due: float
+    lines: int
+    weight: float
+
+
+def detectable(asked: Question, noise: float = NOISE) -> Detectable:
+    """What a test of these sensors, shakers and this band would find of the structure itself.
+
+    Parameters
+    ----------
+    asked : without a recording; its band is what will be measured
+    noise : of |H|, at every line that is compared
+    """
+    low, f_max = asked.band
+    nominal = modelled(asked.tested(asked.assembly), SOLVED * f_max)
+    built = nominal.structure
+    rows = asked.outputs.rows(built), asked.inputs.rows(built)
+    known = sp.csr_array(sp.vstack(rows))
+    reduced = reduced_problem(nominal, f_max, known, base=asked.base)
+    reduced = carrying(reduced, freed_by(asked, reduced, f_max))
+    f = equalised_lines((low, f_max), asked.exclude, ZETA)
+    s = 2 * np.pi * f * (ZETA + 1j)
+    shape = (len(s), len(asked.outputs.labels), len(asked.inputs.labels))
+    unit = Responses(
+        np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
+        noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
+    ).over(reduced.model)  # fmt: skip
+    nuisance = nuisances(reduced, nominal, f_max, measured_on(asked))
+    problem = updating_problem(asked, reduced, unit, nuisance, f_max)
+    x = problem.mean()
+    state = evaluate(reduced.model, problem.base, x)
+    data = replace(unit, values=unit.model(state)).allowing_errors(state)
+    weighed = problem.mass_measurement
+    base = baseline(reduced.model, problem.base, data, weighed, x)
+    places, weight = problem.where.places, problem.setup.weight
+    due = threshold(data) + 2 * float(np.log(len(places)))
+    score = point_scores(
+        base, reduced.model, data, places, "M", weight * MASSES, reduced.flexibility(places)
+    )
+    local = bumps(reduced.groups)
+    shares = []
+    for field in ("E", "t"):
+        columns = field_slopes(base, reduced.model, data, field) @ local
+        told = (columns**2).sum(axis=0) - ((base.Z @ columns) ** 2).sum(axis=0)
+        share = 1 - np.exp(-np.sqrt(due / np.maximum(told, 1e-12)))
+        shares.append(np.where(share < MOST, share, np.nan))
+    gained = score - base.score(base.residual[:, None])[0]
+    return Detectable(
+        places.grids, places.point, weight * _smallest(gained, due), shares[0], shares[1],
+        reduced.groups.group, due, len(f), weight,
+    )  # fmt: skip
+
+
+def _smallest(gained: np.ndarray, due: float) -> np.ndarray:
+    """Smallest of ``MASSES`` whose gain (n_places, n_masses) is due, interpolated; NaN: none."""
+    out = np.full(len(gained), np.nan)
+    for k, gain in enumerate(gained):
+        enough = np.flatnonzero(gain >= due)
+        if not len(enough):
+            continue
+        j = int(enough[0])
+        out[k] = MASSES[0]
+        if j:
+            share = (due - gain[j - 1]) / (gain[j] - gain[j - 1])
+            out[k] = MASSES[j - 1] * (MASSES[j] / MASSES[j - 1]) ** share
+    return out

@@ -1,0 +1,39 @@
+"""What a picture of paired modes shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class PairedShapes:
+    """Paired modes at the sensors, each scaled to its largest entry, and the model's whole shape.
+
+    Attributes
+    ----------
+    points, directions : (k, 3)  of the sensors [m], unit vectors
+    test, model : (k, r)         real, of the same sign and scale
+    motion : (n, 3, r)           of every point of the model
+    f_test, f_model : (r,)       [Hz]
+    numbers : model's mode numbers
+    mac : (r,)
+    """
+
+    points: np.ndarray
+    directions: np.ndarray
+    test: np.ndarray
+    model: np.ndarray
+    motion: np.ndarray
+    f_test: np.ndarray
+    f_model: np.ndarray
+    numbers: Sequence[int]
+    mac: np.ndarray
+
+    def first(self, count: int) -> "PairedShapes":
+        """The pairs lowest in frequency."""
+        r = slice(count)
+        return PairedShapes(
+            self.points, self.directions, self.test[:, r], self.model[:, r],
+            self.motion[:, :, r], self.f_test[r], self.f_model[r], self.numbers[r], self.mac[r],
+        )  # fmt: skip

@@ -1,0 +1,117 @@
+"""Thickness of a forming simulation or a scan on a deck, with what the mapping is worth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..case.mapped_thickness import FormedThickness, formed_thickness
+from ..errors import FileError
+from ..geometry.thickness_mapping import shell_mass
+from ..geometry.thickness_prior import ThinningModel, learn, predict
+from ..io.nastran.edit.changes import Change
+from ..io.nastran.edit.model_changes import changes
+from ..model.assembly import Assembly
+from ..progress import Progress, silent
+from ..units import Units
+from .loaded_model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class MappedDeck:
+    """A deck with mapped thickness.
+
+    Attributes
+    ----------
+    before, after : Assembly
+    found : FormedThickness       part by part
+    changes : of the deck's cards
+    thinning : what was learned of curvature where parts were guessed, None: nothing was
+    guessed : parts whose thickness is a guess -> its standard deviation over t
+    """
+
+    before: Assembly
+    after: Assembly
+    found: FormedThickness
+    changes: tuple[Change, ...]
+    thinning: ThinningModel | None = None
+    guessed: Mapping[str, float] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def mass(self) -> tuple[float, float]:
+        """Of all shells, before and after [kg]."""
+        before, after = (float(shell_mass(a).sum()) for a in (self.before, self.after))
+        return before, after
+
+
+def map_formed(
+    model: Model,
+    formed: Path,
+    units: Units | None = None,
+    place: str = "as it lies",
+    pairs: Mapping[str, int] | None = None,
+    guess: bool = False,
+    progress: Progress = silent,
+) -> MappedDeck:
+    """Map thickness onto a deck's shells, corner by corner.
+
+    Parameters
+    ----------
+    units : of the formed file, the deck's unless given
+    place : "as it lies", "aligned" or "mirrored"
+    pairs : part of the deck -> part id of the formed mesh
+    guess : give parts the file lacks the thinning their curvature lets expect, as learned from the
+        parts it holds
+
+    Raises
+    ------
+    FileError, ModelError, AccuracyError
+        If the deck has no units, the file lies elsewhere, or fits nothing.
+    """
+    if model.units is None or model.deck is None:
+        raise FileError(f"{model.source}: a thickness needs the deck's unit system (--units)")
+    before = model.assembly
+    progress("mapping", 0.2)
+    found = formed_thickness(before, formed, units or model.units, place, pairs)
+    after, thinning, guessed = found.mapped.assembly, None, None
+    if guess:
+        progress("thinning by curvature", 0.6)
+        after, thinning, guessed = _with_guess(after, {p.part for p in found.mapped.parts})
+    progress("cards", 0.8)
+    edits = tuple(changes(model.deck, before, after, model.units))
+    notes = (*model.notes, *found.said(), *_not_mapped(after, found, guessed))
+    return MappedDeck(before, after, found, edits, thinning, guessed, notes)
+
+
+def _with_guess(
+    made: Assembly, mapped: set[str]
+) -> tuple[Assembly, ThinningModel, dict[str, float]]:
+    """Shells of the other parts with the thickness expected of their curvature."""
+    thinning = learn(made, tuple(sorted(mapped)))
+    mean, sd = predict(made, thinning)
+    part = made.shells.part
+    others = [k for k in np.unique(part).tolist() if made.parts[k].name not in mapped]
+    rows = np.isin(part, others) & np.isfinite(mean)
+    t = np.where(rows[:, None], mean[:, None], made.shells.thickness)
+    spread = {
+        made.parts[k].name: float(np.median(sd[part == k] / mean[part == k]))
+        for k in others
+        if rows[part == k].any()
+    }
+    return replace(made, shells=replace(made.shells, thickness=t)), thinning, spread
+
+
+def _not_mapped(
+    made: Assembly, found: FormedThickness, guessed: Mapping[str, float] | None
+) -> list[str]:
+    """Sentences on the parts the file says nothing of."""
+    known = {p.part for p in found.mapped.parts} | set(guessed or {})
+    present = [made.parts[k].name for k in np.unique(made.shells.part).tolist()]
+    out = []
+    if left := [name for name in present if name not in known]:
+        out.append(f"Nothing was mapped onto {', '.join(left)}: they keep the deck's thickness.")
+    if guessed is not None and not guessed:
+        out.append("The file holds every part, so that nothing was left to guess.")
+    return out

@@ -1,0 +1,50 @@
+"""What the test of a layout would find of a model: the smallest mass, softening and thinning."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..case.sensor_places import carried
+from ..errors import FileError
+from ..fem.energy import mass_properties
+from ..progress import Progress, silent
+from ..updating.detectable import NOISE, Detectable, detectable
+from ..updating.map_fit import MassMeasurement
+from ..updating.question import Question
+from .frf import placed_layout
+from .loaded_model import Model
+from .question_of_case import MASS_SD
+
+
+def smallest_findings(
+    model: Model,
+    layout: Path,
+    band: tuple[float, float],
+    noise: float = NOISE,
+    progress: Progress = silent,
+) -> Detectable:
+    """Predicted evidence of a layout, the article weighed to 0.2 %.
+
+    Parameters
+    ----------
+    layout : a table of sensors, or ``plan.json``
+    band : that will be measured [Hz]
+    noise : of |H|, at every line that is compared
+
+    Raises
+    ------
+    FileError
+        If the model has no unit system or no shells, or the layout is none.
+    """
+    if not model.unit:
+        raise FileError(f"{model.source}: what a test finds needs the unit system (--units)")
+    if not len(model.assembly.shells):
+        raise FileError(f"{model.source} has no shells, and what is looked for sits on shells")
+    progress("predicted evidence", 0.1)
+    _, outputs, inputs = placed_layout(model, layout)
+    asked = Question(
+        model.assembly, outputs, inputs, band=band,
+        carried=carried(model.assembly, outputs, inputs),
+    )  # fmt: skip
+    mass = float(mass_properties(model.assembly)[0])
+    weighed = MassMeasurement(mass, MASS_SD * mass)
+    return detectable(replace(asked, mass_measurement=weighed), noise)

@@ -1,0 +1,138 @@
+"""A model to work with from a script: modes, responses, pictures, variants, in one object."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Self, cast
+
+import numpy as np
+
+from ..case.free_parameters import fields_of
+from ..case.schema import FIELDS
+from ..dynamics.frf import FRF, Quantity
+from ..effects.freed import number, with_factor
+from ..errors import LabelError, ModelError
+from ..io.nastran import assembly, write_deck
+from ..io.nastran.edit.model_changes import changes
+from ..model.assembly import Assembly
+from ..model.free_parameter import FreeParameter
+from ..units import Units
+from ..view.drawn_picture import DrawnPicture
+from .frf import frf
+from .loaded_model import Model, load_deck
+
+OF_PARTS = tuple(name for name in FIELDS if name not in ("K", "M"))
+
+
+class WorkingModel(Model):
+    """A model of a deck; nothing in it changes, :meth:`variant` makes another one.
+
+    Modes are numbered from 1 with the rigid ones counted, as Nastran does.
+    """
+
+    def frf(
+        self,
+        output: str | Sequence[str],
+        input: str | Sequence[str],
+        frequency: np.ndarray,
+        damping: float = 0.01,
+        quantity: Quantity = "accelerance",
+    ) -> FRF:
+        """H = Σ_r φ φᵀ / (ω_r² - ω² + 2 i ζ ω_r ω) and the static rest of the modes not solved.
+
+        Parameters
+        ----------
+        output, input : labels as ``55:+Z``, ``55:n`` (the surface's normal); ``base:+Z`` moves all
+            supports
+        frequency : (n_f,) [Hz]
+        damping : ratio of every mode
+
+        Raises
+        ------
+        LabelError
+            If the model has no such grid.
+        """
+        outputs, inputs = ((x,) if isinstance(x, str) else tuple(x) for x in (output, input))
+        (found,) = frf(self, outputs, inputs, np.atleast_1d(frequency), damping).frfs
+        return found if found.quantity == "transmissibility" else found.to(quantity)
+
+    def show(self, mode: int) -> DrawnPicture:
+        """The shape of a mode, drawn."""
+        from tempfile import TemporaryDirectory
+
+        from ..view.scene import mode_shape
+
+        most = len(self.structure.system.dofs)
+        if not 1 <= mode <= most:
+            raise ModelError(f"no mode {mode}; the modes of this model are 1 to {most}")
+        modal = self.modes(mode)
+        motion = self.motion(modal.shapes[:, mode - 1 :])[:, :, 0]
+        with TemporaryDirectory(prefix="chladni-") as folder:
+            path = Path(folder) / "mode.png"
+            mode_shape(path, self.seen, motion, float(modal.frequency[mode - 1]), f"mode {mode}")
+            return DrawnPicture(path.read_bytes())
+
+    def variant(self, **values: float | Mapping[str, float]) -> Self:
+        """The model with other numbers, as ``variant(t={"inner": 0.8e-3}, E=2.0e11)``.
+
+        Parameters
+        ----------
+        values : E, rho, nu, t, E1, E2, G12 or nu12 [SI], one number for all parts that have it, or
+            part -> number. Formed thickness keeps its distribution: its nominal value becomes t.
+
+        Raises
+        ------
+        LabelError
+            If there is no such field or part, or the part has no such field.
+        """
+        made = self.assembly
+        for field, value in values.items():
+            if field not in OF_PARTS:
+                raise LabelError(f"no field {field!r}; there are {', '.join(OF_PARTS)}")
+            for k, wanted in _wanted(made, field, value).items():
+                free = FreeParameter(field, field, positions=(k,))
+                made = with_factor(made, free, wanted / number(made.parts[k], field))
+        return replace(self, assembly=made)
+
+    def write(self, path: Path | str) -> Path:
+        """Write its deck: the cards that changed are edited, every other line stays as it was."""
+        if self.deck is None:
+            raise ModelError("this model was not read from a deck, so there is none to edit")
+        before = assembly(self.deck, self.units)
+        return write_deck(self.deck, path, changes(self.deck, before, self.assembly, self.units))
+
+
+def load(deck: str | Path, units: str | Units | None = None) -> WorkingModel:
+    """The model of a Nastran deck, converted to SI.
+
+    Parameters
+    ----------
+    units : the deck's consistent system: SI, mm-t-s, mm-kg-ms, mm-kg-s or in-lb-s; without it its
+        numbers are kept as they are (frequencies are Hz in any system that counts seconds)
+
+    Raises
+    ------
+    FileError, ModelError
+        One sentence naming file, line, card and the alternatives.
+    """
+    made = load_deck(Path(deck), units).model()
+    return WorkingModel(**vars(made))
+
+
+def _wanted(made: Assembly, field: str, value: float | Mapping[str, float]) -> dict[int, float]:
+    """Position of each part that takes a value -> the value; none may be zero or below."""
+    if isinstance(value, Mapping):
+        out = {made.part(name): float(v) for name, v in value.items()}
+        for k in out:
+            if field not in fields_of(made.parts[k]):
+                have = ", ".join(fields_of(made.parts[k])) or "nothing that can be changed"
+                raise LabelError(f"part {made.parts[k].name} has no {field}; it has {have}")
+    else:
+        having = [k for k, part in enumerate(made.parts) if field in fields_of(part)]
+        out = dict.fromkeys(having, float(cast(float, value)))
+        if not out:
+            raise LabelError(f"no part of the model has {field}")
+    for k, v in out.items():
+        if not 0 < v < np.inf or not number(made.parts[k], field) > 0:
+            raise ModelError(f"{field} of {made.parts[k].name} cannot become {v:g}")
+    return out

@@ -1,0 +1,121 @@
+"""The chain closes: a plan drives the model, and the case made of it finds no difference."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.io.nastran import write_assembly
+from chladni_specimens.plates import plate
+
+
+def call(*words):
+    done = CliRunner().invoke(application(), [str(w) for w in words])
+    assert done.exit_code == 0, (done.output, done.exception)
+    return done
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """A deck and the folder of its plan."""
+    folder = tmp_path_factory.mktemp("chain")
+    deck = write_assembly(plate(0.3, 0.22, 6, 6, 1e-3), folder / "plate.bdf", "mm-t-s")
+    words = ["--units", "mm-t-s", "--sensors", 8, "--modes", 5, "--drawn", 0]
+    call("plan", deck, *words, "--mass", 0.004, "--out", folder / "plan")
+    return deck, folder / "plan"
+
+
+@pytest.mark.parametrize("layout", ["plan.json", "sensors.csv"])
+def test_a_planned_test_of_the_model_finds_the_model(planned, tmp_path, layout):
+    """The sensors' mass is in both: Q of the case that init drafts is that of rounding."""
+    deck, plan = planned
+    words = ["--units", "mm-t-s", "--sensors", plan / layout, "--band", "10:220"]
+    call("frf", deck, *words, "--lines", 1200, "--out", tmp_path / "frf")
+    words = [deck, tmp_path / "frf" / "frf.uff", "--sensors", plan / "sensors.csv"]
+    call("init", *words, "--out", tmp_path / "case")
+    call("correlate", tmp_path / "case", "--out", tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "correlation.json").read_text())
+    assert found["Q"]["mean"] < 1e-8
+    assert [pair["mac"] > 0.999 for pair in found["modes"]][:5] == [True] * 5, "the planned modes"
+    sensors = json.loads((plan / "plan.json").read_text())["sensors"]
+    assert set(found["comac"]) == {s["label"] for s in sensors}
+
+
+def test_the_plan_says_what_its_sensors_weigh(planned, tmp_path):
+    """8 sensors of 4 g: the first elastic frequency is that of the loaded plate."""
+    deck, plan = planned
+    model = chladni.load(deck, "mm-t-s")
+    from chladni.workflows.frf import placed_layout
+
+    loaded, outputs, _ = placed_layout(model, plan / "plan.json")
+    assert len(outputs.labels) == 8
+    mass = chladni.modes(loaded, 7).mass - chladni.modes(model, 7).mass
+    assert mass == pytest.approx(0.032, rel=1e-6)
+
+
+def test_a_place_inside_a_shell_moves_as_its_corners_do(planned, tmp_path):
+    """At the centre of a shell, two triangles at its diagonal: the mean of the diagonal's grids.
+
+    Its label is a number no grid has.
+    """
+    deck, _ = planned
+    model = chladni.load(deck, "mm-t-s")
+    shells = model.assembly.shells
+    corners = shells.nodes[8]
+    x, y, z = model.assembly.points[corners].mean(axis=0)
+    table = tmp_path / "sensors.csv"
+    table.write_text(
+        "label,grid,x,y,z,nx,ny,nz,role\n"
+        f"11195:n,,{x:.7f},{y:.7f},{z:.7f},0,0,1,output\n"
+        "2:+Z,2,,,,0,0,1,input\n"
+    )
+    words = ["--units", "mm-t-s", "--sensors", table, "--band", "20:150", "--lines", 30]
+    call("frf", deck, *words, "--out", tmp_path / "out")
+    f = np.linspace(20, 150, 30)
+    ids = model.assembly.ids[corners[[0, 2]]]
+    due = model.frf([f"{i}:+Z" for i in ids], "2:+Z", f).values.mean(axis=1)[:, 0]
+    with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
+        assert held["outputs"].tolist() == ["11195:n"]
+        np.testing.assert_allclose(held["values"][:, 0, 0], due, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "told"),
+    [
+        (None, "none.json", "no file"),
+        ("{}", "plan.json", "is no plan.json"),
+        ("[1, 2]", "plan.json", "is no plan.json"),
+        ("label,role\n2:+Z,output\n", "sensors.csv", "names no input"),
+        ("label,role\n2:+Z,output\n999:+Z,input\n", "sensors.csv", "no grid 999"),
+    ],
+)
+def test_what_is_no_layout_is_told(planned, tmp_path, text, name, told):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    words = ["frf", planned[0], "--units", "mm-t-s", "--sensors", tmp_path / name]
+    done = CliRunner().invoke(application(), [*map(str, words), "--out", str(tmp_path / "out")])
+    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert told in done.output
+
+
+def test_a_layout_and_an_input_are_one_too_many(planned, tmp_path):
+    deck, plan = planned
+    words = ["frf", deck, "--sensors", plan / "plan.json", "--input", "2:+Z"]
+    done = CliRunner().invoke(application(), [*map(str, words), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "leave out the others" in done.output
+
+
+def test_a_plan_tells_what_it_would_find(planned, tmp_path):
+    """The table on the page, a map, and JSON place by place."""
+    deck, _ = planned
+    words = ["--units", "mm-t-s", "--sensors", 8, "--modes", 5, "--drawn", 0, "--detect"]
+    call("plan", deck, *words, "--out", tmp_path)
+    rows = json.loads((tmp_path / "smallest.json").read_text())["mass"]
+    weight = chladni.modes(chladni.load(deck, "mm-t-s"), 7).mass
+    assert all(row["mass_kg"] is None or 0 < row["mass_kg"] < weight for row in rows)
+    assert (tmp_path / "smallest_mass.png").is_file()
+    assert "What this layout would find" in (tmp_path / "report.html").read_text()

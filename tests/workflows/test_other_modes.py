@@ -1,0 +1,160 @@
+"""Modes of another program beside the model's: frames, double modes, files of three kinds."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+
+N = 5  # grids along a side
+
+
+def call(*words):
+    return CliRunner().invoke(application(), [str(w) for w in words])
+
+
+def deck(path, turned=0.0):
+    """A free square steel plate; its grids move in axes turned about z by so many degrees."""
+    c, s = np.cos(np.deg2rad(turned)), np.sin(np.deg2rad(turned))
+    lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,2.1+11,,0.3,7850.", "PSHELL,1,1,.001,1,,1"]
+    lines.append(f"CORD2R,5,,0.,0.,0.,0.,0.,1.\n,{c:.9f},{s:.9f},0.")
+    for i, j in np.ndindex(N, N):
+        lines.append(f"GRID,{1 + j + N * i},,{0.05 * i:.3f},{0.05 * j:.3f},0.,5")
+    for i, j in np.ndindex(N - 1, N - 1):
+        a = 1 + j + N * i
+        lines.append(f"CQUAD4,{a},1,{a},{a + N},{a + N + 1},{a + 1}")
+    path.write_text("\n".join([*lines, "ENDDATA", ""]))
+    return path
+
+
+def punch(path, frequency, motion, ids):
+    """Eigenvectors of a punch file: translations (n, 3, r), rotations zero."""
+    lines = []
+    for k, f in enumerate(frequency):
+        lines += ["$TITLE   = PLATE", "$SUBTITLE=", "$LABEL   =", "$EIGENVECTOR", "$REAL OUTPUT",
+                  "$SUBCASE ID =           1",
+                  f"$EIGENVALUE = {(2 * np.pi * f) ** 2:14.7E}  MODE = {k + 1:5d}"]  # fmt: skip
+        for row, id in enumerate(ids):
+            values = "".join(f"{v:18.6E}" for v in motion[row, :, k])
+            lines += [f"{id:10d}       G{values}", f"{'-CONT-':<18}{'':>0}" + 3 * f"{0.0:18.6E}"]
+    path.write_text("".join(f"{line:<72}{k + 1:8d}\n" for k, line in enumerate(lines)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """Model, frequencies and translations of the plate in the basic frame."""
+    model = chladni.load(deck(tmp_path_factory.mktemp("plain") / "plate.bdf"), "SI")
+    modal = model.modes(14)
+    return model, modal.frequency, model.motion(modal.shapes)
+
+
+def test_shapes_are_turned_from_the_frames_of_their_grids(plain, tmp_path):
+    """In axes turned by 30° about z a motion u has the components Rᵀ u."""
+    model, f, motion = plain
+    other = deck(tmp_path / "turned.bdf", 30.0)
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    local = np.einsum("ji,njr->nir", R, motion + 0.3 * motion[:, [2, 2, 2]])
+    plain_file = punch(tmp_path / "modes.pch", f, local, model.assembly.ids)
+    found = chladni.other_modes(chladni.load(other, "SI"), plain_file)
+    expected = motion + 0.3 * motion[:, [2, 2, 2]]
+    elastic = found.f_other.size
+    np.testing.assert_allclose(found.shapes, expected[:, :, -elastic:], rtol=1e-4, atol=1e-5)
+
+
+def test_a_model_is_its_own_partner(plain, tmp_path):
+    """Every elastic mode finds itself, under its own number; a double pair only in its span."""
+    model, f, motion = plain
+    pairs = [k for k in range(6, 13) if f[k + 1] / f[k] - 1 < 1e-6]
+    assert pairs, "a square plate has double modes"
+    mixed = motion.copy()
+    a, b = pairs[0], pairs[0] + 1
+    mixed[:, :, a], mixed[:, :, b] = (
+        motion[:, :, a] + motion[:, :, b],
+        motion[:, :, a] - motion[:, :, b],
+    )
+    path = punch(tmp_path / "modes.pch", f, mixed, model.assembly.ids)
+    found = chladni.other_modes(model, path)
+    np.testing.assert_allclose(found.in_span, 1, atol=1e-6)
+    double = {k + d for k in pairs for d in (0, 1)}
+    alone = [k for k, n in enumerate(found.numbers_other) if n - 1 not in double]
+    assert len(alone) > 3
+    for i, j, value in zip(found.pairs.model, found.pairs.test, found.pairs.mac, strict=True):
+        if j in alone:
+            assert found.numbers_model[i] == found.numbers_other[j]
+            assert value == pytest.approx(1, abs=1e-6)
+    mine = found.mac[[found.numbers_model.index(n + 1) for n in (a, b)]]
+    assert mine[:, [found.numbers_other.index(n + 1) for n in (a, b)]].max() < 0.6
+
+
+def test_what_modes_writes_correlate_reads(plain, tmp_path):
+    """The universal file of `chladni modes` comes back, its shapes those of the model."""
+    path = plain[0].source
+    assert (
+        call("modes", path, "--units", "SI", "--count", 12, "--out", tmp_path / "a").exit_code == 0
+    )
+    words = ["correlate", path, "--modes", tmp_path / "a" / "modes.unv", "--units", "SI"]
+    done = call(*words, "--out", tmp_path / "b")
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "b" / "correlation.json").read_text())
+    assert len(found["modes"]) == 6
+    assert min(m["in_span"] for m in found["modes"]) > 0.9999
+    assert {"mac.png", "shapes.png", "report.html"} <= {p.name for p in (tmp_path / "b").iterdir()}
+
+
+@pytest.mark.skipif(not importlib.util.find_spec("pyyeti"), reason="OP2 files are read by pyYeti")
+def test_modes_of_nastran_itself():
+    """An OP2 file of MSC Nastran: the frequencies of all elastic modes to 1e-6, MAC 1."""
+    folder = Path(importlib.util.find_spec("pyyeti").origin).parent / "tests/nastran_op2_data"
+    if not (folder / "rdop2gpwg_1.op2").is_file():
+        pytest.skip("this pyYeti comes without its examples")
+    model = chladni.load(folder / "rdop2gpwg_1.dat")
+    found = chladni.other_modes(model, folder / "rdop2gpwg_1.op2")
+    assert len(found.pairs) == len(found.f_other) == 12
+    off = found.f_model[found.pairs.model] / found.f_other[found.pairs.test] - 1
+    assert np.abs(off).max() < 1e-6
+    assert found.pairs.mac.min() > 1 - 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("none.pch", None, "no file"),
+        ("modes.txt", "", "modes are read of .op2, .pch"),
+        ("modes.pch", "$TITLE\n", "holds no eigenvectors"),
+        ("modes.unv", "    -1\n    -1\n", "modes.unv"),
+    ],
+)
+def test_what_holds_no_modes_is_told(plain, tmp_path, name, text, told):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    words = ["correlate", plain[0].source, "--modes", tmp_path / name]
+    done = call(*words, "--units", "SI", "--out", tmp_path / "out")
+    assert (done.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert told in done.output
+
+
+def test_modes_of_another_deck_are_refused(plain, tmp_path):
+    model, f, motion = plain
+    far = punch(tmp_path / "far.pch", f, motion, model.assembly.ids + 5000)
+    done = call("correlate", model.source, "--modes", far, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "is it of this deck" in done.output
+
+
+def test_a_deck_without_modes_is_told_what_is_due(plain, tmp_path):
+    done = call("correlate", plain[0].source, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "with --modes" in done.output
+
+
+def test_units_alone_are_no_comparison(plain, tmp_path):
+    done = call("correlate", plain[0].source, "--units", "SI", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "--modes" in done.output
