@@ -43,9 +43,15 @@ def model_families(built: Structure) -> list[ModelFamily]:
     """Every family of joints, and the transverse shear of every part."""
     return [
         ModelFamily((Parameter("k", "-", 0.0, sd, step=0.5),), text, slope=_slope(K))
-        for text, K, sd in (*_solids(built), *_bushes(built), *_shear(built))
+        for text, K, sd in (*joint_families(built), *_shear(built))
         if K.nnz
     ]
+
+
+def joint_families(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
+    """(name, what it has in K, prior sd of ln k) of every family of joints."""
+    yield from _solids(built)
+    yield from _bushes(built)
 
 
 def _slope(K: sp.csr_array) -> Slope:

@@ -22,6 +22,8 @@ from . import (
     stiffness_patch,
     suspension,
     thickness_distribution,
+    weld_compliance,
+    weld_missing,
 )
 from .family import Family
 
@@ -38,6 +40,8 @@ BUILT_IN = (
     stiffness_patch.FAMILY,
     mass_patch.FAMILY,
     crack.FAMILY,
+    weld_missing.FAMILY,
+    weld_compliance.FAMILY,
 )
 _added: dict[str, Family] = {}
 
