@@ -67,7 +67,12 @@ def alone(assembly: Assembly, joint: Joint) -> Assembly:
         dampers=nothing, scalar_masses=nothing, masses=Masses(),
     )  # fmt: skip
     some = _picked(members(assembly, joint.kind, joint.group), joint.elements)
-    return replace(bare, **{joint.kind: (some,) if joint.kind == "solids" else some})
+    return _with(bare, joint.kind, (some,) if joint.kind == "solids" else some)
+
+
+def _with(assembly: Assembly, kind: str, new: Any) -> Assembly:
+    changed: dict[str, Any] = {kind: new}
+    return replace(assembly, **changed)
 
 
 def stiffness_rows(built: Structure, joint: Joint) -> sp.csr_array:
@@ -83,7 +88,7 @@ def stiffness_rows(built: Structure, joint: Joint) -> sp.csr_array:
     B = sp.csr_array((V[:, kept] * np.sqrt(w[kept])).T @ built.T[at])
     B.eliminate_zeros()
     on = np.unique(B.indices)
-    U, s, Vt = np.linalg.svd(B[:, on].toarray(), full_matrices=False)
+    _, s, Vt = np.linalg.svd(B[:, on].toarray(), full_matrices=False)
     kept = s > np.sqrt(FLAT) * s[0] if len(s) else s > 0
     where = (np.repeat(np.arange(kept.sum()), len(on)), np.tile(on, kept.sum()))
     return sp.csr_array(((s[kept, None] * Vt[kept]).ravel(), where), shape=(kept.sum(), B.shape[1]))
@@ -108,7 +113,7 @@ def beads(built: Structure) -> list[Joint]:
     """
     assembly = built.assembly
     out: list[Joint] = []
-    for group, part, rows in _solid_parts(assembly, soft=True):
+    for group, rows in _solid_parts(assembly, soft=True):
         pieces = list(_pieces(assembly.solids[group].nodes[rows]))
         whole = [rows] if len(pieces) > 1 else []
         for chosen in (*whole, *(rows[piece] for piece in pieces)):
@@ -141,8 +146,8 @@ def _touched(built: Structure, joint: Joint) -> np.ndarray:
     return built.assembly.rows(built.system.dofs[np.unique(built.T[dofs].indices), 0])
 
 
-def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, int, np.ndarray]]:
-    """(group, position of the part, rows) of solids of adhesive, or of metal."""
+def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """(group, rows) of the parts of solids of adhesive, or of metal."""
     for group, solids in enumerate(assembly.solids):
         for part in np.unique(solids.part):
             section = assembly.parts[int(part)].section
@@ -150,7 +155,7 @@ def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, int, np.
                 continue
             material = section.material
             if isinstance(material, Isotropic) and (material.E < SOFT) == soft:
-                yield group, int(part), np.flatnonzero(solids.part == part)
+                yield group, np.flatnonzero(solids.part == part)
 
 
 def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
@@ -171,7 +176,7 @@ def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Joint:
 
 
 def _weld_solids(assembly: Assembly) -> Iterator[Joint]:
-    for group, _, rows in _solid_parts(assembly, soft=False):
+    for group, rows in _solid_parts(assembly, soft=False):
         for piece in _pieces(assembly.solids[group].nodes[rows]):
             if len(piece) <= MOST_SOLIDS:
                 yield _of_solids(assembly, group, rows[piece])
@@ -235,14 +240,14 @@ def without_joint(assembly: Assembly, joint: Joint) -> Assembly:
 
 def _with_members(assembly: Assembly, joint: Joint, new: Any) -> Assembly:
     if joint.kind != "solids":
-        return replace(assembly, **{joint.kind: new})
+        return _with(assembly, joint.kind, new)
     solids = list(assembly.solids)
     solids[joint.group] = new
     return replace(assembly, solids=tuple(solids))
 
 
 def _only_here(assembly: Assembly, part: int, count: int) -> bool:
-    groups = (*assembly.solids, assembly.beams, assembly.shells)
+    groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
     return sum(int((g.part == part).sum()) for g in groups) == count
 
 
