@@ -144,6 +144,7 @@ class Effect:
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
     writable: ClassVar[bool] = True  # whether a deck could hold it
     remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
+    frees_motion: ClassVar[bool] = False  # so that it may bring a mode the structure had not
     own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()

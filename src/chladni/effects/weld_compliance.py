@@ -2,8 +2,10 @@
 
 A deck's weld is a thousand times stiffer than the sheets round it: what it does to the structure
 hardly depends on its own stiffness w until that falls to the z of the sheets.  So its prior and its
-name go by the softness z/(w + z) that static responses give: with that share of its stiffness left
-it carries half of its load, with e^-3 of that next to none, and is missing.
+name go by the softness s = z/(w + z) that static responses give: with s of its stiffness left it
+carries half of its load, with e^-3 s next to none, and is missing.  With e^3 s it carries nearly
+all: what data want of a weld beyond that is another patch of sheet that it holds, which a mesh sets
+and no weld can be blamed for.
 """
 
 from dataclasses import dataclass, field, replace
@@ -14,16 +16,18 @@ import scipy.sparse as sp
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, SolidSection
-from .effect import Effect, MatrixTerm, Parameter
+from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .joints import Joint, fasteners, with_factor_on
 from .model_families import SOFT, joint_families
 from .search_context import Candidate, SearchContext, best_places
 
-NONE_LEFT = float(np.exp(-3.0))  # of what carries half of the load: below it the joint is missing
-SD = 1.5  # of ln of what is left: from a twentieth of the load to all of it
-STARTS = (-1.5, 0.5, 2.5)  # of the same, about what carries half
+NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
+MOST = 3.0  # ln of what is left over s, at most
+SD = 1.2  # of the same: from next to nothing of the load to nearly all
+STARTS = (-1.5, 0.0, 1.5)
+SOUND = 40.0  # x of the deck's own
 BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
@@ -42,6 +46,7 @@ class WeldCompliance(Effect):
 
     name = "weld-compliance"
     claim = "a weld or a fastener is softer than the deck has it"
+    frees_motion = True
 
     joint: Joint | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
@@ -49,20 +54,26 @@ class WeldCompliance(Effect):
     softness: float = 1.0
 
     @staticmethod
-    def softness_of(share: np.ndarray) -> float:
-        """Of the directions (r,) the geometric mean."""
-        return float(np.exp(np.log(share).mean()))
-
-    @staticmethod
     def strength(softness: float) -> Parameter:
-        """ln of what is left, about what carries half of the load."""
-        mean = float(np.log(softness))
-        return Parameter("K", "of the deck's", mean, SD, starts=tuple(mean + s for s in STARTS))
+        """ln of what is left over s."""
+        return Parameter("K", "of the deck's", 0.0, SD, softness, starts=STARTS, nominal=SOUND)
+
+    def left(self, x: float) -> tuple[float, float]:
+        """f(x) = s e^x, x > 0 bent towards ``MOST``, and its slope; a sound one is apart: 1."""
+        if x >= SOUND:
+            return 1.0, 0.0
+        y = MOST * np.tanh(x / MOST) if x > 0 else x
+        f = min(self.softness * float(np.exp(y)), 1.0)
+        return f, f * (1 - (y / MOST) ** 2 if x > 0 else 1.0)
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The joint's own and that of the others of its kind."""
-        each = zip((self.operator, self.others), x, np.eye(len(x)), strict=False)
-        return tuple(MatrixTerm("K", A, float(np.expm1(v)), np.exp(v) * e) for A, v, e in each)
+        (f, slope), e = self.left(x[0]), np.eye(len(x))
+        own = MatrixTerm("K", self.operator, f - 1, slope * e[0])
+        if len(x) == 1:
+            return (own,)
+        g = float(np.exp(x[1]))
+        return own, MatrixTerm("K", self.others, g - 1, g * e[1])
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """All relative motions that load the joint."""
@@ -74,15 +85,16 @@ class WeldCompliance(Effect):
         assert self.joint is not None
         beside = x[1] if len(x) > 1 else 0.0
         made = with_all(assembly, self.joint.kind, float(np.exp(beside)))
-        return with_factor_on(made, self.joint, float(np.exp(x[0] - beside)))
+        return with_factor_on(made, self.joint, self.left(x[0])[0] / float(np.exp(beside)))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of the joint's stiffness."""
-        return super().reported(x, sd)[:1]
+        low, here, high = (self.left(x[0] + k * 1.96 * WIDER * sd[0])[0] for k in (-1, 0, 1))
+        return (Estimate("K", here, "of the deck's", low, high),)
 
     def becomes(self, x: np.ndarray) -> str:
         """A missing weld, where next to no load is carried."""
-        return "weld-missing" if x[0] < np.log(NONE_LEFT * self.softness) else ""
+        return "weld-missing" if x[0] < NONE_LEFT else ""
 
 
 def with_all(assembly: Assembly, kind: str, factor: float) -> Assembly:
@@ -119,7 +131,7 @@ def of_one(
     share : (r,)   z/(w + z) of the joint's rows, see :func:`.joints.softness`
     families : {name: what all joints of a kind have in K, prior sd of ln of their factor}
     """
-    own, soft = sp.csr_array(joint.rows.T @ joint.rows), kind.softness_of(share)
+    own, soft = sp.csr_array(joint.rows.T @ joint.rows), float(share.min())
     unknown: tuple[Parameter, ...] = (kind.strength(soft),)
     others, text = own, FAMILY_OF.get(joint.kind, "")
     if text in families:
@@ -145,10 +157,10 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effects[k] for k in some]
         return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
-    left = np.array([[start[0] for start in e.starts()] for e in effects])
+    left = np.array([[e.left(start[0])[0] for start in e.starts()] for e in effects])
     out: dict[int, Candidate] = {}
     for about, base in reversed(tuple(enumerate(context.bases))):
-        score = context.scan.fastener_scores(about, np.exp(left))
+        score = context.scan.fastener_scores(about, left)
         wanted = FOLLOWED if not out else FOLLOWED + 1
         for k in np.argsort(score.min(axis=1)):
             if len(out) >= wanted:
@@ -173,7 +185,7 @@ def drawn(article: Article, rng: np.random.Generator) -> tuple[Joint, dict[str, 
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A fastener keeps 1e-5 to 1e-4 of its stiffness."""
+    """A fastener keeps 1e-5 to 1e-4 of its stiffness: it carries about half of its load."""
     joint, truth = drawn(article, rng)
     f = float(10 ** rng.uniform(-5, -4))
     made = with_factor_on(article.assembly, joint, f)

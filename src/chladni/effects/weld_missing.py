@@ -10,39 +10,34 @@ from .estimate import Estimate
 from .family import Article, Family
 from .joints import without_joint
 from .search_context import Candidate, SearchContext
-from .weld_compliance import NEEDS, NONE_LEFT, WeldCompliance, drawn, proposed, with_all
+from .weld_compliance import NEEDS, NONE_LEFT, SOUND, WeldCompliance, drawn, proposed, with_all
 
-GONE = -20.0  # ln of what is left: nothing, for a hundred thousandth is next to none already
+GONE = -12.0  # ln of what is left over what carries half of the load: nothing
 
 
 @dataclass(frozen=True, eq=False)
 class WeldMissing(WeldCompliance):
-    """The joint times e^-20, others of its kind times e^g: no number tells how much it is gone."""
+    """The joint times e^-12 s, others of its kind times e^g: nothing tells how much it is gone."""
 
     name = "weld-missing"
     claim = "a weld or a fastener that the deck has is missing, or holds nothing"
 
     @staticmethod
-    def softness_of(share: np.ndarray) -> float:
-        """Of the directions (r,) the least: in each of them next to no load is carried."""
-        return float(share.min())
-
-    @staticmethod
     def strength(softness: float) -> Parameter:
-        """ln of what is left: nothing."""
-        return Parameter("K", "of the deck's", GONE, 1.0, starts=(GONE,))
+        """ln of what is left over what carries half of the load: nothing."""
+        return Parameter("K", "of the deck's", GONE, 1.0, softness, starts=(GONE,), nominal=SOUND)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The joint's elements taken out where it is gone; the others as fitted beside it."""
         assert self.joint is not None
-        if x[0] > np.log(NONE_LEFT * self.softness):
+        if x[0] > NONE_LEFT:
             return super().apply(assembly, x)
         beside = x[1] if len(x) > 1 else 0.0
         return without_joint(with_all(assembly, self.joint.kind, np.exp(beside)), self.joint)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Nothing is left, or less than would carry a twentieth of the load."""
-        return (Estimate("K", 0.0, "of the deck's", 0.0, NONE_LEFT * self.softness),)
+        return (Estimate("K", 0.0, "of the deck's", 0.0, self.left(NONE_LEFT)[0]),)
 
     def becomes(self, x: np.ndarray) -> str:
         """It is the simplest."""

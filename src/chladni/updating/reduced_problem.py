@@ -62,8 +62,13 @@ class ReducedProblem:
         """The reduced model over a basis that can carry an effect near x, split as it needs."""
         low = np.flatnonzero(self.frequency <= self.f_max)
         rows = effect.basis_rows(x, self.model.basis[:, low])
-        model = self.model if rows is None else self.with_attachments(rows)
-        return model.split_for(effect, x)
+        if rows is None:
+            return self.model.split_for(effect, x)
+        if not effect.frees_motion:
+            return self.with_attachments(rows).split_for(effect, x)
+        static = attachments(self.factor, rows)  # and the motion their inertia adds
+        swinging = self.factor.solve(self.structure.system.M @ static)
+        return self.model.extended(np.hstack([static, swinging])).split_for(effect, x)
 
 
 def reduced_problem(
