@@ -224,6 +224,10 @@ class Effect:
         """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
         return ""
 
+    def implausible(self, x: np.ndarray) -> str:
+        """Why its value at x is none such a thing can have; "" where it may."""
+        return ""
+
     def starts(self) -> list[np.ndarray]:
         """Points from which a fit begins: every combination of its parameters' starts."""
         options = [p.starts or (p.mean,) for p in self.parameters]

@@ -231,6 +231,19 @@ def with_factor_on(assembly: Assembly, joint: Joint, factor: float) -> Assembly:
     return _with_members(replace(assembly, parts=tuple(parts)), joint, changed)
 
 
+def with_solids(assembly: Assembly, factor: float, soft: bool) -> Assembly:
+    """The assembly with all solids of adhesive, or all of metal, times a factor."""
+    if factor == 1:
+        return assembly
+    parts = []
+    for part in assembly.parts:
+        m = getattr(part.section, "material", None)
+        if isinstance(part.section, SolidSection) and isinstance(m, Isotropic):
+            part = _stiffer(part, factor) if (m.E < SOFT) == soft else part
+        parts.append(part)
+    return assembly.with_parts(tuple(parts))
+
+
 def without_joint(assembly: Assembly, joint: Joint) -> Assembly:
     """The assembly with the elements of a joint taken out."""
     old = members(assembly, joint.kind, joint.group)

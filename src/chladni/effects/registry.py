@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from ..errors import ExtensionError, LabelError
 from . import (
+    adhesive_stiffness,
     crack,
     extra_support,
     local_resonator,
@@ -42,6 +43,7 @@ BUILT_IN = (
     crack.FAMILY,
     weld_missing.FAMILY,
     weld_compliance.FAMILY,
+    adhesive_stiffness.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -15,12 +15,11 @@ import scipy.sparse as sp
 
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from ..model.properties import Isotropic, SolidSection
 from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import Joint, fasteners, with_factor_on
-from .model_families import SOFT, joint_families
+from .joints import Joint, fasteners, with_factor_on, with_solids
+from .model_families import joint_families
 from .search_context import Candidate, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
@@ -98,20 +97,11 @@ class WeldCompliance(Effect):
 
 
 def with_all(assembly: Assembly, kind: str, factor: float) -> Assembly:
-    """The assembly with all solids stiffer than adhesive, or all bushes, times a factor."""
-    if factor == 1:
-        return assembly
-    if kind == "bushes":
-        bushes = replace(assembly.bushes, stiffness=factor * assembly.bushes.stiffness)
-        return replace(assembly, bushes=bushes)
-    parts = []
-    for part in assembly.parts:
-        m = getattr(part.section, "material", None)
-        if isinstance(part.section, SolidSection) and isinstance(m, Isotropic) and m.E >= SOFT:
-            G = None if m.G is None else m.G * factor
-            part = part.with_section(material=replace(m, E=m.E * factor, G=G))
-        parts.append(part)
-    return assembly.with_parts(tuple(parts))
+    """The assembly with all welds of solids, or all bushes, times a factor."""
+    if kind != "bushes":
+        return with_solids(assembly, factor, soft=False)
+    bushes = replace(assembly.bushes, stiffness=factor * assembly.bushes.stiffness)
+    return replace(assembly, bushes=bushes)
 
 
 def each(kind: type[WeldCompliance], context: SearchContext) -> list[WeldCompliance]:
