@@ -34,6 +34,7 @@ class AdhesiveStiffness(Effect):
 
     name = "adhesive-stiffness"
     claim = "a bead of adhesive is far softer or stiffer than the deck has it"
+    rounds = 2
 
     joint: Joint | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
@@ -47,6 +48,10 @@ class AdhesiveStiffness(Effect):
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """A φ of the bead; the basis carries all adhesive together already."""
         return sp.csr_array((self.operator @ shapes).T)
+
+    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
+        """What the bead answers: (P⁻¹ A)ᵏ φ spans how a bead of any stiffness changes a mode."""
+        return self.operator @ static
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """E of the bead, that of the others as it was fitted beside it."""

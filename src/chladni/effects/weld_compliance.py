@@ -45,7 +45,7 @@ class WeldCompliance(Effect):
 
     name = "weld-compliance"
     claim = "a weld or a fastener is softer than the deck has it"
-    frees_motion = True
+    rounds = 1  # a weld that is gone may free a mode of its own
 
     joint: Joint | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))

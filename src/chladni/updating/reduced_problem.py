@@ -64,11 +64,11 @@ class ReducedProblem:
         rows = effect.basis_rows(x, self.model.basis[:, low])
         if rows is None:
             return self.model.split_for(effect, x)
-        if not effect.frees_motion:
-            return self.with_attachments(rows).split_for(effect, x)
-        static = attachments(self.factor, rows)  # and the motion their inertia adds
-        swinging = self.factor.solve(self.structure.system.M @ static)
-        return self.model.extended(np.hstack([static, swinging])).split_for(effect, x)
+        blocks = [attachments(self.factor, rows)]
+        for _ in range(effect.rounds):
+            loads = effect.reloads(blocks[-1], self.structure.system.M)
+            blocks.append(self.factor.solve(loads))
+        return self.model.extended(np.hstack(blocks)).split_for(effect, x)
 
 
 def reduced_problem(
