@@ -246,7 +246,7 @@ def test_slopes_leave_a_remainder_of_second_order(on, proposed):
         slope = np.einsum("prr,p->r", state.dK - state.lam * state.dM, d)[FLEXIBLE]
         if not np.abs(slope).max() > 1e-9 * state.lam[FLEXIBLE].max():
             continue
-        h = 0.02
+        h = 0.01
         left = [
             np.abs(lam(model, c.effect, x + s * d) - state.lam[FLEXIBLE] - s * slope).max()
             for s in (h, h / 2)

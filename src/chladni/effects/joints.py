@@ -158,6 +158,11 @@ def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarr
                 yield group, np.flatnonzero(solids.part == part)
 
 
+def soft_solids(assembly: Assembly) -> Iterator[tuple[int, np.ndarray]]:
+    """(group, rows) of every part of adhesive."""
+    yield from _solid_parts(assembly, soft=True)
+
+
 def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
     """Rows (k,) of elements that hang together by their nodes (m, n)."""
     m = len(nodes)

@@ -14,6 +14,7 @@ from . import (
     adhesive_stiffness,
     crack,
     extra_support,
+    hem_contact,
     local_resonator,
     mass_patch,
     orthotropic_material,
@@ -44,6 +45,7 @@ BUILT_IN = (
     weld_missing.FAMILY,
     weld_compliance.FAMILY,
     adhesive_stiffness.FAMILY,
+    hem_contact.FAMILY,
 )
 _added: dict[str, Family] = {}
 
