@@ -30,6 +30,7 @@ JOINED = {  # structures of the set joints, by what is put into them
     "nothing": ("bonded plates", "lidded box", "bolted bracket"),
     "weld-missing": ("lidded box", "bolted bracket"),
     "adhesive-stiffness": ("bonded plates", "tailgate"),
+    "hem-contact": ("tailgate",),
 }
 
 

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.effects.hem_line import hem_lines
 from chladni.errors import ModelError
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, SolidSection
+from chladni_specimens.joints.bolts import grip
 
 from .hidden import Hidden, Site
 from .hidden_kinds import Kind
@@ -67,7 +69,37 @@ def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     return Hidden(made, {"value": _modulus(section) * factor, "part": name})
 
 
+def hem(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """The sheets of a string do not slide, 1e9 to 1e10 N/m² at size 1: all along, or on half."""
+    a = site.article
+    lines = hem_lines(a)
+    if not lines:
+        raise ModelError("the article has no string of adhesive between two sheets")
+    line = max(lines, key=lambda one: one.length)
+    k = float(np.exp(rng.uniform(np.log(1e9), np.log(1e10)))) * size
+    middle, whole = float(rng.uniform(0, line.length)), bool(rng.integers(2))
+    d = line.from_place(middle)
+    held = np.ones(len(line), bool) if whole else np.abs(d) <= line.length / 4
+    names = np.array([[_part_at(a, rows) for rows in side] for side in line.sides])
+    for pair in {(str(one), str(two)) for one, two in names}:
+        on = held & (names == pair).all(axis=1)
+        if on.any():
+            places, along, share = line.middle[on], line.along[on], line.share[on]
+            a = grip(a, places, along, k * share, pair, reach=0.02)[0]
+    truth = {"value": k, "whole": whole}
+    if not whole:
+        truth["point_m"] = line.middle[int(np.abs(d).argmin())].tolist()
+    return Hidden(a, truth)
+
+
+def _part_at(a: Assembly, rows: np.ndarray) -> str:
+    """Name of the sheet that has these points."""
+    inside = np.isin(a.shells.nodes, rows).any(axis=1)
+    return a.parts[int(np.bincount(a.shells.part[inside]).argmax())].name
+
+
 JOINTS: dict[str, Kind] = {
     "weld-missing": weld_missing,
     "adhesive-stiffness": adhesive,
+    "hem-contact": hem,
 }
