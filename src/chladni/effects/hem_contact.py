@@ -134,7 +134,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     lines = hem_lines(built.assembly)
     out = []
     for line in lines:
-        rows = line.slides(built)
+        rows = line.relative_rows(built)
         whole, some = (f(line, rows, len(lines)) for f in (everywhere, along_stretch))
         middles = (2 * np.arange(PLACES) + 1) / PLACES
         starts = [np.array([k, s, 0.0]) for s in middles for k in STARTS[::2]]

@@ -1,127 +1,45 @@
-"""Strings of adhesive along an edge: the line they follow, and how its two sheets slide on it.
-
-The sliding is that of two means at one point, each the best rigid motion of the grids of a sheet
-that carry a solid there; between different points rigid rotation would load what resists it.
-"""
+"""Strings of adhesive along an edge: the line they follow between two sheets."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..fem.assemble import Structure
-from ..fem.average import average_rows
-from ..model.added_points import with_points
-from ..model.assembly import Assembly, Average, Bushes
+from ..model.assembly import Assembly, Average
 from .joints import soft_solids
+from .sheet_pairs import SheetPairs
 
 SHORTEST = 8  # solids of a string
 CLOSED = 6.0  # pitches between its ends at which a line still goes on
 
 
 @dataclass(frozen=True, eq=False)
-class HemLine:
-    """A line through the solids of a string, in order.
+class HemLine(SheetPairs):
+    """A line through the solids of a string, in order; ``along`` are its tangents.
 
     Attributes
     ----------
     name : of the part
-    middle, along : (k, 3)   middles of the solids [m], unit tangents
+    sheets : names of the sheets
     share : (k,)             length each stands for [m]
     s : (k,)                 arc length [m]
     length : float           of all, the gap between the ends of a closed line included [m]
     closed : bool
-    sides : of each solid the rows of grids that carry it in either sheet
-    sheets : names of the sheets
     """
 
     name: str
-    middle: np.ndarray
-    along: np.ndarray
+    sheets: tuple[str, ...]
     share: np.ndarray
     s: np.ndarray
     length: float
     closed: bool
-    sides: tuple[tuple[np.ndarray, np.ndarray], ...]
-    sheets: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.s)
 
     def from_place(self, s0: float) -> np.ndarray:
         """Arc length (k,) from a place of the line, the shorter way round of a closed one [m]."""
         d = self.s - s0
         return d - self.length * np.round(d / self.length) if self.closed else d
-
-    def slides(self, built: Structure) -> sp.csr_array:
-        """Rows (k, n): how far the second sheet slides along the line over the first."""
-        bare, ends = self.tied(replace(built.assembly, axes=None, rigid=()))
-        means = average_rows(bare, np.arange(len(bare.rigid)))
-        where = (means.dof[means.row], means.on)
-        n = 6 * len(bare.points)
-        G = sp.csr_array((means.factor, where), shape=(n, n))[:, : built.T.shape[0]]
-        first, second = (self._pick(end, n) for end in ends.T)
-        return sp.csr_array((second - first) @ G @ built.T)
-
-    def _pick(self, rows: np.ndarray, n: int) -> sp.csr_array:
-        k = len(rows)
-        columns = (6 * rows[:, None] + np.arange(3)).ravel()
-        where = (np.repeat(np.arange(k), 3), columns)
-        return sp.csr_array((self.along.ravel(), where), shape=(k, n))
-
-    def tied(self, assembly: Assembly, on: np.ndarray | None = None) -> tuple[Assembly, np.ndarray]:
-        """The assembly with both ends of springs at some solids (all), and their rows (k, 2)."""
-        at = np.arange(len(self)) if on is None else on
-        grown, rows = with_points(assembly, np.repeat(self.middle[at], 2, axis=0))
-        first, T = 1 + _last_id(assembly), (1, 2, 3)
-        carriers = [grids for k in at for grids in self.sides[k]]
-        means = tuple(
-            Average(first + j, int(row), T, tuple((int(g), T, 1.0) for g in grids))
-            for j, (row, grids) in enumerate(zip(rows, carriers, strict=True))
-        )
-        turns = np.array([(r, c) for r in rows for c in (4, 5, 6)], dtype=np.int64).reshape(-1, 2)
-        supports = np.concatenate([grown.supports, turns])
-        grown = replace(grown, rigid=(*grown.rigid, *means), supports=supports)
-        return grown, rows.reshape(-1, 2)
-
-    def gripped(self, assembly: Assembly, k: np.ndarray) -> Assembly:
-        """The assembly with springs k (n,) [N/m] against sliding, where there are any."""
-        on = np.flatnonzero(k > 0)
-        grown, ends = self.tied(assembly, on)
-        old, zero = grown.bushes, np.zeros((len(on), 6))
-        e = self.along[on]
-        z = np.cross(e, np.eye(3)[np.abs(e).argmin(axis=1)])
-        z /= np.linalg.norm(z, axis=1, keepdims=True)
-        stiffness = zero.copy()
-        stiffness[:, 0] = k[on]
-        new = Bushes(
-            np.append(old.ids, 1 + _last_id(grown) + np.arange(len(on))),
-            np.concatenate([old.nodes, ends]),
-            np.concatenate([old.frame, np.stack([e, np.cross(z, e), z], axis=1)]),
-            np.concatenate([old.place, self.middle[on]]),
-            np.concatenate([old.stiffness, stiffness]),
-            np.concatenate([old.viscous, zero]),
-            np.concatenate([old.loss, zero]),
-        )
-        return replace(grown, bushes=new)
-
-
-def _last_id(a: Assembly) -> int:
-    """The largest id of any element."""
-    groups: tuple[Any, ...] = (
-        a.shells,
-        a.beams,
-        a.springs,
-        a.dampers,
-        a.scalar_masses,
-        a.bushes,
-        a.masses,
-    )
-    ids = [int(g.ids.max(initial=0)) for g in (*groups, *a.solids)]
-    return max(*ids, *(r.id for r in a.rigid), 0)
 
 
 def hem_lines(assembly: Assembly) -> list[HemLine]:
@@ -195,9 +113,8 @@ def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
     parts = np.unique(np.concatenate([part[np.concatenate(side)] for side in sides]))
     sheets = tuple(assembly.parts[int(p)].name for p in parts)
     share = np.minimum(np.gradient(s), 2 * pitch)
-    return HemLine(
-        name, middle, along, share, s, float(s[-1]) + gap * closed, closed, sides, sheets
-    )
+    length = float(s[-1]) + gap * closed
+    return HemLine(middle, along, sides, name, sheets, share, s, length, closed)
 
 
 def _carriers(assembly: Assembly) -> dict[int, np.ndarray]:

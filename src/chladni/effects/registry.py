@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from ..errors import ExtensionError, LabelError
 from . import (
     adhesive_stiffness,
+    contact_stiffness,
     crack,
     extra_support,
     hem_contact,
@@ -46,6 +47,7 @@ BUILT_IN = (
     weld_compliance.FAMILY,
     adhesive_stiffness.FAMILY,
     hem_contact.FAMILY,
+    contact_stiffness.FAMILY,
 )
 _added: dict[str, Family] = {}
 
