@@ -26,6 +26,12 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
         f"{best.effect.name} is not told apart from {', '.join(names[1:])} by these data (it is as "
         f"probable as {odds})"
     )
+    odd = [
+        f"{t.effect.name} would need a value it cannot have: {why}"
+        for t in diagnosis.hypotheses
+        if t.effect.name in names and (why := t.effect.implausible(t.fit.of(t.effect)))
+    ]
+    note = "; ".join([note, *odd])
     if not check:
         return replace(diagnosis, one_of=names, notes=(*diagnosis.notes, note))
     note = f"{note}; what would settle it: {check}"
