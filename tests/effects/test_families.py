@@ -1,5 +1,6 @@
 """What every family promises, ours and those of packages: physics, candidates, bench and deck."""
 
+import json
 import pickle
 from dataclasses import dataclass, replace
 
@@ -316,3 +317,11 @@ def test_pickles(family, proposed):
     for c in proposed:
         again = pickle.loads(pickle.dumps(c.effect))
         assert again.location(c.start) == c.effect.location(c.start)
+
+
+def test_says_of_itself_what_json_holds(proposed):
+    for c in proposed:
+        sd = np.full(len(c.start), 0.1)
+        said = *c.effect.reported(c.start, sd), c.effect.location(c.start), c.effect.where()
+        json.dumps([vars(one) for one in said], allow_nan=False)
+        assert all(row.low <= row.value <= row.high for row in c.effect.reported(c.start, sd))

@@ -17,7 +17,7 @@ from ..model.properties import Isotropic, Part, SolidSection
 from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import Joint, alone, beads, with_factor_on, with_solids
+from .joints import Connection, alone, beads, with_factor_on, with_solids
 from .model_families import joint_families
 from .search_context import Candidate, SearchContext, best_places
 
@@ -36,7 +36,7 @@ class AdhesiveStiffness(Effect):
     claim = "a bead of adhesive is far softer or stiffer than the deck has it"
     rounds = 2
 
-    joint: Joint | None = None
+    joint: Connection | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
@@ -82,7 +82,7 @@ def beads_of(built: Structure) -> list[AdhesiveStiffness]:
 
 
 def _of_one(
-    built: Structure, bead: Joint, family: tuple[sp.csr_array, float], tried: int
+    built: Structure, bead: Connection, family: tuple[sp.csr_array, float], tried: int
 ) -> AdhesiveStiffness:
     K, sd = family
     own = congruence(built.T, _families(alone(built.assembly, bead), True)[2])
@@ -103,12 +103,12 @@ def _of_one(
     )  # fmt: skip
 
 
-def _parts(assembly: Assembly, bead: Joint) -> list[Part]:
+def _parts(assembly: Assembly, bead: Connection) -> list[Part]:
     group = assembly.solids[bead.group]
     return [assembly.parts[int(p)] for p in np.unique(group.part[bead.elements])]
 
 
-def _modulus(assembly: Assembly, bead: Joint) -> float | None:
+def _modulus(assembly: Assembly, bead: Connection) -> float | None:
     """E [Pa] where all of the bead has the same."""
     values = {
         p.section.material.E

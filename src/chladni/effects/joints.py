@@ -24,7 +24,7 @@ FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class Connection:
     """Elements that hold sheets together in one place.
 
     Attributes
@@ -59,7 +59,7 @@ def members(assembly: Assembly, kind: str, group: int) -> Any:
     return assembly.solids[group] if kind == "solids" else getattr(assembly, kind)
 
 
-def alone(assembly: Assembly, joint: Joint) -> Assembly:
+def alone(assembly: Assembly, joint: Connection) -> Assembly:
     """The points with the elements of a joint and nothing else that is stiff or heavy."""
     nothing = Scalars()
     bare = replace(
@@ -75,7 +75,7 @@ def _with(assembly: Assembly, kind: str, new: Any) -> Assembly:
     return replace(assembly, **changed)
 
 
-def stiffness_rows(built: Structure, joint: Joint) -> sp.csr_array:
+def stiffness_rows(built: Structure, joint: Connection) -> sp.csr_array:
     """Rows b (r, n) over the free dofs with bᵀ b what the joint has in K.
 
     Motions of the joint that cost nothing, and those of the elements alone that no sheet follows,
@@ -94,7 +94,7 @@ def stiffness_rows(built: Structure, joint: Joint) -> sp.csr_array:
     return sp.csr_array(((s[kept, None] * Vt[kept]).ravel(), where), shape=(kept.sum(), B.shape[1]))
 
 
-def fasteners(built: Structure) -> list[Joint]:
+def fasteners(built: Structure) -> list[Connection]:
     """Every weld, screw and bush between sheets, with its rows, where the structure has sheets."""
     if not len(built.assembly.shells):
         return []
@@ -106,13 +106,13 @@ def fasteners(built: Structure) -> list[Joint]:
     return [j for j in (_on_sheets(a, joint, _moved(columns, joint)) for joint in found) if j.parts]
 
 
-def beads(built: Structure) -> list[Joint]:
+def beads(built: Structure) -> list[Connection]:
     """Solids of adhesive that hang together, and all of a part where these are several.
 
     Those of a part come before what they consist of. They have no rows: they are many elements.
     """
     assembly = built.assembly
-    out: list[Joint] = []
+    out: list[Connection] = []
     for group, rows in _solid_parts(assembly, soft=True):
         pieces = list(_pieces(assembly.solids[group].nodes[rows]))
         whole = [rows] if len(pieces) > 1 else []
@@ -122,7 +122,7 @@ def beads(built: Structure) -> list[Joint]:
     return [j for j in out if j.parts]
 
 
-def _moved(columns: sp.csc_array, joint: Joint) -> np.ndarray:
+def _moved(columns: sp.csc_array, joint: Connection) -> np.ndarray:
     """Rows of the points that move with the free dofs a joint couples; ``columns`` are those of T.
 
     Of a mean these are the grids it is taken over, of a rigid spider those that follow it.
@@ -130,7 +130,7 @@ def _moved(columns: sp.csc_array, joint: Joint) -> np.ndarray:
     return np.unique(columns[:, np.unique(joint.rows.indices)].indices // 6)
 
 
-def _on_sheets(assembly: Assembly, joint: Joint, points: np.ndarray) -> Joint:
+def _on_sheets(assembly: Assembly, joint: Connection, points: np.ndarray) -> Connection:
     """The joint with the sheets that have some of these points (k,)."""
     touching = np.isin(assembly.shells.nodes, points).any(axis=1)
     parts, count = np.unique(assembly.shells.part[touching], return_counts=True)
@@ -139,7 +139,7 @@ def _on_sheets(assembly: Assembly, joint: Joint, points: np.ndarray) -> Joint:
     return replace(joint, parts=names, grids=tuple(assembly.ids[on].tolist()))
 
 
-def _touched(built: Structure, joint: Joint) -> np.ndarray:
+def _touched(built: Structure, joint: Connection) -> np.ndarray:
     """Rows of the points on which the nodes of a joint depend."""
     nodes = np.unique(members(built.assembly, joint.kind, joint.group).nodes[joint.elements])
     dofs = (6 * nodes[:, None] + np.arange(3)).ravel()
@@ -174,20 +174,20 @@ def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
     yield from np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
 
 
-def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Joint:
+def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
     solids = assembly.solids[group]
     middle = assembly.points[solids.nodes[rows]].mean(axis=(0, 1))
-    return Joint("solids", group, rows, tuple(solids.ids[rows].tolist()), middle)
+    return Connection("solids", group, rows, tuple(solids.ids[rows].tolist()), middle)
 
 
-def _weld_solids(assembly: Assembly) -> Iterator[Joint]:
+def _weld_solids(assembly: Assembly) -> Iterator[Connection]:
     for group, rows in _solid_parts(assembly, soft=False):
         for piece in _pieces(assembly.solids[group].nodes[rows]):
             if len(piece) <= MOST_SOLIDS:
                 yield _of_solids(assembly, group, rows[piece])
 
 
-def _bars(assembly: Assembly) -> Iterator[Joint]:
+def _bars(assembly: Assembly) -> Iterator[Connection]:
     """Bars by themselves whose ends are those of rigid spiders or means."""
     beams = assembly.beams
     if not len(beams):
@@ -198,13 +198,13 @@ def _bars(assembly: Assembly) -> Iterator[Joint]:
         nodes, count = np.unique(beams.nodes[piece], return_counts=True)
         if len(piece) <= MOST_BARS and held.issuperset(nodes[count == 1].tolist()):
             middle = assembly.points[nodes].mean(axis=0)
-            yield Joint("beams", 0, piece, tuple(beams.ids[piece].tolist()), middle)
+            yield Connection("beams", 0, piece, tuple(beams.ids[piece].tolist()), middle)
 
 
-def _bushes(assembly: Assembly) -> Iterator[Joint]:
+def _bushes(assembly: Assembly) -> Iterator[Connection]:
     for row in np.flatnonzero((assembly.bushes.nodes >= 0).all(axis=1)):
         ids = (int(assembly.bushes.ids[row]),)
-        yield Joint("bushes", 0, np.array([row]), ids, assembly.bushes.place[row])
+        yield Connection("bushes", 0, np.array([row]), ids, assembly.bushes.place[row])
 
 
 def _picked(family: Any, rows: np.ndarray) -> Any:
@@ -212,7 +212,7 @@ def _picked(family: Any, rows: np.ndarray) -> Any:
     return type(family)(**{name: column[rows] for name, column in vars(family).items()})
 
 
-def with_factor_on(assembly: Assembly, joint: Joint, factor: float) -> Assembly:
+def with_factor_on(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
     """The assembly with the stiffness of a joint times a factor; its mass stays.
 
     Solids and bars get a part of their own, unless all of their part is in the joint.
@@ -249,14 +249,14 @@ def with_solids(assembly: Assembly, factor: float, soft: bool) -> Assembly:
     return assembly.with_parts(tuple(parts))
 
 
-def without_joint(assembly: Assembly, joint: Joint) -> Assembly:
+def without_joint(assembly: Assembly, joint: Connection) -> Assembly:
     """The assembly with the elements of a joint taken out."""
     old = members(assembly, joint.kind, joint.group)
     kept = np.setdiff1d(np.arange(len(old.ids)), joint.elements)
     return _with_members(assembly, joint, _picked(old, kept))
 
 
-def _with_members(assembly: Assembly, joint: Joint, new: Any) -> Assembly:
+def _with_members(assembly: Assembly, joint: Connection, new: Any) -> Assembly:
     if joint.kind != "solids":
         return _with(assembly, joint.kind, new)
     solids = list(assembly.solids)

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from .effect import Effect
-from .joints import Joint
+from .joints import Connection
 from .surroundings import ShellGrids, Surroundings
 
 
@@ -97,7 +97,7 @@ class SearchContext(Protocol):
         """Fast scores; None where only natural frequencies are known."""
 
     @property
-    def fasteners(self) -> tuple[tuple[Joint, np.ndarray], ...]:
+    def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
         """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
 
     def scores(

@@ -18,7 +18,7 @@ from ..model.assembly import Assembly
 from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import Joint, fasteners, with_factor_on, with_solids
+from .joints import Connection, fasteners, with_factor_on, with_solids
 from .model_families import joint_families
 from .search_context import Candidate, SearchContext, best_places
 
@@ -47,7 +47,7 @@ class WeldCompliance(Effect):
     claim = "a weld or a fastener is softer than the deck has it"
     rounds = 1  # a weld that is gone may free a mode of its own
 
-    joint: Joint | None = None
+    joint: Connection | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     softness: float = 1.0
@@ -112,7 +112,11 @@ def each(kind: type[WeldCompliance], context: SearchContext) -> list[WeldComplia
 
 
 def of_one(
-    kind: type[WeldCompliance], joint: Joint, share: np.ndarray, families: JointFamilies, tried: int
+    kind: type[WeldCompliance],
+    joint: Connection,
+    share: np.ndarray,
+    families: JointFamilies,
+    tried: int,
 ) -> WeldCompliance:
     """The effect of one of as many fasteners as were tried.
 
@@ -165,7 +169,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     return proposed(WeldCompliance, context)
 
 
-def drawn(article: Article, rng: np.random.Generator) -> tuple[Joint, dict[str, object]]:
+def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[str, object]]:
     """A fastener of the article, and where it is."""
     from ..fem.assemble import structure
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.joints import Joint
+from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..effects.surroundings import ShellGrids, Surroundings
@@ -91,7 +91,7 @@ class UpdatingContext:
         return loosened(self.problem.reduced)
 
     @property
-    def fasteners(self) -> tuple[tuple[Joint, np.ndarray], ...]:
+    def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
         """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
         return tuple((each.joint, each.share) for each in self.loosened)
 

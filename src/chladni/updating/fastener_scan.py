@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.reduction import attachments
-from ..effects.joints import Joint, fasteners
+from ..effects.joints import Connection, fasteners
 from ..geometry.sampling import farthest_point_sample
 from .likelihood import Responses
 from .reduced_model import State
@@ -38,7 +38,7 @@ LEAST = 1e-9  # of R: rounding of the solves
 class Loosened:
     """A fastener, R_0 = 1 - b P⁻¹ bᵀ of its rows and N_0 = b P⁻¹ M P⁻¹ bᵀ (r, r)."""
 
-    joint: Joint
+    joint: Connection
     R: np.ndarray
     N: np.ndarray
 
