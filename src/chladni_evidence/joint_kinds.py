@@ -56,7 +56,7 @@ def _modulus(section: object) -> float:
 
 
 def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The adhesive of one part softer or stiffer by e^1.5 to e^2.5 at size 1."""
+    """The adhesive of one part softer or stiffer by e^3 to e^4 at size 1."""
     a = site.article
     soft = [p.name for p in a.parts if 0 < _modulus(p.section) < SOFTEST]
     if not soft:
@@ -64,7 +64,7 @@ def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     name, way = str(rng.choice(soft)), float(rng.choice([-1, 1]))
     section = a.parts[a.part(name)].section
     way = -1.0 if _modulus(section) > 1e9 else way  # a layer of epoxy could hardly hold more
-    factor = float(np.exp(way * rng.uniform(1.5, 2.5) * size))
+    factor = float(np.exp(way * rng.uniform(3.0, 4.0) * size))
     made = scaled(a, {name: {"E": factor}})
     return Hidden(made, {"value": _modulus(section) * factor, "part": name})
 
