@@ -26,6 +26,7 @@ from .linear_parameter import LinearScale
 SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 ADHESIVE, FASTENER = 0.5, 0.5  # prior sd of ln k
 WELD = 0.3
+JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
 
