@@ -15,7 +15,7 @@ from .preparation import SOLVED, measured_on, nuisances, updating_problem
 from .question import Prepared, Question
 from .reduced_problem import reduced_problem
 
-TRIES = 5  # times the basis is widened by what it lacks
+TRIES = 3  # times the basis is widened by what it lacks
 
 
 @dataclass(frozen=True, eq=False)

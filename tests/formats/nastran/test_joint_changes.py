@@ -111,14 +111,14 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
 
 
 def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
-    """The other bush of PBUSH 7 keeps the card as it was."""
+    """The other bush of PBUSH 7 keeps the card as it was; a short field holds seven digits."""
     found, before = deck
     effect = freed(shell_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
     after = effect.apply(before, np.array([0.2]))
     got, _ = rewritten(found, before, after)
     due, is_now = (structure(a).system.K.toarray() for a in (after, got))
     assert_allclose(is_now, due, atol=1e-7 * np.abs(due).max())
-    assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-9)
+    assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
     assert_allclose(got.bushes.stiffness[1], before.bushes.stiffness[1], rtol=1e-9)
 
 
