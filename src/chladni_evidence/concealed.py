@@ -33,11 +33,11 @@ NUMBERED = 7  # families before the nulls in the order that seeds the random num
 
 
 def concealable() -> tuple[str, ...]:
-    """Names of all that can be concealed: every family of effects, and the nulls.
+    """Names of all that can be concealed: every family that acts on a bare sheet, and the nulls.
 
     The order seeds the cases, so that what comes later must stand later.
     """
-    names = registry.names()
+    names = tuple(family.name for family in registry.families() if not family.needs)
     return (*names[:NUMBERED], *NULLS, *names[NUMBERED:])
 
 

@@ -12,7 +12,7 @@ from .benched_recording import PLAIN, Recorder
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
 
-SETS = ("tailgate", "panels", "forms", "outside")
+SETS = ("tailgate", "panels", "forms", "outside", "joints")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
@@ -26,6 +26,12 @@ HOMES = {  # structures of the set outside, by what is put into them
     "crack": ("plate", "bonded plates", "curved shell", "ribbed plate"),
     "friction-joint": ("lidded box", "bonded plates", "tube frame"),
     "duplicated-pair": ("panel", "bolted bracket", "bonded plates", "lidded box"),
+}
+JOINED = {  # structures of the set joints, by what is put into them
+    "nothing": ("bonded plates", "lidded box", "bolted bracket"),
+    "weld-missing": ("lidded box", "bolted bracket"),
+    "adhesive-stiffness": ("bonded plates", "tailgate"),
+    "hem-contact": ("tailgate",),
 }
 
 
@@ -62,8 +68,15 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     forms: on each form a null and one other kind, the kinds in turn.
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
+    joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
     """
-    made = {"tailgate": _tailgate, "panels": _panels, "forms": _forms, "outside": _outside}
+    made = {
+        "tailgate": _tailgate,
+        "panels": _panels,
+        "forms": _forms,
+        "outside": _outside,
+        "joints": _joints,
+    }
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
     return [order for seed in seeds for order in made[name](seed)]
@@ -92,6 +105,11 @@ def _outside(seed: int) -> Iterator[Order]:
     for k, (kind, homes) in enumerate(HOMES.items()):
         home = homes[(seed + k) % len(homes)]
         yield Order(home, kind, seed, _mesh(kind, MESHES[(seed + k) % 2]))
+
+
+def _joints(seed: int) -> Iterator[Order]:
+    for kind, homes in JOINED.items():
+        yield from (Order(h, kind, seed, "16 mm" if h == "tailgate" else "fine") for h in homes)
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:

@@ -28,11 +28,12 @@ from .benched_recording import PLAIN, Benched, Recorder, benched_recording, can_
 from .footing import Spots, footing
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
+from .joint_kinds import JOINTS
 from .outside_kinds import OUTSIDE
 from .part_scatter import scattered
 from .response_of_article import accelerance, decades_apart, seen
 
-KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE}
+KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS}
 UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # as large as they are
 TWICE = 2.0  # an effect moves the responses at least this many times as far as the scatter does
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]

@@ -3,9 +3,16 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chladni.effects import registry
+from chladni.model.assembly import Assembly
+from chladni.model.properties import Isotropic
+from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
+from chladni_specimens.joints.bolts import screw
+from chladni_specimens.joints.builders import adhesive_bead, spot_welds
+from chladni_specimens.plates import STEEL
 
 
 def write_package(folder: Path, name: str, entries: dict[str, str]) -> None:
@@ -44,3 +51,32 @@ def example_edge_mass(tmp_path_factory):
         yield registry.family("edge-mass")
     registry._installed.cache_clear()
     sys.modules.pop("edge_mass", None)
+
+
+SEALANT = Isotropic(6e6, 0.4, 1000.0, id=2)
+HIGH = 1.2e-3  # of the upper plate above the lower one [m]
+
+
+@pytest.fixture(scope="session")
+def jointed():
+    """Builds two plates joined in every way, of elements of a size."""
+    return jointed_plates
+
+
+def jointed_plates(h: float = 0.05) -> Assembly:
+    """A plate over another: three welds, a screw and a sealed edge hold them; they almost touch.
+
+    400 x 300 mm of 1.5 mm below, 360 x 260 mm of 1 mm above.
+    """
+    pieces = [
+        rectangle("lower", (0, 0, 0), stops([0.0, 0.4], h), stops([0.0, 0.3], h)),
+        rectangle("upper", (0.02, 0.02, HIGH), stops([0.0, 0.36], h), stops([0.0, 0.26], h)),
+    ]
+    made = of_pieces(pieces, {"lower": (1.5e-3, STEEL), "upper": (1e-3, STEEL)})
+    places = np.array([(0.05, y, HIGH / 2) for y in (0.06, 0.15, 0.24)])
+    made = spot_welds(made, places, ("lower", "upper"))[0]
+    made = screw(made, np.array([0.2, 0.05, HIGH / 2]), ("lower", "upper"))[0]
+    line = np.array([(0.12, 0.27, HIGH / 2), (0.37, 0.27, HIGH / 2), (0.37, 0.03, HIGH / 2)])
+    return adhesive_bead(
+        made, line, ("lower", "upper"), height=0.15e-3, pitch=0.97 * h, material=SEALANT
+    )[0]

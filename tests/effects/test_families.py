@@ -1,7 +1,8 @@
 """What every family promises, ours and those of packages: physics, candidates, bench and deck."""
 
+import json
 import pickle
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,19 +13,22 @@ from chladni.effects import registry
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.family import Article
+from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.surroundings import Setup
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
+from chladni.geometry.sampling import farthest_point_sample
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.assembly import Assembly
 from chladni.units import UNITS
 from chladni.updating.candidates import UpdatingContext
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
+from chladni.updating.reduced_problem import ReducedProblem, reduced_problem
 from chladni_specimens.plates import plate
 
 TOP = 300.0  # Hz; six flexible modes of the plate lie below
@@ -41,48 +45,82 @@ CONTRACT = {  # names that issue texts, cases and other programs may use
 }
 
 
-@pytest.fixture(scope="module")
-def deck():
-    return plate(0.4, 0.3, 8, 6, 1.5e-3)
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A deck, what is known of its test, two recordings of it, and an article of a finer mesh."""
+
+    deck: Assembly
+    reduced: ReducedProblem
+    sensors: list[int]
+    by_responses: UpdatingContext
+    by_poles: UpdatingContext
+    article: Article
 
 
-@pytest.fixture(scope="module")
-def reduced(deck):
-    return reduced_problem(deck, TOP)
-
-
-@pytest.fixture(scope="module")
-def setup(deck):
-    return Setup(tuple(((int(g), 1.0),) for g in SENSORS), (7, 63), mass_properties(deck)[0], TOP)
-
-
-def updating_context(reduced, data, setup):
+def updating_context(reduced, data, setup, sensors):
     """A search with E free, and its null."""
-    base = (ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01))
-    labels = tuple(f"{g}:+Z" for g in SENSORS)
+    base = (
+        ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01),
+        *(e for e in model_families(reduced.structure) if "shear" not in e.text),
+    )  # fmt: skip
+    labels = tuple(f"{g}:+Z" for g in sensors)
     problem = UpdatingProblem(reduced, data, None, base, (), setup, labels)
     fit = fitted(reduced.model, base, data, None, problem.mean())
     return UpdatingContext(problem, HypothesisFit(Effect(), fit, reduced.model))
 
 
-@pytest.fixture(scope="module")
-def by_responses(reduced, setup):
-    """A plate 4 % stiffer than the model, with one corner sensor at half its level."""
-    rows = reduced.grids.rows[[reduced.grids.position(g) for g in SENSORS]]
+def recorded(reduced, sensors):
+    """A structure 4 % stiffer than the model, with one sensor at half its level."""
+    rows = reduced.grids.rows[[reduced.grids.position(g) for g in sensors]]
     s = 2 * np.pi * np.linspace(30, TOP, 50) * (0.05 + 1j)
-    use = np.ones((50, len(SENSORS)), bool)
-    empty = Responses(np.ones((50, len(SENSORS), 1), complex), s, rows, rows[[4]], use)
+    use = np.ones((50, len(sensors)), bool)
+    empty = Responses(np.ones((50, len(sensors), 1), complex), s, rows, rows[[4]], use)
     data = empty.over(reduced.model)
     stiffer = evaluate(reduced.model, [ordinary(reduced.groups, "E", [0])], np.array([0.04]))
-    gains = np.where(np.arange(len(SENSORS)) == 2, 0.5, 1.0)[:, None]
-    return updating_context(reduced, replace(data, values=data.model(stiffer) * gains), setup)
+    gains = np.where(np.arange(len(sensors)) == 2, 0.5, 1.0)[:, None]
+    return replace(data, values=data.model(stiffer) * gains)
+
+
+def ground(deck, fine, sensors):
+    reduced = reduced_problem(deck, TOP)
+    hangers = sensors[1], sensors[3]
+    shares = tuple(((int(g), 1.0),) for g in sensors)
+    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP)
+    f = reduced.frequency[FLEXIBLE] * 1.02
+    every = np.ones(len(f), bool)
+    poles = Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP))
+    ones = np.ones(len(sensors))
+    return Ground(
+        deck, reduced, sensors,
+        updating_context(reduced, recorded(reduced, sensors), setup, sensors),
+        updating_context(reduced, poles, setup, sensors),
+        Article(fine, deck, np.array(sensors), np.array(hangers), ones),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def by_poles(reduced, setup):
-    f = reduced.frequency[FLEXIBLE] * 1.02
-    every = np.ones(len(f), bool)
-    return updating_context(reduced, Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP)), setup)
+def on_plate():
+    fine = plate(0.4, 0.3, 16, 12, 1.5e-3)
+    return ground(plate(0.4, 0.3, 8, 6, 1.5e-3), fine, SENSORS)
+
+
+@pytest.fixture(scope="module")
+def on_joints(jointed):
+    """Two plates joined, for what acts on joints."""
+    deck = jointed()
+    lower = np.unique(deck.shells.nodes[deck.shells.part == 0])
+    spread = lower[farthest_point_sample(deck.points[lower], 6)]
+    return ground(deck, jointed(0.03), deck.ids[spread].tolist())
+
+
+@pytest.fixture
+def reduced(on_plate):
+    return on_plate.reduced
+
+
+@pytest.fixture
+def by_responses(on_plate):
+    return on_plate.by_responses
 
 
 @pytest.fixture(params=NAMES)
@@ -91,8 +129,14 @@ def family(request, example_edge_mass):
 
 
 @pytest.fixture
-def proposed(family, by_responses):
-    return family.proposed(by_responses)
+def on(family, request):
+    """The ground a family has what it needs on."""
+    return request.getfixturevalue("on_joints" if family.needs else "on_plate")
+
+
+@pytest.fixture
+def proposed(family, on):
+    return family.proposed(on.by_responses)
 
 
 def acting(candidate):
@@ -111,15 +155,15 @@ def test_names_are_unique_and_ours_are_in_the_contract(example_edge_mass):
     assert {family.name for family in registry.BUILT_IN} <= CONTRACT
 
 
-def test_candidates_fit_the_search(family, proposed, by_responses, by_poles):
+def test_candidates_fit_the_search(family, proposed, on):
     """Starts of the right length about either base; with poles all but faults of the test."""
     assert proposed
-    frequencies = family.proposed(by_poles)
+    frequencies = family.proposed(on.by_poles)
     assert bool(frequencies) == (family.effect.kind != "test")
     for c in (*proposed, *frequencies):
         assert isinstance(c.effect, family.effect)
         assert len(c.start) == len(c.effect.parameters)
-        assert len(c.base) == len(by_responses.null)
+        assert len(c.base) == len(on.by_responses.null)
         assert c.effect.trials_factor >= 1
 
 
@@ -162,10 +206,10 @@ def test_begins_anew_where_it_moved_to(reduced, by_responses, kind):
     assert np.abs(anew - moved).max() < 0.5 * np.abs(lam(model, effect, old) - moved).max()
 
 
-def test_does_nothing_at_its_nominal_parameters(reduced, proposed):
+def test_does_nothing_at_its_nominal_parameters(on, proposed):
     for c in proposed:
         idle = np.array([p.nominal for p in c.effect.parameters])
-        model = reduced.model_for(c.effect, c.start)
+        model = on.reduced.model_for(c.effect, c.start)
         state = evaluate(model, [c.effect], idle, False)
         without = evaluate(model, [], np.zeros(0), False)
         assert_allclose(state.lam[FLEXIBLE], without.lam[FLEXIBLE], rtol=1e-6)
@@ -175,18 +219,18 @@ def test_does_nothing_at_its_nominal_parameters(reduced, proposed):
             assert_allclose(state.offset, 0, atol=1e-12)
 
 
-def test_acts_elsewhere(reduced, proposed):
+def test_acts_elsewhere(on, proposed):
     for c in proposed:
-        model, x = reduced.model_for(c.effect, c.start), acting(c)
+        model, x = on.reduced.model_for(c.effect, c.start), acting(c)
         moved = np.abs(lam(model, c.effect, x) / lam(model, Effect(), x[:0]) - 1).max() > 1e-4
         change = c.effect.outputs(x)
         assert moved != (change is not None and bool(np.abs(change.value).max() > 0.01))
 
 
-def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(reduced, proposed):
+def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(on, proposed):
     rng = np.random.default_rng(3)
     c = proposed[0]
-    model = reduced.model_for(c.effect, c.start)
+    model = on.reduced.model_for(c.effect, c.start)
     mean, sd = (np.array([getattr(p, q) for p in c.effect.parameters]) for q in ("mean", "sd"))
     for _ in range(20):
         x = mean + sd * rng.uniform(-3, 3, len(sd))
@@ -194,16 +238,16 @@ def test_leaves_stiffness_and_mass_positive_wherever_the_prior_reaches(reduced, 
         assert state.lam[0] > -1e-6 * state.lam[FLEXIBLE][0]
 
 
-def test_slopes_leave_a_remainder_of_second_order(reduced, proposed):
+def test_slopes_leave_a_remainder_of_second_order(on, proposed):
     """|λ(x + hd) - λ(x) - h λ'd| falls as h²."""
     for c in proposed:
-        model, x = reduced.model_for(c.effect, c.start), acting(c)
+        model, x = on.reduced.model_for(c.effect, c.start), acting(c)
         d = np.cos(2 + np.arange(len(x)))
         state = evaluate(model, [c.effect], x)
         slope = np.einsum("prr,p->r", state.dK - state.lam * state.dM, d)[FLEXIBLE]
         if not np.abs(slope).max() > 1e-9 * state.lam[FLEXIBLE].max():
             continue
-        h = 0.02
+        h = 0.01
         left = [
             np.abs(lam(model, c.effect, x + s * d) - state.lam[FLEXIBLE] - s * slope).max()
             for s in (h, h / 2)
@@ -211,34 +255,28 @@ def test_slopes_leave_a_remainder_of_second_order(reduced, proposed):
         assert left[0] / left[1] == pytest.approx(4, rel=0.15)
 
 
-def test_what_remakes_the_structure_is_idle_where_it_has_been_remade(reduced, proposed):
+def test_what_remakes_the_structure_is_idle_where_it_has_been_remade(on, proposed):
     for c in proposed:
         if c.effect.remakes_structure:
             x = acting(c)
-            model = reduced.model_for(c.effect, x)
+            model = on.reduced.model_for(c.effect, x)
             again = c.effect.with_reference_state(x)
             assert_allclose(lam(model, again, x), lam(model, Effect(), x[:0]), rtol=1e-12)
 
 
-@pytest.fixture(scope="module")
-def article(deck):
-    fine, n = plate(0.4, 0.3, 16, 12, 1.5e-3), len(SENSORS)
-    return Article(fine, deck, np.array(SENSORS), np.array([7, 63]), np.ones(n))
-
-
-def test_is_concealed_in_the_article_or_its_recording(family, article, proposed):
+def test_is_concealed_in_the_article_or_its_recording(family, on, proposed):
     """The deck stays; the truth speaks of parameters the effect reports; a seed repeats it."""
-    one, two = (family.conceal(article, np.random.default_rng(5)) for _ in range(2))
-    assert one.deck is article.deck
+    one, two = (family.conceal(on.article, np.random.default_rng(5)) for _ in range(2))
+    assert one.deck is on.article.deck
     assert one.truth == two.truth
     c = proposed[0]
     reported = {row.name for row in c.effect.reported(c.start, np.zeros(len(c.start)))}
     assert one.truth["parameters"]
     assert set(one.truth["parameters"]) <= reported
     before, after = (normal_modes(structure(a.assembly).system, 12).frequency[6:]
-                     for a in (article, one))  # fmt: skip
+                     for a in (on.article, one))  # fmt: skip
     moved = np.abs(after / before - 1).max() > 1e-5
-    assert moved != bool((one.gains != article.gains).any())
+    assert moved != bool((one.gains != on.article.gains).any())
     assert moved == (family.effect.kind == "physics")
 
 
@@ -253,9 +291,9 @@ def cards_that_differ(path, other):
     return out
 
 
-def test_goes_into_the_deck_by_its_cards_and_no_others(family, deck, proposed, tmp_path):
+def test_goes_into_the_deck_by_its_cards_and_no_others(family, on, proposed, tmp_path):
     """What was written, read again, is the structure the effect makes; else it says why not."""
-    path = write_assembly(deck, tmp_path / "deck.bdf", UNITS["mm-t-s"])
+    path = write_assembly(on.deck, tmp_path / "deck.bdf", UNITS["mm-t-s"])
     read = read_deck(path)
     before = assembly(read, UNITS["mm-t-s"])
     after = proposed[0].effect.apply(before, acting(proposed[0]))
@@ -279,3 +317,11 @@ def test_pickles(family, proposed):
     for c in proposed:
         again = pickle.loads(pickle.dumps(c.effect))
         assert again.location(c.start) == c.effect.location(c.start)
+
+
+def test_says_of_itself_what_json_holds(proposed):
+    for c in proposed:
+        sd = np.full(len(c.start), 0.1)
+        said = *c.effect.reported(c.start, sd), c.effect.location(c.start), c.effect.where()
+        json.dumps([vars(one) for one in said], allow_nan=False)
+        assert all(row.low <= row.value <= row.high for row in c.effect.reported(c.start, sd))

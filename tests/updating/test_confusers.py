@@ -12,8 +12,10 @@ from chladni.updating.result_parts import why_not
 from chladni.updating.ties import TIED, simplest_first
 
 
-def tried(name, S, becomes=""):
-    effect = SimpleNamespace(name=name, becomes=lambda x: becomes)
+def tried(name, S, becomes="", implausible=""):
+    effect = SimpleNamespace(
+        name=name, becomes=lambda x: becomes, implausible=lambda x: implausible
+    )
     return SimpleNamespace(
         neg2_log_evidence=S, effect=effect, fit=SimpleNamespace(of=lambda e: None)
     )
@@ -75,3 +77,17 @@ def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
     effect = SimpleNamespace(parameters=(None, None, None, high))
     assert LocalResonator.becomes(effect, [0, 0, 0, 301.0]) == "point-mass"
     assert LocalResonator.becomes(effect, [0, 0, 0, 299.0]) == ""
+
+
+def test_a_value_a_thing_cannot_have_yields_to_one_it_can():
+    """A uniform hem and a stiff string are one to frequencies: told as one of the two."""
+    string = tried("adhesive-stiffness", 0.0, implausible="E of 210000 MPa is that of no sealant")
+    hem, far = tried("hem-contact", TIED - 1), tried("hem-contact", TIED + 1)
+    assert simplest_first([string, hem]) == [hem, string]
+    assert simplest_first([string, far]) == [string, far]
+    plain = tried("adhesive-stiffness", 0.0)
+    assert simplest_first([plain, hem]) == [plain, hem]
+    answer = with_confusers(Diagnosis(None, None, None, (hem, string), "missing physics"))
+    assert answer.one_of[:2] == ("hem-contact", "adhesive-stiffness")
+    assert "cut through the hem" in answer.one_of[2]
+    assert "no sealant" in answer.notes[-1]

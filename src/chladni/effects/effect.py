@@ -144,6 +144,7 @@ class Effect:
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
     writable: ClassVar[bool] = True  # whether a deck could hold it
     remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
+    rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
     own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()
@@ -193,6 +194,14 @@ class Effect:
         operators = [sp.csr_array((m.operator @ shapes).T) for m in self.matrices(x)]
         return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
 
+    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
+        """Loads (n, k) that static responses (n, k) of the last round cause in their turn.
+
+        What acts strongly changes modes beyond first order: the basis holds the responses to these
+        as well, ``rounds`` times.
+        """
+        return M @ static
+
     def recentred(self, x: np.ndarray, where: "Surroundings") -> tuple["Effect", np.ndarray] | None:
         """The effect about the place it moved to, and its start there; None: it is near enough."""
         return None
@@ -221,6 +230,10 @@ class Effect:
 
     def becomes(self, x: np.ndarray) -> str:
         """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
+        return ""
+
+    def implausible(self, x: np.ndarray) -> str:
+        """Why its value at x is none such a thing can have; "" where it may."""
         return ""
 
     def starts(self) -> list[np.ndarray]:

@@ -67,6 +67,7 @@ class Family:
     cards : of the deck that hold it
     no_cards : why none can
     settled_by : the measurement that tells it from what looks like it, in words
+    needs : what a structure must have beside its sheets for it to act, in words; "": nothing
     """
 
     effect: type[Effect]
@@ -76,6 +77,7 @@ class Family:
     cards: tuple[str, ...] = ()
     no_cards: str = ""
     settled_by: str = ""
+    needs: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:

@@ -6,7 +6,7 @@ of a part, in which two formulations of one element differ most (MacNeal's resid
 flexibility is part of it), and the same for coarse and fine meshes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,9 @@ from .effect import Parameter
 from .linear_parameter import LinearScale
 
 SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
-ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
+ADHESIVE, FASTENER = 0.5, 0.5  # prior sd of ln k
+WELD = 0.3
+JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
 
@@ -41,11 +43,26 @@ class ModelFamily(LinearScale):
 
 def model_families(built: Structure) -> list[ModelFamily]:
     """Every family of joints, and the transverse shear of every part."""
+    return [*joint_nuisances(built), *_families(_shear(built))]
+
+
+def joint_nuisances(built: Structure) -> list[ModelFamily]:
+    """Every family of joints: it moves what modes alone do not, and a basis has to carry it."""
+    return _families(joint_families(built))
+
+
+def _families(found: Iterable[tuple[str, sp.csr_array, float]]) -> list[ModelFamily]:
     return [
-        ModelFamily((Parameter("k", "-", 0.0, sd, step=0.5),), text, slope=_slope(K))
-        for text, K, sd in (*_solids(built), *_bushes(built), *_shear(built))
+        ModelFamily((Parameter("k", "-", 0.0, sd, step=max(0.5, sd / 2)),), text, slope=_slope(K))
+        for text, K, sd in found
         if K.nnz
     ]
+
+
+def joint_families(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
+    """(name, what it has in K, prior sd of ln k) of every family of joints."""
+    yield from _solids(built)
+    yield from _bushes(built)
 
 
 def _slope(K: sp.csr_array) -> Slope:

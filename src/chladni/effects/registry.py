@@ -11,8 +11,11 @@ from importlib.metadata import EntryPoint, entry_points
 
 from ..errors import ExtensionError, LabelError
 from . import (
+    adhesive_stiffness,
+    contact_stiffness,
     crack,
     extra_support,
+    hem_contact,
     local_resonator,
     mass_patch,
     orthotropic_material,
@@ -22,6 +25,8 @@ from . import (
     stiffness_patch,
     suspension,
     thickness_distribution,
+    weld_compliance,
+    weld_missing,
 )
 from .family import Family
 
@@ -38,6 +43,11 @@ BUILT_IN = (
     stiffness_patch.FAMILY,
     mass_patch.FAMILY,
     crack.FAMILY,
+    weld_missing.FAMILY,
+    weld_compliance.FAMILY,
+    adhesive_stiffness.FAMILY,
+    hem_contact.FAMILY,
+    contact_stiffness.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from .effect import Effect
+from .joints import Connection
 from .surroundings import ShellGrids, Surroundings
 
 
@@ -62,6 +63,12 @@ class ResponseScan(Protocol):
         The amount is in units of what the set has; the responses are taken as linear in it.
         """
 
+    def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
+        """Score of each of the context's fasteners with some of its stiffness left (n, k).
+
+        ``left`` (n, k) is in units of what the fastener has; nothing is linearised.
+        """
+
 
 class SearchContext(Protocol):
     """The structure, the test, two states of the base effects, and scores of what is tried.
@@ -89,8 +96,17 @@ class SearchContext(Protocol):
     def scan(self) -> ResponseScan | None:
         """Fast scores; None where only natural frequencies are known."""
 
-    def scores(self, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
-        """Score of an effect at each start about the calibrated model (n_ways, n_starts)."""
+    @property
+    def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
+        """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
+
+    def scores(
+        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False
+    ) -> np.ndarray:
+        """Score of an effect at each start about the calibrated model (n_ways, n_starts).
+
+        With ``carried`` the basis is widened by what the effect moves, as it is for a fit.
+        """
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Where poles alone are known: the lowest minima over the effect's whole prior."""
@@ -117,7 +133,7 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
 
 def best_places(
     context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2,
-    apart: float = APART,
+    apart: float = APART, carried: bool = False,
 ) -> list[Candidate]:  # fmt: skip
     """The same effect at many places, each evaluated at all its starts: the best places.
 
@@ -125,10 +141,11 @@ def best_places(
     ----------
     point : (n_effects, 3)   their places [m]
     apart : see :func:`distinct`
+    carried : see :meth:`SearchContext.scores`
     """
     options = []
     for effect in effects:
-        scores = context.scores(effect, effect.starts())[0]
+        scores = context.scores(effect, effect.starts(), carried)[0]
         options.append((float(scores.min()), effect.starts()[int(np.argmin(scores))]))
     best = distinct(np.array([score for score, _ in options]), point, [], wanted, apart)
     return [Candidate(effects[k], options[k][1], context.bases[-1]) for k in best]

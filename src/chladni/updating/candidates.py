@@ -7,10 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..effects.surroundings import ShellGrids, Surroundings
 from ..errors import ModelError
+from .fastener_scan import Loosened, fastener_scores, loosened
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
@@ -83,13 +85,28 @@ class UpdatingContext:
         data = self.problem.data
         return Scan(self, data) if isinstance(data, Responses) else None
 
-    def scores(self, effect: Effect, starts: Sequence[np.ndarray]) -> np.ndarray:
+    @cached_property
+    def loosened(self) -> tuple[Loosened, ...]:
+        """Welds and fasteners with what the sheets give where they are loaded."""
+        return loosened(self.problem.reduced)
+
+    @property
+    def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
+        """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
+        return tuple((each.joint, each.share) for each in self.loosened)
+
+    def scores(
+        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False
+    ) -> np.ndarray:
         """Score of an effect at each start about the calibrated model (n_ways, n_starts).
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
-        data, base = self.problem.data, self.baselines[-1]
-        model = self.problem.reduced.model.split_for(effect, starts[0])
+        base, reduced = self.baselines[-1], self.problem.reduced
+        model = reduced.model.split_for(effect, starts[0])
+        if carried:
+            model = reduced.model_for(effect, starts[0])
+        data = self.problem.data.over(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)
         for k, start in enumerate(starts):
@@ -155,6 +172,12 @@ class Scan:
         base = self.context.baselines[about]
         slopes = field_slopes(base, self.context.problem.reduced.model, self.data, field)
         return direction_scores(base, slopes @ change)
+
+    def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
+        """Score of each fastener with some of its stiffness left (n, k)."""
+        context, base = self.context, self.context.baselines[about]
+        reduced = context.problem.reduced
+        return fastener_scores(base, reduced, self.data, context.loosened, left)
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]

@@ -24,6 +24,12 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)
     odds = "; ".join(f"{evidence_in_words(behind[name])} against {name}" for name in names[1:])
     note = f"{best.effect.name} is not told apart by these data: {odds}"
+    odd = [
+        f"{t.effect.name} would need a value it cannot have: {why}"
+        for t in diagnosis.hypotheses
+        if t.effect.name in names and (why := t.effect.implausible(t.fit.of(t.effect)))
+    ]
+    note = "; ".join([note, *odd])
     if not check:
         return replace(diagnosis, one_of=names, notes=(*diagnosis.notes, note))
     note = f"{note}; what would settle it: {check}"

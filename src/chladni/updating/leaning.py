@@ -1,4 +1,4 @@
-"""Ordinary numbers that ended where no ordinary number is: they stand for something else."""
+"""Numbers that ended where no such number is: they stand for something else."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.freed import Freed
+from ..effects.model_families import JOINTS, ModelFamily
 from .map_fit import Fit
 
 FAR = 3.0  # prior standard deviations from the deck's value
@@ -17,6 +18,18 @@ def leaning(fit: Fit) -> list[str]:
         said
         for effect in fit.effects
         if effect.kind == "ordinary" and (said := _said(effect, fit.of(effect)))
+    ]
+
+
+def strained(fit: Fit) -> list[str]:
+    """A sentence for every family of joints that took more than joints of its kind scatter."""
+    return [
+        f"the stiffness of {effect.text} as a whole ended at {np.exp(x[0]):.2g} of the deck's, "
+        f"{away:.2g} standard deviations of what it may be by itself: it may be what is wrong"
+        for effect in fit.effects
+        if isinstance(effect, ModelFamily)
+        and (away := _away(effect, x := fit.of(effect))) > FAR
+        and effect.text in JOINTS
     ]
 
 

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..effects.discretisation import Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
-from ..effects.model_families import model_families
+from ..effects.model_families import joint_nuisances, model_families
 from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
@@ -84,7 +84,8 @@ def _by_responses(question: Question) -> Prepared:
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     measured = measured_on(question)
     reduced = reduced_problem(nominal, f_max, measured(built), base=question.base)
-    reduced = carrying(reduced, freed_by(question, reduced, f_max))
+    free = [*freed_by(question, reduced, f_max), *joint_nuisances(built)]
+    reduced = carrying(reduced, free)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)

@@ -62,8 +62,13 @@ class ReducedProblem:
         """The reduced model over a basis that can carry an effect near x, split as it needs."""
         low = np.flatnonzero(self.frequency <= self.f_max)
         rows = effect.basis_rows(x, self.model.basis[:, low])
-        model = self.model if rows is None else self.with_attachments(rows)
-        return model.split_for(effect, x)
+        if rows is None:
+            return self.model.split_for(effect, x)
+        blocks = [attachments(self.factor, rows)]
+        for _ in range(effect.rounds):
+            loads = effect.reloads(blocks[-1], self.structure.system.M)
+            blocks.append(self.factor.solve(loads))
+        return self.model.extended(np.hstack(blocks)).split_for(effect, x)
 
 
 def reduced_problem(

@@ -26,7 +26,7 @@ from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.joint_fit import Posterior, informed
-from ..updating.leaning import leaning
+from ..updating.leaning import leaning, strained
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
@@ -222,7 +222,7 @@ def _result(
     )
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
-    left = remainder(prepared, found)
+    left, away = remainder(prepared, found), (*leaning(deck.fit), *strained(last.fit))
     spot = left_where(last, asked.mass_measurement)
     weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
     return DiagnosisResult(
@@ -237,7 +237,7 @@ def _result(
         structured=left,
         adequate=_adequate(found, spot),
         left_where=spot,
-        notes=(*prepared.notes, *found.notes, *leaning(deck.fit), left.sentence, *_blind(spot)),
+        notes=(*prepared.notes, *found.notes, *away, left.sentence, *_blind(spot)),
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,

@@ -1,15 +1,17 @@
 """Changed solids, bars, springs, bushes and masses are written into the cards that hold them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.freed import freed
 from chladni.effects.shell_groups import shell_groups
-from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
+from chladni.model.assembly import Bushes
 from chladni.model.free_parameter import FreeParameter
 from chladni.units import UNITS
 
@@ -108,8 +110,22 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     assert [line.split(",")[0] for line in gone] == cards
 
 
-def test_part_of_a_property_is_refused(deck):
+def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
+    """The other bush of PBUSH 7 keeps the card as it was; a short field holds seven digits."""
     found, before = deck
     effect = freed(shell_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
-    with pytest.raises(ModelError, match="PBUSH 7 changed differently"):
-        changes(found, before, effect.apply(before, np.array([0.2])), UNITS["mm-t-s"])
+    after = effect.apply(before, np.array([0.2]))
+    got, _ = rewritten(found, before, after)
+    due, is_now = (structure(a).system.K.toarray() for a in (after, got))
+    assert_allclose(is_now, due, atol=1e-7 * np.abs(due).max())
+    assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
+    assert_allclose(got.bushes.stiffness[1], before.bushes.stiffness[1], rtol=1e-9)
+
+
+def test_a_bush_that_was_taken_out_is_a_card_less(deck):
+    found, before = deck
+    kept = {name: column[1:] for name, column in vars(before.bushes).items()}
+    after = replace(before, bushes=Bushes(**kept))
+    got, gone = rewritten(found, before, after)
+    assert got.bushes.ids.tolist() == after.bushes.ids.tolist()
+    assert [line.split(",")[0] for line in gone] == ["CBUSH"]

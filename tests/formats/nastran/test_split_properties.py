@@ -83,7 +83,7 @@ def test_another_material_and_thickness_of_some_shells(opened):
 def test_shells_of_two_properties_have_no_common_copy(opened):
     deck, before, units = opened
     both = [int(np.flatnonzero(before.shells.part == k)[0]) for k in (0, 1)]
-    with pytest.raises(ModelError, match="shells of patch come from 2 properties"):
+    with pytest.raises(ModelError, match="elements of patch come from 2 properties"):
         changes(deck, before, split(before, both, bending_ratio=0.5), units)
 
 
@@ -113,5 +113,5 @@ ENDDATA
     (tmp_path / "deck.bdf").write_text(text)
     deck = read_deck(tmp_path / "deck.bdf")
     before = assembly(deck, UNITS["SI"])
-    with pytest.raises(ModelError, match="property 1 is no PSHELL"):
+    with pytest.raises(ModelError, match="property 1 is none of PSHELL"):
         changes(deck, before, split(before, [1], bending_ratio=0.5), UNITS["SI"])

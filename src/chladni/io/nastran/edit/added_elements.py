@@ -1,4 +1,4 @@
-"""Cards of grids, masses, springs and bushes that were added to a deck."""
+"""Cards of grids, means, masses, springs and bushes that were added to a deck."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import ModelError
-from ....model.assembly import Assembly
+from ....model.assembly import Assembly, Average
 from ....units import Units
 from .. import Deck
 from .split_properties import property_ids
@@ -22,6 +22,7 @@ def added_cards(deck: Deck, before: Assembly, after: Assembly, units: Units) -> 
     """
     return [
         *_grids(before, after, units),
+        *_means(before, after),
         *_masses(before, after, units),
         *_springs(before, after, units),
         *_bushes(deck, before, after, units),
@@ -34,6 +35,18 @@ def _grids(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
         held = sorted(int(c) for r, c in after.supports if r == row)
         place = after.points[row] / units.length
         yield ["GRID", int(after.ids[row]), 0, *place.tolist(), 0, "".join(map(str, held)) or None]
+
+
+def _means(before: Assembly, after: Assembly) -> Iterator[list]:
+    """RBE3 of every mean that was added, its weights equal and of translations."""
+    for mean in after.rigid[len(before.rigid) :]:
+        alike = isinstance(mean, Average) and len({(c, w) for _, c, w in mean.terms}) == 1
+        if not isinstance(mean, Average) or not alike or mean.moved:
+            raise ModelError(f"rigid element {mean.id} was added; only plain RBE3 are written here")
+        wanted, on = ("".join(map(str, c)) for c in (mean.components, mean.terms[0][1]))
+        grids = [int(after.ids[row]) for row, _, _ in mean.terms]
+        reference = int(after.ids[mean.reference])
+        yield ["RBE3", mean.id, None, reference, wanted, mean.terms[0][2], on, *grids]
 
 
 def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:

@@ -16,7 +16,15 @@ from .added_elements import added_cards, free_system
 from .changes import Change
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
-from .split_properties import section_changes, split_changes, with_new_properties
+from .split_properties import (
+    PROPERTIES,
+    Split,
+    property_kind,
+    section_changes,
+    split_changes,
+    taken_out,
+    with_new_properties,
+)
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
@@ -32,10 +40,10 @@ def changes(
         If the two differ in something no card here can say.
     """
     units = unit_system(units or "SI")
-    out: list[Change] = []
+    before, out = taken_out(deck, before, after)
     before, after, split = with_new_properties(deck, before, after)
     free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
-    out += _materials(deck, before, after, units, free)
+    out += _materials(deck, before, after, units, free, split)
     out += laminate_changes(deck, before, after, units, free)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after)
@@ -57,7 +65,7 @@ def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]
 
 
 def _materials(
-    deck: Deck, before: Assembly, after: Assembly, units: Units, free: Iterator[int]
+    deck: Deck, before: Assembly, after: Assembly, units: Units, free: Iterator[int], split: Split
 ) -> list[Change]:
     """Cards of materials changed; where only some users of one changed, a card of their own."""
     known = {(k, name): m for k, name, m in _uses(deck, before)}
@@ -79,22 +87,20 @@ def _materials(
                 continue
             new = next(free)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
-            out += [_of_material(deck, after.parts[k], name, new) for k, name in at]
+            out += [_of_material(deck, after.parts[k], name, new, split) for k, name in at]
     oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
     return out + (_axes(deck, before, after) if oriented else [])
 
 
-def _of_material(deck: Deck, part: Part, name: str, material: int) -> Change:
+def _of_material(deck: Deck, part: Part, name: str, material: int, split: Split) -> Change:
     """The property card of a part names another material."""
     if name in _MID:
         return SetField("PSHELL", part.id, _MID[name], material)
-    kinds = ("PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
-    for kind in kinds:
-        if part.id in _ids(deck, kind):
-            return SetField(kind, part.id, "MID", material)
+    if kind := property_kind(deck, split.get(part.id, part.id)):
+        return SetField(kind, part.id, "MID", material)
     raise ModelError(
-        f"part {part.name} shares a material with others and none of {', '.join(kinds)} names it, "
-        "so it cannot have one of its own"
+        f"part {part.name} shares a material with others and none of {', '.join(PROPERTIES[1:])} "
+        "names it, so it cannot have one of its own"
     )
 
 

@@ -1,18 +1,25 @@
-"""Shells that take a property of their own: a copy of the old one, with what changed in it."""
+"""Elements that take a property of their own, a copy of the old one with what changed in it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from ....errors import ModelError
 from ....model.assembly import Assembly
 from ....model.properties import ShellSection
 from ....units import Units
-from .. import Add, Deck, SetField
+from .. import Add, Deck, Delete, SetField
 from ..text.cards import position
 from ..text.format import Value
 from .changes import Change
 
 Split = dict[int, int]  # id of a new property: id of the one it is a copy of
+SHEETS = ("CQUAD4", "CTRIA3")
+SOLIDS = ("CHEXA", "CPENTA", "CTETRA")
+BEAMS = ("CBAR", "CBEAM", "CROD", "CTUBE")
+PROPERTIES = ("PSHELL", "PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "PTUBE")
 
 
 def with_new_properties(
@@ -20,51 +27,95 @@ def with_new_properties(
 ) -> tuple[Assembly, Assembly, Split]:
     """Both assemblies with the same parts, new ones under ids the deck has free.
 
-    A part that only ``after`` has must have all its shells from one part of ``before``.
+    A part that only ``after`` has must have all its elements from one part of ``before``.
 
     Raises
     ------
     ModelError
-        If shells changed their part otherwise.
+        If elements changed their part otherwise.
     """
-    known, moved = len(before.parts), before.shells.part != after.shells.part
-    if (after.shells.part[moved] < known).any():
-        raise ModelError("a shell went from one property of the deck to another one")
+    known = len(before.parts)
+    pairs = [(old.part, new.part) for old, new in zip(_groups(before), _groups(after), strict=True)]
+    if any((now[was != now] < known).any() for was, now in pairs):
+        raise ModelError("an element went from one property of the deck to another one")
     old, new, split = list(before.parts), list(after.parts), Split()
     free = 1 + max(max(p.id for p in new), *property_ids(deck))
     for k in range(known, len(new)):
-        sources = set(before.shells.part[after.shells.part == k].tolist())
+        sources = set(np.concatenate([was[now == k] for was, now in pairs]).tolist())
         if len(sources) != 1:
-            raise ModelError(f"the shells of {new[k].name} come from {len(sources)} properties")
+            raise ModelError(f"the elements of {new[k].name} come from {len(sources)} properties")
         source = before.parts[sources.pop()]
         new[k] = replace(new[k], id=free)
         old.append(replace(new[k], section=source.section))
         split[free], free = source.id, free + 1
-    shells = replace(before.shells, part=after.shells.part)
-    return replace(before, parts=tuple(old), shells=shells), after.with_parts(tuple(new)), split
+    moved = replace(
+        before, parts=tuple(old), shells=replace(before.shells, part=after.shells.part),
+        beams=replace(before.beams, part=after.beams.part),
+        solids=tuple(
+            replace(was, part=now.part)
+            for was, now in zip(before.solids, after.solids, strict=True)
+        ),
+    )  # fmt: skip
+    return moved, after.with_parts(tuple(new)), split
+
+
+def _groups(assembly: Assembly) -> tuple[Any, ...]:
+    return assembly.shells, assembly.beams, *assembly.solids
 
 
 def split_changes(
     deck: Deck, after: Assembly, split: Split, changes: Sequence[Change]
 ) -> list[Change]:
-    """The changes with those of a new property put into its card, and its shells told its id."""
+    """The changes with those of a new property put into its card, and its elements told its id."""
     fields: dict[int, dict[int, Value]] = {id: {1: id} for id in split}
     out: list[Change] = []
     for change in changes:
-        if isinstance(change, SetField) and change.kind == "PSHELL" and change.id in split:
-            fields[change.id][position("PSHELL", change.field)] = change.value
+        if isinstance(change, SetField) and change.kind in PROPERTIES and change.id in split:
+            fields[change.id][position(change.kind, str(change.field))] = change.value
         else:
             out.append(change)
     for k, part in enumerate(after.parts):
-        if part.id not in split:
-            continue
-        out.append(Add([_card(deck, split[part.id], fields[part.id])], part.name))
-        mine = after.shells.part == k
-        for kind, chosen in (
-            ("CQUAD4", mine & ~after.shells.triangle), ("CTRIA3", mine & after.shells.triangle)
-        ):  # fmt: skip
-            out += [SetField(kind, int(i), "PID", part.id) for i in after.shells.ids[chosen]]
+        if part.id in split:
+            out.append(Add([_card(deck, split[part.id], fields[part.id])], part.name))
+            out += [
+                SetField(kind, id, "PID", part.id)
+                for group, kinds in _with_kinds(after)
+                for kind, id in _named(deck, kinds, group.ids[group.part == k])
+            ]
     return out
+
+
+def _with_kinds(assembly: Assembly) -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Groups of elements with parts, and the cards they may stand on."""
+    yield assembly.shells, SHEETS
+    yield assembly.beams, BEAMS
+    yield from ((group, SOLIDS) for group in assembly.solids)
+
+
+def _named(deck: Deck, kinds: Sequence[str], ids: np.ndarray) -> Iterator[tuple[str, int]]:
+    """(card, id) of elements."""
+    if not len(ids):
+        return
+    for cards in deck.present(*kinds):
+        for id in cards.integers(1)[np.isin(cards.integers(1), ids)].tolist():
+            yield cards.name, int(id)
+
+
+def taken_out(deck: Deck, before: Assembly, after: Assembly) -> tuple[Assembly, list[Change]]:
+    """The assembly less the solids, beams and bushes that the other has no more; their cards."""
+    changes: list[Change] = []
+
+    def kept(was: Any, now: Any, kinds: tuple[str, ...]) -> Any:
+        stays = np.isin(was.ids, now.ids)
+        changes.extend(Delete(kind, id) for kind, id in _named(deck, kinds, was.ids[~stays]))
+        return type(was)(**{name: column[stays] for name, column in vars(was).items()})
+
+    solids = tuple(
+        kept(was, now, SOLIDS) for was, now in zip(before.solids, after.solids, strict=True)
+    )
+    beams = kept(before.beams, after.beams, BEAMS)
+    bushes = kept(before.bushes, after.bushes, ("CBUSH",))
+    return replace(before, solids=solids, beams=beams, bushes=bushes), changes
 
 
 def section_changes(before: Assembly, after: Assembly, units: Units) -> list[Change]:
@@ -89,15 +140,24 @@ def property_ids(deck: Deck) -> list[int]:
     return [0, *(int(word) for word in words if word.isdigit())]
 
 
+def property_kind(deck: Deck, id: int) -> str:
+    """Name of the card of a property of elements, "" where none here has the id."""
+    for kind in (kind for kind in PROPERTIES if kind in deck.cards):
+        if str(id).encode() in deck[kind].words(1).tolist():
+            return kind
+    return ""
+
+
 def _card(deck: Deck, source: int, fields: dict[int, Value]) -> list[Value]:
-    """A PSHELL as another one, but for some fields."""
-    cards = deck["PSHELL"]
-    row = next((i for i in range(len(cards)) if cards.fields(i)[0] == str(source)), None)
-    if row is None:
-        raise ModelError(f"{deck.path}: property {source} is no PSHELL, so shells of it cannot "
-                         "have a copy of their own")  # fmt: skip
+    """A property as another one, but for some fields."""
+    kind = property_kind(deck, source)
+    if not kind:
+        raise ModelError(f"{deck.path}: property {source} is none of {', '.join(PROPERTIES)}, so "
+                         "elements of it cannot have a copy of their own")  # fmt: skip
+    cards = deck[kind]
+    row = next(i for i in range(len(cards)) if cards.fields(i)[0] == str(source))
     card: list[Value] = [word or None for word in cards.fields(row)]
     card += [None] * (max(fields) - len(card))
     for k, value in fields.items():
         card[k - 1] = value
-    return ["PSHELL", *card]
+    return [kind, *card]

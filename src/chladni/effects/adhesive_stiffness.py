@@ -1,0 +1,148 @@
+"""A bead of adhesive that is softer or stiffer than the deck has it, by more than coupons scatter.
+
+That a bead's stiffness is off by half is ordinary and free in every fit; here it may be off by
+orders of magnitude: not cured, torn, another product.  Between thin sheets a bead saturates: some
+thirty times stiffer than a sealant it only holds.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.assemble import Structure, _families, structure
+from ..fem.sparse_assembly import congruence
+from ..model.assembly import Assembly
+from ..model.properties import Isotropic, Part, SolidSection
+from .effect import Effect, MatrixTerm, Parameter
+from .estimate import Estimate
+from .family import Article, Family
+from .joints import Connection, alone, beads, with_factor_on, with_solids
+from .model_families import joint_families
+from .search_context import Candidate, SearchContext, best_places
+
+SD = 3.0  # of ln of the factor
+STARTS = (-2.5, 2.0, 4.0)
+MOST = 12  # beads that are tried, longest first
+FOLLOWED = 2
+SEALANT = 80e6  # [Pa] what flows into a hem and stays soft has less (Echaniz Granado 2015: 6 MPa)
+
+
+@dataclass(frozen=True, eq=False)
+class AdhesiveStiffness(Effect):
+    """K + (e^x - 1) K_bead + (e^g - 1) K_others: the bead's own modulus, that of all others."""
+
+    name = "adhesive-stiffness"
+    claim = "a bead of adhesive is far softer or stiffer than the deck has it"
+    rounds = 2
+
+    joint: Connection | None = None
+    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """The bead's own and that of the others."""
+        each = zip((self.operator, self.others), x, np.eye(len(x)), strict=False)
+        return tuple(MatrixTerm("K", A, float(np.expm1(v)), np.exp(v) * e) for A, v, e in each)
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """A φ of the bead; the basis carries all adhesive together already."""
+        return sp.csr_array((self.operator @ shapes).T)
+
+    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
+        """What the bead answers: (P⁻¹ A)ᵏ φ spans how a bead of any stiffness changes a mode."""
+        return self.operator @ static
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """E of the bead, that of the others as it was fitted beside it."""
+        assert self.joint is not None
+        beside = float(np.exp(x[1])) if len(x) > 1 else 1.0
+        made = with_solids(assembly, beside, soft=True)
+        return with_factor_on(made, self.joint, float(np.exp(x[0])) / beside)
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """E of the bead."""
+        return super().reported(x, sd)[:1]
+
+    def implausible(self, x: np.ndarray) -> str:
+        """Of what is a sealant in the deck: a modulus no sealant has."""
+        E = self.parameters[0].value(x[0])
+        if self.parameters[0].scale >= SEALANT or E <= SEALANT:
+            return ""
+        return (
+            f"E of {E / 1e6:.0f} MPa is that of no sealant, which has less than {SEALANT / 1e6:g}"
+        )
+
+
+def beads_of(built: Structure) -> list[AdhesiveStiffness]:
+    """The effect of every bead, and of all of a part together."""
+    found = sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
+    families = {text: (K, sd) for text, K, sd in joint_families(built)} if found else {}
+    return [_of_one(built, bead, families["adhesive"], len(found)) for bead in found]
+
+
+def _of_one(
+    built: Structure, bead: Connection, family: tuple[sp.csr_array, float], tried: int
+) -> AdhesiveStiffness:
+    K, sd = family
+    own = congruence(built.T, _families(alone(built.assembly, bead), True)[2])
+    others = sp.csr_array(K - own)
+    E = _modulus(built.assembly, bead)
+    unit, scale = ("of the deck's", 1.0) if E is None else ("Pa", E)
+    unknown: tuple[Parameter, ...] = (
+        Parameter("E", unit, 0.0, SD, scale, step=1.0, starts=STARTS),
+    )
+    if abs(others).max() > 1e-9 * abs(K).max():
+        unknown = (*unknown, Parameter("E of other beads", "-", 0.0, sd, step=0.5))
+    x, y, z = bead.point.tolist()
+    names = sorted({p.name for p in _parts(built.assembly, bead)})
+    text = f"{' and '.join(names)}, {len(bead.elements)} solids {bead.where}"
+    return AdhesiveStiffness(
+        unknown, text, bead.parts, bead.grids, point=(x, y, z), trials_factor=tried,
+        replaces=("adhesive",), joint=bead, operator=own, others=others,
+    )  # fmt: skip
+
+
+def _parts(assembly: Assembly, bead: Connection) -> list[Part]:
+    group = assembly.solids[bead.group]
+    return [assembly.parts[int(p)] for p in np.unique(group.part[bead.elements])]
+
+
+def _modulus(assembly: Assembly, bead: Connection) -> float | None:
+    """E [Pa] where all of the bead has the same."""
+    values = {
+        p.section.material.E
+        for p in _parts(assembly, bead)
+        if isinstance(p.section, SolidSection) and isinstance(p.section.material, Isotropic)
+    }
+    return float(values.pop()) if len(values) == 1 else None
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The beads whose change explains most."""
+    effects = beads_of(context.where.groups.structure)
+    if not effects:
+        return []
+    points = np.array([e.point for e in effects])
+    return best_places(context, effects, points, FOLLOWED, -1.0, carried=True)
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """E of a bead times e^-2 to e^-3."""
+    found = beads(structure(article.assembly))
+    bead = found[int(rng.integers(len(found)))]
+    factor = float(np.exp(rng.uniform(-3.0, -2.0)))
+    E = (_modulus(article.assembly, bead) or 1.0) * factor
+    truth = {"point_m": bead.point.tolist(), "value": E, "parameters": {"E": E}}
+    made = with_factor_on(article.assembly, bead, factor)
+    return replace(article, assembly=made, truth=truth)
+
+
+FAMILY = Family(
+    AdhesiveStiffness,
+    conceal,
+    candidates=candidates,
+    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA"),
+    settled_by="pull a coupon of the adhesive, or cut through the joint and look at it",
+    needs="adhesive of solids between sheets",
+)

@@ -1,0 +1,155 @@
+"""Two sheets that almost touch in the model and do touch in reality."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.assemble import Structure, structure
+from ..geometry.clearance import all_gaps
+from ..geometry.sampling import farthest_point_sample
+from ..model.assembly import Assembly
+from .effect import Effect, PointTerm
+from .family import Article, Family
+from .points import strength
+from .search_context import Candidate, SearchContext, best_places, distinct
+from .sheet_pairs import SheetPairs
+from .surroundings import ShellGrids
+
+MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
+STARTS = (-2.0, 0.0, 2.0)
+TRIED = MEDIAN * np.exp(np.linspace(-4.0, 6.0, 6))
+CLOSE = 1e-3  # [m] of clearance, or less
+MOST, BY_POLES = 200, 16  # places, spread over all that are close
+FOLLOWED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class ClosePlaces(SheetPairs):
+    """Places where two sheets nearly touch, away from joints; ``along`` is across the gap.
+
+    Attributes
+    ----------
+    grids : (k,) int               ids of the grids of the first sheet they are at
+    sheets : names of both sheets of each
+    """
+
+    grids: np.ndarray
+    sheets: tuple[tuple[str, str], ...]
+
+    def only(self, k: int) -> "ClosePlaces":
+        """One of them."""
+        return ClosePlaces(
+            self.middle[[k]], self.along[[k]], (self.sides[k],), self.grids[[k]], (self.sheets[k],)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ContactStiffness(Effect):
+    """K + k bᵀ b, b the motion of two sheets against each other across the gap."""
+
+    name = "contact-stiffness"
+    claim = "two sheets touch where the model has a gap between them"
+
+    place: ClosePlaces | None = None
+    rows: sp.csr_array | None = None
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """One spring."""
+        assert self.rows is not None
+        c = np.array([self.parameters[0].value(x[0])])
+        return (PointTerm("K", self.rows, c, c[:, None]),)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CBUSH between two RBE3 at the place."""
+        assert self.place is not None
+        return self.place.gripped(assembly, np.array([self.parameters[0].value(x[0])]))
+
+
+def close_places(assembly: Assembly) -> ClosePlaces:
+    """Places of all pairs of sheets that are close, away from joints and from shared grids."""
+    nodes, found = assembly.shells.nodes, []
+    cell = np.full(len(assembly.points), -1)
+    for gap in all_gaps(assembly):
+        part = assembly.part(gap.parts[0])
+        mine = np.flatnonzero(assembly.shells.part == part)
+        cell[nodes[mine].ravel()] = np.repeat(mine, 4)
+        for k in np.flatnonzero(gap.free & (gap.clearance < CLOSE)):
+            sides = np.unique(nodes[cell[gap.rows[k]]]), np.unique(gap.opposite[k])
+            found.append((gap.rows[k], gap.normal[k], sides, gap.parts))
+    rows = np.array([f[0] for f in found], dtype=np.int64)
+    return ClosePlaces(
+        assembly.points[rows], np.array([f[1] for f in found]).reshape(-1, 3),
+        tuple(f[2] for f in found), assembly.ids[rows], tuple(f[3] for f in found),
+    )  # fmt: skip
+
+
+def contacts(built: Structure) -> list[ContactStiffness]:
+    """A spring at every one of a sample of the places where sheets are close."""
+    every = close_places(built.assembly)
+    if not len(every):
+        return []
+    chosen = farthest_point_sample(every.middle, MOST)
+    K = strength("K", "N/m", MEDIAN, SD, STARTS)
+    out = []
+    for k in chosen:
+        place = every.only(int(k))
+        (first, second), (x, y, z) = place.sheets[0], place.middle[0].tolist()
+        grid = int(place.grids[0])
+        out.append(
+            ContactStiffness(
+                (K,),
+                f"between {first} and {second} at grid {grid}",
+                (first, second),
+                (grid,),
+                point=(x, y, z),
+                trials_factor=len(chosen),
+                place=place,
+                rows=place.relative_rows(built),
+            )
+        )
+    return out
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The places at which a contact explains most, by exact re-analysis at every one."""
+    effects = contacts(context.where.groups.structure)
+    if not effects:
+        return []
+    points = np.array([e.point for e in effects])
+    if context.scan is None:
+        some = farthest_point_sample(points, BY_POLES)
+        chosen = [effects[k] for k in some]
+        return best_places(context, chosen, points[some], FOLLOWED, carried=True)
+    places = ShellGrids(
+        np.array([e.grids[0] for e in effects]),
+        np.array([e.place.along[0] for e in effects if e.place is not None]),
+        points,
+        sp.csr_array(sp.vstack([e.rows for e in effects])),
+    )
+    base = context.bases[-1]
+    scores = context.scan.point_scores(len(context.bases) - 1, "K", TRIED, places)
+    return [
+        Candidate(effects[k], np.array([np.log(TRIED[int(scores[k].argmin())] / MEDIAN)]), base)
+        for k in distinct(scores.min(axis=1), points, [], FOLLOWED)
+    ]
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """A spring of 20 to 200 kN/m between two sheets that almost touch."""
+    effects = contacts(structure(article.assembly))
+    effect = effects[int(rng.integers(len(effects)))]
+    K = float(np.exp(rng.uniform(np.log(2e4), np.log(2e5))))
+    made = effect.apply(article.assembly, np.array([np.log(K / MEDIAN)]))
+    truth = {"point_m": list(effect.point or ()), "value": K, "parameters": {"K": K}}
+    return replace(article, assembly=made, truth=truth)
+
+
+FAMILY = Family(
+    ContactStiffness,
+    conceal,
+    candidates=candidates,
+    cards=("GRID", "RBE3", "CBUSH", "PBUSH", "CORD2R"),
+    settled_by="push a feeler gauge between the sheets there, and measure at two levels",
+    needs="sheets that almost touch, away from joints",
+)

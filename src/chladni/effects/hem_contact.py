@@ -1,0 +1,163 @@
+"""A hem whose sheets do not slide along it, where the model has soft sealant alone.
+
+In a hem the outer sheet is folded round the inner one: what a box section gains in torsion is that
+the inner edge cannot slide along the fold (Echaniz Granado 2015, section 5.3.2, speaks of the edge
+that cannot go into the fold; of the two it is the sliding that stiffens).  All round, a far stiffer
+sealant does the same to all frequencies; along a stretch it does not.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..model.assembly import Assembly
+from .effect import Effect, Parameter, PointTerm
+from .estimate import Estimate, Location
+from .family import Article, Family
+from .hem_line import HemLine, hem_lines
+from .points import NOTHING
+from .search_context import Candidate, SearchContext
+
+MEDIAN, SD = 1e9, 3.0  # [N/m²] stiffness against sliding per length, sd of its ln
+STARTS = (-1.5, 0.5, 2.5)
+HAT = 0.06  # [m] distance of loads whose responses the basis holds
+STRETCH, STRETCH_SD = 0.15, 0.7  # of the line: half of a stretch, sd of its ln
+PLACES = 10  # along a line, tried as the middle of a stretch
+SQUARE = 4  # power of the distance in the edge of a stretch: even
+END = 1e-3  # of the stiffness in the middle: less is not written
+
+
+@dataclass(frozen=True, eq=False)
+class HemContact(Effect):
+    """K + Σ_i k L_i w_i b_iᵀ b_i, b_i the sliding and L_i the length of solid i along the line.
+
+    w = 1 all along, or exp(-(d/ℓ)⁴) at the distance d from the middle of a stretch of length 2ℓ:
+    x = (ln k, middle over half the line's length, ln ℓ).
+    """
+
+    name = "hem-contact"
+    claim = "the sheets of a hem do not slide along it, as soft sealant alone would let them"
+
+    line: HemLine | None = None
+    rows: sp.csr_array | None = None
+
+    @property
+    def local(self) -> bool:
+        """Whether a stretch is meant."""
+        return len(self.parameters) > 1
+
+    def weights(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """w (k,) and ∂ln w/∂x of the middle and of ln ℓ (k, 2)."""
+        assert self.line is not None
+        if not self.local:
+            return np.ones(len(self.line)), np.zeros((len(self.line), 0))
+        _, middle, reach = self.parameters
+        ell = reach.value(x[2])
+        d = self.line.from_place(middle.value(x[1])) / ell
+        slopes = np.stack([SQUARE * d ** (SQUARE - 1) * middle.scale / ell, SQUARE * d**SQUARE], 1)
+        return np.exp(-(d**SQUARE)), slopes
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """The springs along the line."""
+        assert self.line is not None
+        assert self.rows is not None
+        w, slopes = self.weights(x)
+        c = self.parameters[0].value(x[0]) * self.line.share * w
+        gradient = c[:, None] * np.column_stack([np.ones(len(c)), slopes])
+        return (PointTerm("K", self.rows, c, gradient),)
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """Hats along the line, each of the loads of the springs near it."""
+        assert self.line is not None
+        assert self.rows is not None
+        count = min(len(self.line), max(2, round(self.line.length / HAT)))
+        at = np.arange(count) * self.line.length / (count - (not self.line.closed))
+        hats = [np.maximum(1 - np.abs(self.line.from_place(a)) / (at[1] - at[0]), 0) for a in at]
+        return sp.csr_array(sp.csr_array(np.array(hats)) @ self.rows)
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CBUSH between two RBE3 at one place, wherever the hem holds."""
+        assert self.line is not None
+        k = self.terms(x)[0].coefficient
+        return self.line.gripped(assembly, np.where(k > END * k.max(), k, 0.0))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """Stiffness against sliding per length, and the length of a stretch."""
+        k, *rest = super().reported(x, sd)
+        if not self.local:
+            return (k,)
+        L = rest[1]
+        assert L.low is not None
+        assert L.high is not None
+        return k, Estimate("L", 2 * L.value, "m", 2 * L.low, 2 * L.high)
+
+    def location(self, x: np.ndarray) -> Location:
+        """The stretch, from its one end to the other."""
+        if not self.local or self.line is None:
+            return self.where()
+        _, middle, reach = self.parameters
+        s0, ell = middle.value(x[1]), reach.value(x[2])
+        point, *ends = (self._at(s) for s in (s0, s0 - ell, s0 + ell))
+        begin, end = (", ".join(f"{1e3 * v:.0f}" for v in e) for e in ends)
+        text = f"along {self.line.name} from ({begin} mm) to ({end} mm)"
+        return replace(self.where(), text=text, point_m=point, radius_m=ell)
+
+    def _at(self, s: float) -> tuple[float, ...]:
+        """The place (3,) of the line nearest to an arc length."""
+        assert self.line is not None
+        k = int(np.abs(self.line.from_place(s)).argmin())
+        return tuple(float(v) for v in self.line.middle[k])
+
+
+def everywhere(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
+    """No sliding all along a line."""
+    k = Parameter("K", "N/m2", 0.0, SD, MEDIAN, step=1.0, starts=STARTS, nominal=NOTHING)
+    return HemContact(
+        (k,), f"along all of {line.name}", line.sheets, trials_factor=tried, line=line, rows=rows
+    )
+
+
+def along_stretch(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
+    """No sliding along a stretch of a line, anywhere on it."""
+    whole, half = everywhere(line, rows, tried), line.length / 2
+    middle = Parameter("s", "m", 1.0, 3**-0.5, half, "linear", step=0.1)
+    reach = Parameter("L", "m", 0.0, STRETCH_SD, STRETCH * line.length, step=0.3)
+    return replace(
+        whole, parameters=(*whole.parameters, middle, reach), text=f"along some of {line.name}"
+    )
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """Every string of adhesive, all along and where a stretch of it explains most."""
+    built = context.where.groups.structure
+    lines = hem_lines(built.assembly)
+    out = []
+    for line in lines:
+        rows = line.relative_rows(built)
+        whole, some = (f(line, rows, len(lines)) for f in (everywhere, along_stretch))
+        middles = (2 * np.arange(PLACES) + 1) / PLACES
+        starts = [np.array([k, s, 0.0]) for s in middles for k in STARTS[::2]]
+        for effect, tried in ((whole, whole.starts()), (some, starts)):
+            scores = context.scores(effect, tried, carried=True)[0]
+            out.append(Candidate(effect, tried[int(np.argmin(scores))], context.bases[-1]))
+    return out
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """No sliding all along a string, 1e9 to 1e10 N/m²."""
+    lines = hem_lines(article.assembly)
+    line = lines[int(rng.integers(len(lines)))]
+    k = float(10 ** rng.uniform(9.0, 10.0))
+    made = line.gripped(article.assembly, k * line.share)
+    return replace(article, assembly=made, truth={"value": k, "parameters": {"K": k}})
+
+
+FAMILY = Family(
+    HemContact,
+    conceal,
+    candidates=candidates,
+    cards=("GRID", "RBE3", "CBUSH", "PBUSH", "CORD2R"),
+    settled_by="cut through the hem and look whether its sheets touch or the sealant is hard",
+    needs="strings of adhesive between two sheets",
+)

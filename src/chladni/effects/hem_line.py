@@ -1,0 +1,146 @@
+"""Strings of adhesive along an edge: the line they follow between two sheets."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..model.assembly import Assembly, Average
+from .joints import soft_solids
+from .sheet_pairs import SheetPairs
+
+SHORTEST = 8  # solids of a string
+CLOSED = 6.0  # pitches between its ends at which a line still goes on
+
+
+@dataclass(frozen=True, eq=False)
+class HemLine(SheetPairs):
+    """A line through the solids of a string, in order; ``along`` are its tangents.
+
+    Attributes
+    ----------
+    name : of the part
+    sheets : names of the sheets
+    share : (k,)             length each stands for [m]
+    s : (k,)                 arc length [m]
+    length : float           of all, the gap between the ends of a closed line included [m]
+    closed : bool
+    """
+
+    name: str
+    sheets: tuple[str, ...]
+    share: np.ndarray
+    s: np.ndarray
+    length: float
+    closed: bool
+
+    def from_place(self, s0: float) -> np.ndarray:
+        """Arc length (k,) from a place of the line, the shorter way round of a closed one [m]."""
+        d = self.s - s0
+        return d - self.length * np.round(d / self.length) if self.closed else d
+
+
+def hem_lines(assembly: Assembly) -> list[HemLine]:
+    """The line of every part of adhesive that runs as strings between two sheets."""
+    out = []
+    for group, rows in soft_solids(assembly):
+        chains = list(_chains(assembly.solids[group].nodes[rows]))
+        if chains and all(len(chain) > 1 for chain in chains) and len(rows) >= SHORTEST:
+            middle = assembly.points[assembly.solids[group].nodes[rows]].mean(axis=1)
+            order = rows[_joined(middle, chains)]
+            if (line := _line(assembly, group, order)) is not None:
+                out.append(line)
+    return out
+
+
+def _chains(nodes: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows of hexahedra from end to end of each string; nothing where they branch."""
+    m = len(nodes)
+    at, column = np.unique(nodes, return_inverse=True)
+    where = (np.repeat(np.arange(m), nodes.shape[1]), column.ravel())
+    touch = sp.csr_array((np.ones(nodes.size), where), shape=(m, len(at)))
+    shared = sp.coo_array(touch @ touch.T)
+    face = (shared.data >= 4) & (shared.row != shared.col)
+    graph = sp.csr_array((np.ones(face.sum()), (shared.row[face], shared.col[face])), shape=(m, m))
+    degree = np.diff(graph.indptr)
+    if (degree > 2).any():
+        return
+    piece = connected_components(graph, directed=False)[1]
+    for p in range(piece.max() + 1):
+        mine = np.flatnonzero(piece == p)
+        ends = mine[degree[mine] < 2]
+        here, seen = int(ends[0] if len(ends) else mine[0]), [-1]
+        while here >= 0:
+            seen.append(here)
+            beside = graph.indices[graph.indptr[here] : graph.indptr[here + 1]]
+            here = next((int(j) for j in beside if j not in seen[-2:-1] and j != seen[1]), -1)
+        yield np.array(seen[1:])
+
+
+def _joined(middle: np.ndarray, chains: list[np.ndarray]) -> np.ndarray:
+    """Chains one after another, each begun at the end that is nearest to where the last ended."""
+    left = sorted(chains, key=len)
+    line = list(left.pop())
+    while left:
+        gaps = [
+            (float(np.linalg.norm(middle[chain[end]] - middle[line[-1]])), k, end)
+            for k, chain in enumerate(left)
+            for end in (0, -1)
+        ]
+        _, k, end = min(gaps)
+        chain = left.pop(k)
+        line += list(chain if end == 0 else chain[::-1])
+    return np.array(line)
+
+
+def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
+    """The line through solids in order, where each hangs on two sheets."""
+    solids = assembly.solids[group]
+    middle = assembly.points[solids.nodes[rows]].mean(axis=1)
+    step = np.linalg.norm(np.diff(middle, axis=0), axis=1)
+    pitch, gap = float(np.median(step)), float(np.linalg.norm(middle[-1] - middle[0]))
+    closed = gap < CLOSED * pitch
+    along = np.gradient(middle, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    carried, part = _carriers(assembly), _part_of(assembly)
+    sides = tuple(_sides(part, carried, nodes) for nodes in solids.nodes[rows])
+    if any(len(a) < 3 or len(b) < 3 for a, b in sides):
+        return None
+    s = np.concatenate([[0.0], np.cumsum(step)])
+    name = assembly.parts[int(solids.part[rows[0]])].name
+    parts = np.unique(np.concatenate([part[np.concatenate(side)] for side in sides]))
+    sheets = tuple(assembly.parts[int(p)].name for p in parts)
+    share = np.minimum(np.gradient(s), 2 * pitch)
+    length = float(s[-1]) + gap * closed
+    return HemLine(middle, along, sides, name, sheets, share, s, length, closed)
+
+
+def _carriers(assembly: Assembly) -> dict[int, np.ndarray]:
+    """{row of a point that is a mean: rows of the points it is the mean of}."""
+    return {
+        mean.reference: np.array([row for row, _, _ in mean.terms])
+        for mean in assembly.rigid
+        if isinstance(mean, Average)
+    }
+
+
+def _part_of(assembly: Assembly) -> np.ndarray:
+    """Position of a part of shells at each point (n,), -1 where there is none."""
+    out = np.full(len(assembly.points), -1)
+    out[assembly.shells.nodes.ravel()] = np.repeat(assembly.shells.part, 4)
+    return out
+
+
+def _sides(
+    part: np.ndarray, carried: dict[int, np.ndarray], nodes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of grids that carry the nodes of a solid in the first and in the last of its parts."""
+    rows = np.unique(np.concatenate([carried.get(int(n), np.array([n])) for n in nodes]))
+    mine = part[rows]
+    known = np.unique(mine[mine >= 0])
+    none = np.zeros(0, int)
+    if len(known) != 2:
+        return none, none
+    return rows[mine == known[0]], rows[mine == known[1]]

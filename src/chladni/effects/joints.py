@@ -1,0 +1,278 @@
+"""The joints of a structure: welds and fasteners one by one, beads of adhesive.
+
+A joint is what a deck has beside its sheets to hold them together: a solid of a metal or a short
+bar or a bush is a weld or a fastener, solids softer than ``SOFT`` that hang together are a bead.
+What a joint has in K is kept as rows b with K_j = bᵀ b, so that its loss is a change of low rank.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..fem.assemble import Structure, _families
+from ..model.assembly import Assembly, Average, Beams, Bushes, Masses, RigidBody, Scalars, Shells
+from ..model.properties import BeamSection, Isotropic, Part, SolidSection
+from .model_families import SOFT
+
+MOST_SOLIDS = 27  # of a weld: more of them in one piece are a casting
+MOST_BARS = 3  # of a fastener
+FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """Elements that hold sheets together in one place.
+
+    Attributes
+    ----------
+    kind : "solids", "beams" or "bushes" of the assembly
+    group : position among ``Assembly.solids``, 0 of others
+    elements : (k,) int     rows of that group
+    ids : ids of these elements
+    point : (3,) [m]        its middle
+    parts : names of the sheets it holds, largest first
+    grids : ids of the grids of sheets it hangs on
+    """
+
+    kind: str
+    group: int
+    elements: np.ndarray
+    ids: tuple[int, ...]
+    point: np.ndarray
+    parts: tuple[str, ...] = ()
+    grids: tuple[int, ...] = ()
+    rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+
+    @property
+    def where(self) -> str:
+        """What it holds and where, in words."""
+        at = ", ".join(f"{1e3 * v:.0f}" for v in self.point)
+        return f"between {' and '.join(self.parts[:2])} at ({at} mm)"
+
+
+def members(assembly: Assembly, kind: str, group: int) -> Any:
+    """The group of elements a joint is of."""
+    return assembly.solids[group] if kind == "solids" else getattr(assembly, kind)
+
+
+def alone(assembly: Assembly, joint: Connection) -> Assembly:
+    """The points with the elements of a joint and nothing else that is stiff or heavy."""
+    nothing = Scalars()
+    bare = replace(
+        assembly, shells=Shells(), solids=(), beams=Beams(), bushes=Bushes(), springs=nothing,
+        dampers=nothing, scalar_masses=nothing, masses=Masses(),
+    )  # fmt: skip
+    some = _picked(members(assembly, joint.kind, joint.group), joint.elements)
+    return _with(bare, joint.kind, (some,) if joint.kind == "solids" else some)
+
+
+def _with(assembly: Assembly, kind: str, new: Any) -> Assembly:
+    changed: dict[str, Any] = {kind: new}
+    return replace(assembly, **changed)
+
+
+def stiffness_rows(built: Structure, joint: Connection) -> sp.csr_array:
+    """Rows b (r, n) over the free dofs with bᵀ b what the joint has in K.
+
+    Motions of the joint that cost nothing, and those of the elements alone that no sheet follows,
+    have no row.
+    """
+    K = _families(alone(built.assembly, joint), True)[2]
+    at = np.unique(K.indices)
+    w, V = np.linalg.eigh(K[at][:, at].toarray())
+    kept = w > FLAT * w[-1]
+    B = sp.csr_array((V[:, kept] * np.sqrt(w[kept])).T @ built.T[at])
+    B.eliminate_zeros()
+    on = np.unique(B.indices)
+    _, s, Vt = np.linalg.svd(B[:, on].toarray(), full_matrices=False)
+    kept = s > np.sqrt(FLAT) * s[0] if len(s) else s > 0
+    where = (np.repeat(np.arange(kept.sum()), len(on)), np.tile(on, kept.sum()))
+    return sp.csr_array(((s[kept, None] * Vt[kept]).ravel(), where), shape=(kept.sum(), B.shape[1]))
+
+
+def fasteners(built: Structure) -> list[Connection]:
+    """Every weld, screw and bush between sheets, with its rows, where the structure has sheets."""
+    if not len(built.assembly.shells):
+        return []
+    a, columns = built.assembly, sp.csc_array(built.T)
+    found = [
+        replace(joint, rows=stiffness_rows(built, joint))
+        for joint in (*_weld_solids(a), *_bars(a), *_bushes(a))
+    ]
+    return [j for j in (_on_sheets(a, joint, _moved(columns, joint)) for joint in found) if j.parts]
+
+
+def beads(built: Structure) -> list[Connection]:
+    """Solids of adhesive that hang together, and all of a part where these are several.
+
+    Those of a part come before what they consist of. They have no rows: they are many elements.
+    """
+    assembly = built.assembly
+    out: list[Connection] = []
+    for group, rows in _solid_parts(assembly, soft=True):
+        pieces = list(_pieces(assembly.solids[group].nodes[rows]))
+        whole = [rows] if len(pieces) > 1 else []
+        for chosen in (*whole, *(rows[piece] for piece in pieces)):
+            joint = _of_solids(assembly, group, chosen)
+            out.append(_on_sheets(assembly, joint, _touched(built, joint)))
+    return [j for j in out if j.parts]
+
+
+def _moved(columns: sp.csc_array, joint: Connection) -> np.ndarray:
+    """Rows of the points that move with the free dofs a joint couples; ``columns`` are those of T.
+
+    Of a mean these are the grids it is taken over, of a rigid spider those that follow it.
+    """
+    return np.unique(columns[:, np.unique(joint.rows.indices)].indices // 6)
+
+
+def _on_sheets(assembly: Assembly, joint: Connection, points: np.ndarray) -> Connection:
+    """The joint with the sheets that have some of these points (k,)."""
+    touching = np.isin(assembly.shells.nodes, points).any(axis=1)
+    parts, count = np.unique(assembly.shells.part[touching], return_counts=True)
+    names = tuple(assembly.parts[int(p)].name for p in parts[np.argsort(-count, kind="stable")])
+    on = np.intersect1d(points, assembly.shells.nodes[touching])
+    return replace(joint, parts=names, grids=tuple(assembly.ids[on].tolist()))
+
+
+def _touched(built: Structure, joint: Connection) -> np.ndarray:
+    """Rows of the points on which the nodes of a joint depend."""
+    nodes = np.unique(members(built.assembly, joint.kind, joint.group).nodes[joint.elements])
+    dofs = (6 * nodes[:, None] + np.arange(3)).ravel()
+    return built.assembly.rows(built.system.dofs[np.unique(built.T[dofs].indices), 0])
+
+
+def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """(group, rows) of the parts of solids of adhesive, or of metal."""
+    for group, solids in enumerate(assembly.solids):
+        for part in np.unique(solids.part):
+            section = assembly.parts[int(part)].section
+            if not isinstance(section, SolidSection):
+                continue
+            material = section.material
+            if isinstance(material, Isotropic) and (material.E < SOFT) == soft:
+                yield group, np.flatnonzero(solids.part == part)
+
+
+def soft_solids(assembly: Assembly) -> Iterator[tuple[int, np.ndarray]]:
+    """(group, rows) of every part of adhesive."""
+    yield from _solid_parts(assembly, soft=True)
+
+
+def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows (k,) of elements that hang together by their nodes (m, n)."""
+    m = len(nodes)
+    at, column = np.unique(nodes, return_inverse=True)
+    where = (np.repeat(np.arange(m), nodes.shape[1]), column.ravel())
+    touch = sp.csr_array((np.ones(nodes.size), where), shape=(m, len(at)))
+    piece = connected_components(touch @ touch.T, directed=False)[1]
+    order = np.argsort(piece, kind="stable")
+    yield from np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+
+
+def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
+    solids = assembly.solids[group]
+    middle = assembly.points[solids.nodes[rows]].mean(axis=(0, 1))
+    return Connection("solids", group, rows, tuple(solids.ids[rows].tolist()), middle)
+
+
+def _weld_solids(assembly: Assembly) -> Iterator[Connection]:
+    for group, rows in _solid_parts(assembly, soft=False):
+        for piece in _pieces(assembly.solids[group].nodes[rows]):
+            if len(piece) <= MOST_SOLIDS:
+                yield _of_solids(assembly, group, rows[piece])
+
+
+def _bars(assembly: Assembly) -> Iterator[Connection]:
+    """Bars by themselves whose ends are those of rigid spiders or means."""
+    beams = assembly.beams
+    if not len(beams):
+        return
+    held = {r.independent if isinstance(r, RigidBody) else r.reference
+            for r in assembly.rigid if isinstance(r, RigidBody | Average)}  # fmt: skip
+    for piece in _pieces(beams.nodes):
+        nodes, count = np.unique(beams.nodes[piece], return_counts=True)
+        if len(piece) <= MOST_BARS and held.issuperset(nodes[count == 1].tolist()):
+            middle = assembly.points[nodes].mean(axis=0)
+            yield Connection("beams", 0, piece, tuple(beams.ids[piece].tolist()), middle)
+
+
+def _bushes(assembly: Assembly) -> Iterator[Connection]:
+    for row in np.flatnonzero((assembly.bushes.nodes >= 0).all(axis=1)):
+        ids = (int(assembly.bushes.ids[row]),)
+        yield Connection("bushes", 0, np.array([row]), ids, assembly.bushes.place[row])
+
+
+def _picked(family: Any, rows: np.ndarray) -> Any:
+    """Some members of a family of elements."""
+    return type(family)(**{name: column[rows] for name, column in vars(family).items()})
+
+
+def with_factor_on(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
+    """The assembly with the stiffness of a joint times a factor; its mass stays.
+
+    Solids and bars get a part of their own, unless all of their part is in the joint.
+    """
+    old = members(assembly, joint.kind, joint.group)
+    if joint.kind == "bushes":
+        stiffness = old.stiffness.copy()
+        stiffness[joint.elements] *= factor
+        return replace(assembly, bushes=replace(assembly.bushes, stiffness=stiffness))
+    parts, part = list(assembly.parts), old.part.copy()
+    for p in np.unique(part[joint.elements]):
+        mine = joint.elements[part[joint.elements] == p]
+        new = _stiffer(parts[int(p)], factor)
+        if _only_here(assembly, int(p), len(mine)):
+            parts[int(p)] = new
+            continue
+        name = f"{joint.ids[0]} of {new.name}"
+        part[mine] = len(parts)
+        parts.append(replace(new, id=1 + max(x.id for x in parts), name=name))
+    changed = replace(old, part=part)
+    return _with_members(replace(assembly, parts=tuple(parts)), joint, changed)
+
+
+def with_solids(assembly: Assembly, factor: float, soft: bool) -> Assembly:
+    """The assembly with all solids of adhesive, or all of metal, times a factor."""
+    if factor == 1:
+        return assembly
+    parts = []
+    for part in assembly.parts:
+        m = getattr(part.section, "material", None)
+        if isinstance(part.section, SolidSection) and isinstance(m, Isotropic):
+            part = _stiffer(part, factor) if (m.E < SOFT) == soft else part
+        parts.append(part)
+    return assembly.with_parts(tuple(parts))
+
+
+def without_joint(assembly: Assembly, joint: Connection) -> Assembly:
+    """The assembly with the elements of a joint taken out."""
+    old = members(assembly, joint.kind, joint.group)
+    kept = np.setdiff1d(np.arange(len(old.ids)), joint.elements)
+    return _with_members(assembly, joint, _picked(old, kept))
+
+
+def _with_members(assembly: Assembly, joint: Connection, new: Any) -> Assembly:
+    if joint.kind != "solids":
+        return _with(assembly, joint.kind, new)
+    solids = list(assembly.solids)
+    solids[joint.group] = new
+    return replace(assembly, solids=tuple(solids))
+
+
+def _only_here(assembly: Assembly, part: int, count: int) -> bool:
+    groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
+    return sum(int((g.part == part).sum()) for g in groups) == count
+
+
+def _stiffer(part: Part, factor: float) -> Part:
+    """The part with E (and G) times a factor."""
+    assert isinstance(part.section, SolidSection | BeamSection)
+    m = part.section.material
+    assert isinstance(m, Isotropic)
+    G = None if m.G is None else m.G * factor
+    return part.with_section(material=replace(m, E=m.E * factor, G=G))

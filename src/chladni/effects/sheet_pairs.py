@@ -1,0 +1,101 @@
+"""Springs between two sheets: how these move against each other at places, and the cards of it.
+
+The motion is that of two means at one point, each the best rigid motion of the grids of a sheet
+near it; between different points rigid rotation would load what resists it.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.assemble import Structure
+from ..fem.average import average_rows
+from ..model.added_points import with_points
+from ..model.assembly import Assembly, Average, Bushes
+
+
+@dataclass(frozen=True, eq=False)
+class SheetPairs:
+    """Places at which two sheets face each other.
+
+    Attributes
+    ----------
+    middle, along : (k, 3)   places [m], unit vectors of the motion that counts
+    sides : of each place the rows of grids it hangs on in either sheet, three at least
+    """
+
+    middle: np.ndarray
+    along: np.ndarray
+    sides: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def __len__(self) -> int:
+        return len(self.sides)
+
+    def relative_rows(self, built: Structure) -> sp.csr_array:
+        """Rows (k, n): how far the second sheet moves along the direction against the first."""
+        bare, ends = self.tied(replace(built.assembly, axes=None, rigid=()))
+        means = average_rows(bare, np.arange(len(bare.rigid)))
+        where = (means.dof[means.row], means.on)
+        n = 6 * len(bare.points)
+        G = sp.csr_array((means.factor, where), shape=(n, n))[:, : built.T.shape[0]]
+        first, second = (self._pick(end, n) for end in ends.T)
+        return sp.csr_array((second - first) @ G @ built.T)
+
+    def _pick(self, rows: np.ndarray, n: int) -> sp.csr_array:
+        k = len(rows)
+        columns = (6 * rows[:, None] + np.arange(3)).ravel()
+        where = (np.repeat(np.arange(k), 3), columns)
+        return sp.csr_array((self.along.ravel(), where), shape=(k, n))
+
+    def tied(self, assembly: Assembly, on: np.ndarray | None = None) -> tuple[Assembly, np.ndarray]:
+        """The assembly with both ends of springs at some places (all), and their rows (k, 2)."""
+        at = np.arange(len(self)) if on is None else on
+        grown, rows = with_points(assembly, np.repeat(self.middle[at], 2, axis=0))
+        first, T = 1 + _last_id(assembly), (1, 2, 3)
+        carriers = [grids for k in at for grids in self.sides[k]]
+        means = tuple(
+            Average(first + j, int(row), T, tuple((int(g), T, 1.0) for g in grids))
+            for j, (row, grids) in enumerate(zip(rows, carriers, strict=True))
+        )
+        turns = np.array([(r, c) for r in rows for c in (4, 5, 6)], dtype=np.int64).reshape(-1, 2)
+        supports = np.concatenate([grown.supports, turns])
+        grown = replace(grown, rigid=(*grown.rigid, *means), supports=supports)
+        return grown, rows.reshape(-1, 2)
+
+    def gripped(self, assembly: Assembly, k: np.ndarray) -> Assembly:
+        """The assembly with springs k (k,) [N/m] along the directions, where there are any."""
+        on = np.flatnonzero(k > 0)
+        grown, ends = self.tied(assembly, on)
+        old, zero = grown.bushes, np.zeros((len(on), 6))
+        e = self.along[on]
+        z = np.cross(e, np.eye(3)[np.abs(e).argmin(axis=1)])
+        z /= np.linalg.norm(z, axis=1, keepdims=True)
+        stiffness = zero.copy()
+        stiffness[:, 0] = k[on]
+        new = Bushes(
+            np.append(old.ids, 1 + _last_id(grown) + np.arange(len(on))),
+            np.concatenate([old.nodes, ends]),
+            np.concatenate([old.frame, np.stack([e, np.cross(z, e), z], axis=1)]),
+            np.concatenate([old.place, self.middle[on]]),
+            np.concatenate([old.stiffness, stiffness]),
+            np.concatenate([old.viscous, zero]),
+            np.concatenate([old.loss, zero]),
+        )
+        return replace(grown, bushes=new)
+
+
+def _last_id(a: Assembly) -> int:
+    """The largest id of any element."""
+    groups: tuple[Any, ...] = (
+        a.shells,
+        a.beams,
+        a.springs,
+        a.dampers,
+        a.scalar_masses,
+        a.bushes,
+        a.masses,
+    )
+    ids = [int(g.ids.max(initial=0)) for g in (*groups, *a.solids)]
+    return max(*ids, *(r.id for r in a.rigid), 0)

@@ -1,0 +1,196 @@
+"""A weld or a fastener that is softer than the deck has it.
+
+A deck's weld is a thousand times stiffer than the sheets round it: what it does to the structure
+hardly depends on its own stiffness w until that falls to the z of the sheets.  So its prior and its
+name go by the softness s = z/(w + z) that static responses give: with s of its stiffness left it
+carries half of its load, with e^-3 s next to none, and is missing.  With e^3 s it carries nearly
+all: what data want of a weld beyond that is another patch of sheet that it holds, which a mesh sets
+and no weld can be blamed for.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..geometry.sampling import farthest_point_sample
+from ..model.assembly import Assembly
+from .effect import WIDER, Effect, MatrixTerm, Parameter
+from .estimate import Estimate
+from .family import Article, Family
+from .joints import Connection, fasteners, with_factor_on, with_solids
+from .model_families import joint_families
+from .search_context import Candidate, SearchContext, best_places
+
+NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
+MOST = 3.0  # ln of what is left over s, at most
+SD = 1.2  # of the same: from next to nothing of the load to nearly all
+STARTS = (-1.5, 0.0, 1.5)
+SOUND = 40.0  # x of the deck's own
+BY_POLES = 12  # fasteners tried where each costs eigenproblems
+FOLLOWED = 2  # about the calibrated model, and one more about the deck's
+FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
+NEEDS = "welds, screws or bushes between sheets"
+
+JointFamilies = dict[str, tuple[sp.csr_array, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class WeldCompliance(Effect):
+    """K + (f - 1) K_j + (e^g - 1) Σ_{i≠j} K_i: the joint times f = e^x, others of its kind e^g.
+
+    The others' factor takes the place of the one that all of a kind share, so that none has more
+    taken from it than it has and K stays positive.
+    """
+
+    name = "weld-compliance"
+    claim = "a weld or a fastener is softer than the deck has it"
+    rounds = 1  # a weld that is gone may free a mode of its own
+
+    joint: Connection | None = None
+    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    softness: float = 1.0
+
+    @staticmethod
+    def strength(softness: float) -> Parameter:
+        """ln of what is left over s."""
+        return Parameter("K", "of the deck's", 0.0, SD, softness, starts=STARTS, nominal=SOUND)
+
+    def left(self, x: float) -> tuple[float, float]:
+        """f(x) = s e^x, x > 0 bent towards ``MOST``, and its slope; a sound one is apart: 1."""
+        if x >= SOUND:
+            return 1.0, 0.0
+        y = MOST * np.tanh(x / MOST) if x > 0 else x
+        f = min(self.softness * float(np.exp(y)), 1.0)
+        return f, f * (1 - (y / MOST) ** 2 if x > 0 else 1.0)
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """The joint's own and that of the others of its kind."""
+        (f, slope), e = self.left(x[0]), np.eye(len(x))
+        own = MatrixTerm("K", self.operator, f - 1, slope * e[0])
+        if len(x) == 1:
+            return (own,)
+        g = float(np.exp(x[1]))
+        return own, MatrixTerm("K", self.others, g - 1, g * e[1])
+
+    def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
+        """All relative motions that load the joint."""
+        assert self.joint is not None
+        return self.joint.rows
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """A property of its own for the joint, the others as they were fitted beside it."""
+        assert self.joint is not None
+        beside = x[1] if len(x) > 1 else 0.0
+        made = with_all(assembly, self.joint.kind, float(np.exp(beside)))
+        return with_factor_on(made, self.joint, self.left(x[0])[0] / float(np.exp(beside)))
+
+    def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
+        """What is left of the joint's stiffness."""
+        low, here, high = (self.left(x[0] + k * 1.96 * WIDER * sd[0])[0] for k in (-1, 0, 1))
+        return (Estimate("K", here, "of the deck's", low, high),)
+
+    def becomes(self, x: np.ndarray) -> str:
+        """A missing weld, where next to no load is carried."""
+        return "weld-missing" if x[0] < NONE_LEFT else ""
+
+
+def with_all(assembly: Assembly, kind: str, factor: float) -> Assembly:
+    """The assembly with all welds of solids, or all bushes, times a factor."""
+    if kind != "bushes":
+        return with_solids(assembly, factor, soft=False)
+    bushes = replace(assembly.bushes, stiffness=factor * assembly.bushes.stiffness)
+    return replace(assembly, bushes=bushes)
+
+
+def each(kind: type[WeldCompliance], context: SearchContext) -> list[WeldCompliance]:
+    """The effect of every fastener of a structure."""
+    built, tried = context.where.groups.structure, context.fasteners
+    families = {text: (K, sd) for text, K, sd in joint_families(built)} if tried else {}
+    return [of_one(kind, *one, families, len(tried)) for one in tried]
+
+
+def of_one(
+    kind: type[WeldCompliance],
+    joint: Connection,
+    share: np.ndarray,
+    families: JointFamilies,
+    tried: int,
+) -> WeldCompliance:
+    """The effect of one of as many fasteners as were tried.
+
+    Parameters
+    ----------
+    share : (r,)   z/(w + z) of the joint's rows, see :func:`.joints.softness`
+    families : {name: what all joints of a kind have in K, prior sd of ln of their factor}
+    """
+    own, soft = sp.csr_array(joint.rows.T @ joint.rows), float(share.min())
+    unknown: tuple[Parameter, ...] = (kind.strength(soft),)
+    others, text = own, FAMILY_OF.get(joint.kind, "")
+    if text in families:
+        K, sd = families[text]
+        others = sp.csr_array(K - own)
+        unknown = (*unknown, Parameter("K of the others", "-", 0.0, sd, step=0.5))
+    word = "weld" if joint.kind == "solids" else "fastener"
+    x, y, z = joint.point.tolist()
+    return kind(
+        unknown, f"{word} {joint.ids[0]} {joint.where}", joint.parts, joint.grids,
+        point=(x, y, z), trials_factor=tried, replaces=(text,) if text in families else (),
+        joint=joint, operator=own, others=others, softness=soft,
+    )  # fmt: skip
+
+
+def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candidate]:
+    """The fasteners that explain most, by exact re-analysis about the calibrated model and both."""
+    effects = each(kind, context)
+    if not effects:
+        return []
+    points = np.array([e.point for e in effects])
+    if context.scan is None:
+        some = farthest_point_sample(points, BY_POLES)
+        chosen = [effects[k] for k in some]
+        return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
+    left = np.array([[e.left(start[0])[0] for start in e.starts()] for e in effects])
+    out: dict[int, Candidate] = {}
+    for about, base in reversed(tuple(enumerate(context.bases))):
+        score = context.scan.fastener_scores(about, left)
+        wanted = FOLLOWED if not out else FOLLOWED + 1
+        for k in np.argsort(score.min(axis=1)):
+            if len(out) >= wanted:
+                break
+            start = effects[k].starts()[int(np.argmin(score[k]))]
+            out.setdefault(int(k), Candidate(effects[k], start, base))
+    return list(out.values())
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """Softer welds, screws and bushes."""
+    return proposed(WeldCompliance, context)
+
+
+def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[str, object]]:
+    """A fastener of the article, and where it is."""
+    from ..fem.assemble import structure
+
+    found = fasteners(structure(article.assembly))
+    joint = found[int(rng.integers(len(found)))]
+    return joint, {"point_m": joint.point.tolist()}
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """A fastener keeps 1e-5 to 1e-4 of its stiffness: it carries about half of its load."""
+    joint, truth = drawn(article, rng)
+    f = float(10 ** rng.uniform(-5, -4))
+    made = with_factor_on(article.assembly, joint, f)
+    return replace(article, assembly=made, truth={**truth, "value": f, "parameters": {"K": f}})
+
+
+FAMILY = Family(
+    WeldCompliance,
+    conceal,
+    candidates=candidates,
+    cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA", "PBAR", "CBAR", "PBUSH", "CBUSH"),
+    settled_by="tap on either side of the joint with a small hammer, and pull a coupon of it",
+    needs=NEEDS,
+)

@@ -1,0 +1,113 @@
+"""Every weld loosened or taken out, by exact re-analysis.
+
+With w = bᵀ b in K for the rows b of a joint and G the receptance of the structure, what is left of
+the joint being the share f, the receptance becomes (Woodbury)
+
+    G' = G + (1 - f) G_ob (f + (1 - f) R)⁻¹ G_bi,   R = 1 - G_bb.
+
+A weld is far stiffer than its sheets, so that R is the small difference of ones: of the order of
+10^-3 to 10^-6, and what its loss does goes with 1/R.  Modes alone are blind to it.  R is therefore
+taken from static responses P⁻¹ bᵀ of the whole structure, P = K + σM, and followed along the lines
+by the modes, of all others to first order:
+
+    R(s) = R_0 + (s² - σ) N_0 - Σ_r b φ_r φ_rᵀ bᵀ (d_r(s) - d_r(σ) + (s² - σ) d_r(σ)²),
+
+N_0 = b P⁻¹ M P⁻¹ bᵀ, d_r(s) = 1/(λ_r + s²).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.reduction import attachments
+from ..effects.joints import Connection, fasteners
+from ..geometry.sampling import farthest_point_sample
+from .likelihood import Responses
+from .reduced_model import State
+from .reduced_problem import ReducedProblem
+from .scan import Baseline, _residuals
+
+MOST = 400  # fasteners that are tried; of more, so many spread over the structure
+AT_ONCE = 24  # of them are solved for together
+LEAST = 1e-9  # of R: rounding of the solves
+
+
+@dataclass(frozen=True, eq=False)
+class Loosened:
+    """A fastener, R_0 = 1 - b P⁻¹ bᵀ of its rows and N_0 = b P⁻¹ M P⁻¹ bᵀ (r, r)."""
+
+    joint: Connection
+    R: np.ndarray
+    N: np.ndarray
+
+    @property
+    def share(self) -> np.ndarray:
+        """Share z/(w + z) of the sheets in the stiffness of both, along its directions (r,)."""
+        return np.asarray(np.linalg.eigvalsh(self.R))
+
+
+def loosened(reduced: ReducedProblem) -> tuple[Loosened, ...]:
+    """Every fastener of the structure with what the sheets give where it is loaded."""
+    joints = fasteners(reduced.structure)
+    if len(joints) > MOST:
+        spread = farthest_point_sample(np.array([j.point for j in joints]), MOST)
+        joints = [joints[k] for k in spread]
+    out: list[Loosened] = []
+    M = reduced.structure.system.M
+    for k in range(0, len(joints), AT_ONCE):
+        some = joints[k : k + AT_ONCE]
+        rows = sp.csr_array(sp.vstack([j.rows for j in some]))
+        static, start = attachments(reduced.factor, rows), 0
+        for joint in some:
+            stop = start + joint.rows.shape[0]
+            own = static[:, start:stop]
+            out.append(Loosened(joint, _rest(joint.rows @ own), own.T @ (M @ own)))
+            start = stop
+    return tuple(out)
+
+
+def _rest(flexibility: np.ndarray) -> np.ndarray:
+    """1 - b P⁻¹ bᵀ, symmetric, between ``LEAST`` and one."""
+    w, V = np.linalg.eigh(np.eye(len(flexibility)) - (flexibility + flexibility.T) / 2)
+    return np.asarray((V * np.clip(w, LEAST, 1.0)) @ V.T)
+
+
+def fastener_scores(
+    base: Baseline, reduced: ReducedProblem, data: Responses, joints: Sequence[Loosened],
+    left: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Score of each fastener with each share of its stiffness left (n, k).
+
+    Parameters
+    ----------
+    left : (n, k)   f
+    """
+    state, out = base.state, np.empty(left.shape)
+    for j, one in enumerate(joints):
+        H = loosened_receptance(state, reduced, data, one, left[j])
+        for k in range(left.shape[1]):
+            r = _residuals(data, state, H[k : k + 1])
+            out[j, k] = base.score(base.with_mass(r, 0.0))[0]
+    return out
+
+
+def loosened_receptance(
+    state: State, reduced: ReducedProblem, data: Responses, one: Loosened, left: np.ndarray
+) -> np.ndarray:
+    """G' on the lines with shares ``left`` (k,) of a joint left (k, n_f, n_out, n_in)."""
+    phi_o, phi_i, d = data.modal(state)
+    sigma = (2 * np.pi * reduced.hertz) ** 2
+    beyond, still = data.s**2 - sigma, 1 / (state.lam + sigma)
+    follow = d - still + beyond[:, None] * still**2
+    b = reduced.model.rows(one.joint.rows, keep=False) @ state.phi
+    G = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+    G_ob = np.einsum("or,fr,br->fob", phi_o, d, b, optimize=True)
+    G_bi = np.einsum("br,fr,ir->fbi", b, d, phi_i, optimize=True)
+    R = one.R + beyond[:, None, None] * one.N
+    R = R - np.einsum("br,fr,cr->fbc", b, follow, b, optimize=True)
+    return np.array(
+        [G + (1 - f) * (G_ob @ np.linalg.solve(f * np.eye(len(b)) + (1 - f) * R, G_bi))
+         for f in left]
+    )  # fmt: skip

@@ -1,0 +1,105 @@
+"""Hidden effects of joints, in structures that have these."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from chladni.effects.hem_line import hem_lines
+from chladni.errors import ModelError
+from chladni.model.assembly import Assembly, Solids
+from chladni.model.properties import Isotropic, SolidSection
+from chladni_specimens.joints.bolts import grip
+
+from .hidden import Hidden, Site
+from .hidden_kinds import Kind
+from .part_scatter import scaled
+
+SOFTEST = 20e9  # [Pa] of a weld: solids of less are adhesive
+REDRAWN = np.log(1.5)  # ln of the growth of a size: at every one another weld is drawn
+
+
+def weld_missing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """One weld or screw is not there; where a size has to grow, it is another one."""
+    a = site.article
+    order = rng.permutation(sum(len(rows) for _, rows in _welds(a)) + len(_screws(a)))
+    k = int(order[round(float(np.log(size) / REDRAWN)) % len(order)])
+    for group, rows in _welds(a):
+        if k < len(rows):
+            place = a.points[a.solids[group].nodes[rows[k]]].mean(axis=0)
+            kept = np.arange(len(a.solids[group])) != rows[k]
+            solids = list(a.solids)
+            old = solids[group]
+            solids[group] = Solids(old.ids[kept], old.nodes[kept], old.part[kept])
+            made = replace(a, solids=tuple(solids))
+            return Hidden(made, {"value": 0.0, "point_m": place.tolist()})
+        k -= len(rows)
+    kept = np.arange(len(a.beams)) != _screws(a)[k]
+    beams = type(a.beams)(**{name: column[kept] for name, column in vars(a.beams).items()})
+    place = a.points[a.beams.nodes[~kept][0]].mean(axis=0)
+    return Hidden(replace(a, beams=beams), {"value": 0.0, "point_m": place.tolist()})
+
+
+def _welds(a: Assembly) -> list[tuple[int, np.ndarray]]:
+    """(group, rows) of solids of metal, each one a weld."""
+    hard = np.array([_modulus(p.section) >= SOFTEST for p in a.parts])
+    return [(k, np.flatnonzero(hard[group.part])) for k, group in enumerate(a.solids)]
+
+
+def _screws(a: Assembly) -> np.ndarray:
+    return np.arange(len(a.beams)) if len(a.shells) else np.zeros(0, int)
+
+
+def _modulus(section: object) -> float:
+    if isinstance(section, SolidSection) and isinstance(section.material, Isotropic):
+        return section.material.E
+    return 0.0
+
+
+def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """The adhesive of one part softer or stiffer by e^3 to e^4 at size 1."""
+    a = site.article
+    soft = [p.name for p in a.parts if 0 < _modulus(p.section) < SOFTEST]
+    if not soft:
+        raise ModelError("the article has no adhesive")
+    name, way = str(rng.choice(soft)), float(rng.choice([-1, 1]))
+    section = a.parts[a.part(name)].section
+    way = -1.0 if _modulus(section) > 1e9 else way  # a layer of epoxy could hardly hold more
+    factor = float(np.exp(way * rng.uniform(3.0, 4.0) * size))
+    made = scaled(a, {name: {"E": factor}})
+    return Hidden(made, {"value": _modulus(section) * factor, "part": name})
+
+
+def hem(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """The sheets of a string do not slide, 1e9 to 1e10 N/m² at size 1: all along, or on half."""
+    a = site.article
+    lines = hem_lines(a)
+    if not lines:
+        raise ModelError("the article has no string of adhesive between two sheets")
+    line = max(lines, key=lambda one: one.length)
+    k = float(np.exp(rng.uniform(np.log(1e9), np.log(1e10)))) * size
+    middle, whole = float(rng.uniform(0, line.length)), bool(rng.integers(2))
+    d = line.from_place(middle)
+    held = np.ones(len(line), bool) if whole else np.abs(d) <= line.length / 4
+    names = np.array([[_part_at(a, rows) for rows in side] for side in line.sides])
+    for pair in {(str(one), str(two)) for one, two in names}:
+        on = held & (names == pair).all(axis=1)
+        if on.any():
+            places, along, share = line.middle[on], line.along[on], line.share[on]
+            a = grip(a, places, along, k * share, pair, reach=0.02)[0]
+    truth = {"value": k, "whole": whole}
+    if not whole:
+        truth["point_m"] = line.middle[int(np.abs(d).argmin())].tolist()
+    return Hidden(a, truth)
+
+
+def _part_at(a: Assembly, rows: np.ndarray) -> str:
+    """Name of the sheet that has these points."""
+    inside = np.isin(a.shells.nodes, rows).any(axis=1)
+    return a.parts[int(np.bincount(a.shells.part[inside]).argmax())].name
+
+
+JOINTS: dict[str, Kind] = {
+    "weld-missing": weld_missing,
+    "adhesive-stiffness": adhesive,
+    "hem-contact": hem,
+}

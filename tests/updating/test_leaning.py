@@ -1,0 +1,28 @@
+"""What a fit took into its nuisances is said where joints could not be that far off."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.effects.effect import Parameter
+from chladni.effects.model_families import ADHESIVE, ModelFamily
+from chladni.updating.leaning import FAR, strained
+
+
+def fitted(text, away):
+    family = ModelFamily((Parameter("k", "-", 0.0, ADHESIVE),), text)
+    x = np.array([away * ADHESIVE])
+    return SimpleNamespace(effects=(family,), of=lambda effect: x)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_adhesive_that_took_more_than_it_scatters_is_told(sign):
+    assert strained(fitted("adhesive", 0.9 * FAR * sign)) == []
+    (said,) = strained(fitted("adhesive", 1.2 * FAR * sign))
+    assert f"{np.exp(1.2 * FAR * sign * ADHESIVE):.2g} of the deck's" in said
+    assert "3.6 standard deviations" in said
+
+
+def test_the_shear_of_a_sheet_is_no_joint():
+    assert strained(fitted("shear of inner", 2 * FAR)) == []
