@@ -8,6 +8,7 @@ from chladni.errors import ChladniError, LabelError
 
 from .evidence_run import run
 from .evidence_sets import SETS, orders, purpose, seed_range
+from .identification_evidence import KINDS, table
 from .screening_faults import FAULTS, tally
 
 
@@ -16,6 +17,8 @@ def main(words: list[str] | None = None) -> int:
     asked = _parser().parse_args(words)
     if asked.command == "screen":
         return _screened(asked)
+    if asked.command == "identify":
+        return _identified(asked)
     try:
         seeds = seed_range(asked.seeds)
         _say(purpose(seeds))
@@ -47,12 +50,29 @@ def _screened(asked: argparse.Namespace) -> int:
     return 0
 
 
+def _identified(asked: argparse.Namespace) -> int:
+    """Errors, coverage and inventions of identification, by kind of noise."""
+    try:
+        seeds = seed_range(asked.seeds)
+        _say(purpose(seeds))
+        table(seeds, asked.noise.split(";") if asked.noise else list(KINDS), _say)
+    except ChladniError as error:
+        sys.stderr.write(f"chladni_evidence: {error}\n")
+        return 2
+    return 0
+
+
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
     commands = top.add_subparsers(required=True, dest="command")
     screen = commands.add_parser("screen", help="how often faults are named, sound recordings not")
     screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
     screen.add_argument("--faults", default="", help="only these, with commas")
+    found = commands.add_parser("identify", help="poles, damping, intervals against known ones")
+    found.add_argument("--seeds", required=True, help="first and last, as 600-649")
+    found.add_argument(
+        "--noise", default="", help=f"only these, with semicolons: {'; '.join(KINDS)}"
+    )
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

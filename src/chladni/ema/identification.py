@@ -10,7 +10,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
-from .pole_fitting import PoleData, PoleFit, PoleSystem, polish
+from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
 from .pole_selection import (
     ORDERS,
     Rule,
@@ -22,9 +22,14 @@ from .pole_selection import (
     swept,
     uncertainty,
 )
+from .response_variance import frf_variance, left_variance
 
 UNSETTLED = 2.0  # times the noise that is left: the sweep may have begun badly
 OTHERS = (5, 8, 12, 18, 26, 36, 48)  # orders that are tried then
+ROUNDS = 4  # of weights from what is left
+QUIET = 0.3  # times the noise assumed: so little is left that poles below it may be seen
+ROUNDING = 1e-6  # times the noise assumed: nothing is left
+STEADY = 0.05  # of the spread at the noise assumed: no FRF repeats itself to less than 0.05 %
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
 
@@ -85,41 +90,6 @@ class Identified:
         return replace(self, **{name: getattr(self, name)[modes] for name in names})
 
 
-def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
-    """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
-
-    In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
-    Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
-    1 % of |H| and 0.1 % of its rms.
-    """
-    H = np.abs(frf.values)
-    rms = np.sqrt((H**2).mean(axis=0))
-    if frf.variance is not None:
-        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2
-    if frf.coherence is not None:
-        gamma = np.clip(frf.coherence, 1e-3, 1.0)
-        ratio = _smooth((1 - gamma) / gamma) / averages
-        return (ratio + 0.01**2) * H**2 + (1e-4 * rms) ** 2
-    return (0.01 * H) ** 2 + (1e-3 * rms) ** 2
-
-
-def noise_source(frf: FRF, averages: int = 1) -> str:
-    """In words, where :func:`frf_variance` takes the noise from."""
-    if frf.variance is not None:
-        return "the variance that the recording states (averages, repeats or dwells)"
-    if frf.coherence is not None:
-        return f"the coherence, {averages} averages being assumed, and 1 % of |H|"
-    return "1 % of |H| and 0.1 % of its rms are assumed, for the recording states nothing"
-
-
-def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
-    """Moving mean over the first axis, ends held."""
-    half = min(width, len(x)) // 2
-    padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
-    total = padded.cumsum(axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
 def identify(
     frf: FRF,
     band: tuple[float, float] | None = None,
@@ -158,11 +128,14 @@ def identify(
         )
     data, omega_max = _data(frf, keep, averages)
     rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
-    found = _result(frf, keep, data, omega_max, *_modes(data, orders, rule, tries), rule)
-    if found.chi > UNSETTLED and orders == ORDERS:
-        other = _result(frf, keep, data, omega_max, *_modes(data, OTHERS, rule, tries), rule)
-        found = min(found, other, key=lambda one: one.chi)
-    return found
+    fit, slope, sweep = _modes(data, orders, rule, tries)
+    if _chi(data, fit) > UNSETTLED and orders == ORDERS:
+        other = _modes(data, OTHERS, rule, tries)
+        fit, slope, sweep = min((fit, slope, sweep), other, key=lambda one: one[0].chi2)
+    solution = Solution(fit, uncertainty(fit.p, slope, max(1.0, _chi(data, fit) ** 2)))
+    if frf.variance is None and frf.coherence is None and len(fit.p):
+        solution = _reweighted(data, fit, slope, rule, tries)
+    return _result(frf, keep, data, omega_max, solution, sweep, rule)
 
 
 def _modes(
@@ -176,6 +149,60 @@ def _modes(
     return *polish(data, fit.p, rule.largest, tol=0.05), sweep
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A fit, the spread of |p| and ζ (r,) each; ``chi`` where the fit's own weights say another."""
+
+    fit: PoleFit
+    spread: tuple[np.ndarray, np.ndarray]
+    chi: float | None = None
+
+
+def _reweighted(
+    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int
+) -> Solution:
+    """The poles with the noise that they leave, where nobody states it.
+
+    A wrong noise costs accuracy, seldom poles. Where far less is left than was assumed, though,
+    modes that it would have hidden are sought again.
+    """
+    own = data
+    for _ in range(ROUNDS):
+        used = own.w > 0
+        rest = np.where(used, fit.e / np.where(used, own.w, 1.0), 0)
+        chi = _chi(data, replace(fit, e=rest * data.w))
+        if chi < ROUNDING:
+            fit, slope = polish(data, fit.p, rule.largest, tol=0.0)
+            break
+        own = replace(data, w=_weights(left_variance(rest, data.y - rest, used), used))
+        fit, slope = polish(own, fit.p, rule.largest, tol=0.05)
+        if chi > QUIET:
+            break
+        count = len(fit.p)
+        fit, slope = merge_duplicate_poles(own, *extended(own, fit, slope, rule, tries), rule)
+        if len(fit.p) == count:
+            break
+    plain, its_slope = solve(data, fit.p, slope=True)
+    assert its_slope is not None
+    known = uncertainty(fit.p, slope, _chi(own, fit) ** 2)
+    least = uncertainty(fit.p, its_slope, STEADY**2)
+    spread = (np.maximum(known[0], least[0]), np.maximum(known[1], least[1]))
+    chi = _chi(data, plain)
+    kept = fit if chi < QUIET else replace(fit, delta_chi2=plain.delta_chi2)
+    return Solution(kept, spread, chi)
+
+
+def _weights(variance: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """√2 / σ, zero where a sample does not count."""
+    used = used & (variance > 0)
+    return np.where(used, np.sqrt(2 / np.where(used, variance, 1.0)), 0.0)
+
+
+def _chi(data: PoleData, fit: PoleFit) -> float:
+    """Rms of the whitened residual over its degrees of freedom."""
+    return float(np.sqrt(fit.chi2 / max(data.samples - fit.x.size - 2 * len(fit.p), 1)))
+
+
 def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     """Scaled, weighted samples, and the scale of s."""
     variance = frf_variance(frf, averages)
@@ -184,7 +211,7 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     y = frf.values[keep].reshape(len(s), -1)
     v = variance[keep].reshape(len(s), -1)
     fine = np.isfinite(y) & np.isfinite(v) & (v > 0)
-    w = np.where(fine, np.sqrt(2 / np.where(fine, v, 1.0)), 0.0)
+    w = _weights(v, fine)
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
@@ -197,16 +224,14 @@ def _result(
     keep: np.ndarray,
     data: PoleData,
     omega_max: float,
-    fit: PoleFit,
-    slope: PoleSystem,
+    solution: Solution,
     sweep: Sweep,
     rule: Rule,
 ) -> Identified:
-    """Back to rad/s and labels, poles in order, spreads from the Gauss-Newton matrix."""
+    """Back to rad/s and labels, poles in order."""
     n_out, n_in = len(frf.outputs), len(frf.inputs)
-    parameters = fit.x.size + 2 * len(fit.p)
-    chi = np.sqrt(fit.chi2 / max(data.samples - parameters, 1))
-    sd_f, sd_z = uncertainty(fit.p, slope, chi**2)
+    fit, (sd_f, sd_z) = solution.fit, solution.spread
+    chi = _chi(data, fit) if solution.chi is None else solution.chi
     order = np.argsort(np.abs(fit.p))
     shape = (n_out, n_in)
     f = frf.frequency[keep]

@@ -184,8 +184,8 @@ def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.nda
 
 
 def uncertainty(p: np.ndarray, slope: PoleSystem, noise: float) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,)."""
-    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, noise)
+    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,); noise is χ² by dof."""
+    C = np.linalg.pinv(slope.H, hermitian=True) * noise
     k = 2 * np.arange(len(p))
     a, b, d = C[k, k], C[k, k + 1], C[k + 1, k + 1]
     size, x, y = np.abs(p), p.real, p.imag

@@ -9,11 +9,12 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..ema.finding import Screening
-from ..ema.identification import Identified, noise_source
+from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.level_shift import level_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import responses
+from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent
