@@ -10,26 +10,12 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
-from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
-from .pole_selection import (
-    ORDERS,
-    Rule,
-    Sweep,
-    extended,
-    merge_duplicate_poles,
-    settled,
-    start,
-    swept,
-    uncertainty,
-)
-from .response_variance import frf_variance, left_variance
+from .pole_fitting import PoleData
+from .pole_search import Solution, searched, weights
+from .pole_search_by_parts import is_large, searched_by_parts
+from .pole_selection import ORDERS, Rule, Sweep
+from .response_variance import frf_variance
 
-UNSETTLED = 2.0  # times the noise that is left: the sweep may have begun badly
-OTHERS = (5, 8, 12, 18, 26, 36, 48)  # orders that are tried then
-ROUNDS = 4  # of weights from what is left
-QUIET = 0.3  # times the noise assumed: so little is left that poles below it may be seen
-ROUNDING = 1e-6  # times the noise assumed: nothing is left
-STEADY = 0.05  # of the spread at the noise assumed: no FRF repeats itself to less than 0.05 %
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
 
@@ -128,79 +114,10 @@ def identify(
         )
     data, omega_max = _data(frf, keep, averages)
     rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
-    fit, slope, sweep = _modes(data, orders, rule, tries)
-    if _chi(data, fit) > UNSETTLED and orders == ORDERS:
-        other = _modes(data, OTHERS, rule, tries)
-        fit, slope, sweep = min((fit, slope, sweep), other, key=lambda one: one[0].chi2)
-    solution = Solution(fit, uncertainty(fit.p, slope, max(1.0, _chi(data, fit) ** 2)))
-    if frf.variance is None and frf.coherence is None and len(fit.p):
-        solution = _reweighted(data, fit, slope, rule, tries)
-    return _result(frf, keep, data, omega_max, solution, sweep, rule)
-
-
-def _modes(
-    data: PoleData, orders: tuple[int, ...], rule: Rule, tries: int
-) -> tuple[PoleFit, PoleSystem, Sweep]:
-    """A sweep over orders, then the poles that pay, polished."""
-    sweep = swept(data, orders, rule.largest)
-    fit, slope = settled(data, start(data, sweep, rule), rule)
-    fit, slope = extended(data, fit, slope, rule, tries)
-    fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    return *polish(data, fit.p, rule.largest, tol=0.05), sweep
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A fit, the spread of |p| and ζ (r,) each; ``chi`` where the fit's own weights say another."""
-
-    fit: PoleFit
-    spread: tuple[np.ndarray, np.ndarray]
-    chi: float | None = None
-
-
-def _reweighted(
-    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int
-) -> Solution:
-    """The poles with the noise that they leave, where nobody states it.
-
-    A wrong noise costs accuracy, seldom poles. Where far less is left than was assumed, though,
-    modes that it would have hidden are sought again.
-    """
-    own = data
-    for _ in range(ROUNDS):
-        used = own.w > 0
-        rest = np.where(used, fit.e / np.where(used, own.w, 1.0), 0)
-        chi = _chi(data, replace(fit, e=rest * data.w))
-        if chi < ROUNDING:
-            fit, slope = polish(data, fit.p, rule.largest, tol=0.0)
-            break
-        own = replace(data, w=_weights(left_variance(rest, data.y - rest, used), used))
-        fit, slope = polish(own, fit.p, rule.largest, tol=0.05)
-        if chi > QUIET:
-            break
-        count = len(fit.p)
-        fit, slope = merge_duplicate_poles(own, *extended(own, fit, slope, rule, tries), rule)
-        if len(fit.p) == count:
-            break
-    plain, its_slope = solve(data, fit.p, slope=True)
-    assert its_slope is not None
-    known = uncertainty(fit.p, slope, _chi(own, fit) ** 2)
-    least = uncertainty(fit.p, its_slope, STEADY**2)
-    spread = (np.maximum(known[0], least[0]), np.maximum(known[1], least[1]))
-    chi = _chi(data, plain)
-    kept = fit if chi < QUIET else replace(fit, delta_chi2=plain.delta_chi2)
-    return Solution(kept, spread, chi)
-
-
-def _weights(variance: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """√2 / σ, zero where a sample does not count."""
-    used = used & (variance > 0)
-    return np.where(used, np.sqrt(2 / np.where(used, variance, 1.0)), 0.0)
-
-
-def _chi(data: PoleData, fit: PoleFit) -> float:
-    """Rms of the whitened residual over its degrees of freedom."""
-    return float(np.sqrt(fit.chi2 / max(data.samples - fit.x.size - 2 * len(fit.p), 1)))
+    stated = frf.variance is not None or frf.coherence is not None
+    search = searched_by_parts if is_large(data) else searched
+    solution = search(data, rule, stated, orders, tries)
+    return _result(frf, keep, omega_max, solution, rule)
 
 
 def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
@@ -211,7 +128,7 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
     y = frf.values[keep].reshape(len(s), -1)
     v = variance[keep].reshape(len(s), -1)
     fine = np.isfinite(y) & np.isfinite(v) & (v > 0)
-    w = _weights(v, fine)
+    w = weights(v, fine)
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
@@ -222,16 +139,13 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
 def _result(
     frf: FRF,
     keep: np.ndarray,
-    data: PoleData,
     omega_max: float,
     solution: Solution,
-    sweep: Sweep,
     rule: Rule,
 ) -> Identified:
     """Back to rad/s and labels, poles in order."""
     n_out, n_in = len(frf.outputs), len(frf.inputs)
     fit, (sd_f, sd_z) = solution.fit, solution.spread
-    chi = _chi(data, fit) if solution.chi is None else solution.chi
     order = np.argsort(np.abs(fit.p))
     shape = (n_out, n_in)
     f = frf.frequency[keep]
@@ -243,12 +157,12 @@ def _result(
         frequency_sd=omega_max * sd_f[order] / (2 * np.pi),
         damping_sd=sd_z[order],
         relative_delta_chi2=fit.delta_chi2[order] / rule.price,
-        chi=float(chi),
+        chi=solution.chi,
         outputs=frf.outputs,
         inputs=frf.inputs,
         quantity=frf.quantity,
         band=(float(f[0]), float(f[-1])),
-        diagram=replace(sweep, poles=omega_max * sweep.poles),
+        diagram=replace(solution.sweep, poles=omega_max * solution.sweep.poles),
     )
 
 

@@ -13,6 +13,7 @@ from .pole_fitting import PoleData, PoleFit, PoleSystem, bounded, polish, reloca
 
 ORDERS = (6, 10, 15, 22, 31, 42, 56)
 _VF_STEPS = 6
+_CLEAR = 10.0  # times its noise: a channel that is less has little to say
 BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
 
 
@@ -63,10 +64,11 @@ def compressed(data: PoleData, most: int = 8) -> PoleData:
     """At most ``most`` real combinations of the channels, lines weighted alike for all.
 
     Channels are scaled to one and every line to the rms over channels, so that small responses
-    count as large ones do.
+    count as large ones do; a channel of hardly more than noise is not raised above its neighbours.
     """
     used = data.w > 0
-    scale = np.sqrt((np.abs(data.y) ** 2).mean(axis=0))
+    noise = np.where(used, 2 / np.where(used, data.w, 1.0) ** 2, 0.0).mean(axis=0)
+    scale = np.sqrt(np.maximum((np.abs(data.y) ** 2).mean(axis=0), _CLEAR**2 * noise))
     y = np.where(used, data.y, 0) / np.maximum(scale, 1e-300)
     g = 1 / np.sqrt(np.maximum((np.abs(y) ** 2).mean(axis=1), 1e-12))
     _, _, V = np.linalg.svd(stacked(g[:, None] * y), full_matrices=False)
