@@ -3,6 +3,7 @@
 Weighted common-pole fit on any frequency grid; see `fitting` and `selection`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -10,10 +11,11 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
+from .pole_choice import by_subspace, edited
 from .pole_fitting import PoleData
 from .pole_search import Solution, searched, weights
 from .pole_search_by_parts import is_large, searched_by_parts
-from .pole_selection import ORDERS, Rule, Sweep
+from .pole_selection import ORDERS, Rule
 from .response_variance import frf_variance
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
@@ -33,7 +35,6 @@ class Identified:
     chi : float                      rms of the whitened residual (1: the noise is all that is left)
     outputs, inputs, quantity        as in the recording
     band : (low, high)               [Hz] that was fitted
-    diagram : Sweep                  poles of every order, [rad/s]: the stabilisation diagram
     """
 
     poles: np.ndarray
@@ -48,7 +49,6 @@ class Identified:
     inputs: tuple[str, ...]
     quantity: str
     band: tuple[float, float]
-    diagram: Sweep
 
     @property
     def frequency(self) -> np.ndarray:
@@ -84,6 +84,9 @@ def identify(
     averages: int = 1,
     use: np.ndarray | None = None,
     tries: int = 12,
+    states: int | None = None,
+    drop: Sequence[float] = (),
+    pick: Sequence[float] = (),
 ) -> Identified:
     """Modes of a recording.
 
@@ -96,11 +99,40 @@ def identify(
     averages : of the estimate, where the spread comes from the coherence
     use : (n_f,) bool, lines that count (a gap, the cord's band left out)
     tries : attempts to add a pole where the residual stands out
+    states : the other road: all poles of a state space of that order (``subspace``)
+    drop, pick : [Hz] of poles taken out or put in by hand; the others are polished anew
 
     Raises
     ------
     FileError
         If the band holds too few lines.
+    LabelError
+        If there is no pole to drop at a frequency, or none stays where one was picked.
+    """
+    keep = kept_lines(frf, band, use)
+    data, omega_max = pole_data(frf, keep, averages)
+    rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
+    stated = frf.variance is not None or frf.coherence is not None
+    if states is not None:
+        solution = by_subspace(data, rule, stated, states)
+    elif is_large(data):
+        solution = searched_by_parts(data, rule, stated, orders, tries)
+    else:
+        solution = searched(data, rule, stated, orders, tries)
+    if len(drop) or len(pick):
+        solution = edited(data, solution, rule, stated, omega_max / (2 * np.pi), drop, pick)
+    return _result(frf, keep, omega_max, solution, rule)
+
+
+def kept_lines(
+    frf: FRF, band: tuple[float, float] | None = None, use: np.ndarray | None = None
+) -> np.ndarray:
+    """Lines that are identified from (n_f,) bool.
+
+    Raises
+    ------
+    FileError
+        If they are too few.
     """
     keep = frf.frequency > 0
     if band is not None:
@@ -112,16 +144,11 @@ def identify(
             f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
             f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
-    data, omega_max = _data(frf, keep, averages)
-    rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
-    stated = frf.variance is not None or frf.coherence is not None
-    search = searched_by_parts if is_large(data) else searched
-    solution = search(data, rule, stated, orders, tries)
-    return _result(frf, keep, omega_max, solution, rule)
+    return keep
 
 
-def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
-    """Scaled, weighted samples, and the scale of s."""
+def pole_data(frf: FRF, keep: np.ndarray, averages: int = 1) -> tuple[PoleData, float]:
+    """Scaled, weighted samples, and the scale of s [rad/s]."""
     variance = frf_variance(frf, averages)
     s = 2j * np.pi * frf.frequency[keep]
     omega_max = float(np.abs(s).max())
@@ -162,7 +189,6 @@ def _result(
         inputs=frf.inputs,
         quantity=frf.quantity,
         band=(float(f[0]), float(f[-1])),
-        diagram=replace(solution.sweep, poles=omega_max * solution.sweep.poles),
     )
 
 

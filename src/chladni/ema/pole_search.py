@@ -8,7 +8,6 @@ from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
 from .pole_selection import (
     ORDERS,
     Rule,
-    Sweep,
     extended,
     merge_duplicate_poles,
     settled,
@@ -37,45 +36,40 @@ class Solution:
     fit : PoleFit
     spread : (r,), (r,)   standard deviations of |p| and of ζ
     chi : float           rms of the residual over the noise stated or assumed
-    sweep : Sweep
     """
 
     fit: PoleFit
     spread: Spread
     chi: float
-    sweep: Sweep
 
 
 def searched(
     data: PoleData, rule: Rule, stated: bool, orders: tuple[int, ...] = ORDERS, tries: int = 12
 ) -> Solution:
     """The poles that pay; ``stated``: the weights are the recording's own, not assumed."""
-    fit, slope, sweep = selected(data, orders, rule, tries)
+    fit, slope = selected(data, orders, rule, tries)
     if chi_of(data, fit) > UNSETTLED and orders == ORDERS:
         other = selected(data, OTHERS, rule, tries)
-        fit, slope, sweep = min((fit, slope, sweep), other, key=lambda one: one[0].chi2)
+        fit, slope = min((fit, slope), other, key=lambda one: one[0].chi2)
     if not stated and len(fit.p):
-        fit, spread, chi = reweighted(data, fit, slope, rule, tries)
-        return Solution(fit, spread, chi, sweep)
+        return reweighted(data, fit, slope, rule, tries)
     chi = chi_of(data, fit)
-    return Solution(fit, uncertainty(fit.p, slope, max(1.0, chi**2)), chi, sweep)
+    return Solution(fit, uncertainty(fit.p, slope, max(1.0, chi**2)), chi)
 
 
 def selected(
     data: PoleData, orders: tuple[int, ...], rule: Rule, tries: int
-) -> tuple[PoleFit, PoleSystem, Sweep]:
+) -> tuple[PoleFit, PoleSystem]:
     """A sweep over orders, then the poles that pay, polished."""
     sweep = swept(data, orders, rule.largest)
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    return *polish(data, fit.p, rule.largest, tol=0.05), sweep
+    return polish(data, fit.p, rule.largest, tol=0.05)
 
 
-def reweighted(
-    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int
-) -> tuple[PoleFit, Spread, float]:
-    """The poles with the noise that they leave, where nobody states it; their spread, and χ.
+def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int) -> Solution:
+    """The poles with the noise that they leave, where nobody states it.
 
     A wrong noise costs accuracy, seldom poles. Where far less is left than was assumed, though,
     modes that it would have hidden are sought again.
@@ -84,7 +78,7 @@ def reweighted(
     for _ in range(ROUNDS):
         if chi < ROUNDING:
             fit, slope = polish(data, fit.p, rule.largest, tol=0.0)
-            return fit, uncertainty(fit.p, slope, STEADY**2), chi
+            return Solution(fit, uncertainty(fit.p, slope, STEADY**2), chi)
         own = with_noise_left(data, own, fit)
         fit, slope = polish(own, fit.p, rule.largest, tol=0.05)
         count = len(fit.p)
@@ -95,7 +89,7 @@ def reweighted(
         if len(fit.p) == count:
             break
     fit = fit if chi < QUIET else replace(fit, delta_chi2=plain.delta_chi2)
-    return fit, own_spread(own, fit, slope, chi), chi
+    return Solution(fit, own_spread(own, fit, slope, chi), chi)
 
 
 def with_noise_left(data: PoleData, fitted: PoleData, fit: PoleFit) -> PoleData:

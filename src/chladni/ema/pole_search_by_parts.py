@@ -6,20 +6,20 @@ ASME J. Vib. Acoust. 110, 88-95: compression by principal components). They choo
 channel then polishes them with its own noise. Residues of all poles are solved for at once.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
 
-from .pole_fitting import PoleData, polish, solve, stacked
-from .pole_search import ROUNDING, Solution, chi_of, own_spread, selected, with_noise_left
-from .pole_selection import Rule, Sweep, extended, uncertainty
+from .pole_fitting import PoleData, basis, polish, solve, stacked
+from .pole_search import ROUNDING, STEADY, Solution, chi_of, selected, with_noise_left
+from .pole_selection import Rule, extended, uncertainty
 
 CHANNELS, LINES = 48, 3000  # up to here all are fitted at once
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
 MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
-POLISH = 4  # steps on all channels: they begin within the noise of the answer
+POLISH = 3  # steps on all channels: they begin within the noise of the answer
 TRIES = 4  # poles sought in what all channels leave
 
 
@@ -28,23 +28,33 @@ def is_large(data: PoleData) -> bool:
     return data.y.shape[1] > CHANNELS or len(data.s) > LINES
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Poles of one band, and the samples (margins too, own weights) they were fitted to.
+
+    ``poles`` (r,) are those of the band itself, ``x`` (2 r, n_c) their residues as real pairs.
+    """
+
+    rows: slice
+    w: np.ndarray
+    poles: np.ndarray
+    x: np.ndarray
+
+
 def searched_by_parts(
     data: PoleData, rule: Rule, stated: bool, orders: tuple[int, ...], tries: int
 ) -> Solution:
     """As :func:`.pole_search.searched`, of poles that are chosen band by band."""
     parts = [_part(data, low, high, rule, stated, orders, tries) for low, high in core_bands(data)]
-    p, delta_chi2, sd_f, sd_z = (
-        np.concatenate(all_of)
-        for all_of in zip(
-            *((one.fit.p, one.fit.delta_chi2, *one.spread) for one in parts), strict=True
-        )
+    parts = _once(parts)
+    done = [_polished(data, parts, k, rule, stated) for k in range(len(parts))]
+    p, delta_chi2, sd_f, sd_z = (np.concatenate(all_of) for all_of in zip(*done, strict=True))
+    fit, _ = solve(data, p)
+    return Solution(
+        replace(fit, delta_chi2=delta_chi2),
+        (sd_f, sd_z),
+        chi_of(data, fit),
     )
-    of = np.concatenate([np.full(len(one.fit.p), k) for k, one in enumerate(parts)])
-    kept = _once(p, delta_chi2, of)
-    fit, _ = solve(data, p[kept])
-    chi = chi_of(data, fit)
-    fit = replace(fit, delta_chi2=delta_chi2[kept])
-    return Solution(fit, (sd_f[kept], sd_z[kept]), chi, _joined([one.sweep for one in parts]))
 
 
 def core_bands(data: PoleData) -> list[tuple[int, int]]:
@@ -86,49 +96,57 @@ def _part(
     stated: bool,
     orders: tuple[int, ...],
     tries: int,
-) -> Solution:
+) -> Part:
     """Poles of one band, those of its margins left out again; at the ends all are kept."""
     n, margin = len(data.s), max(6, int(MARGIN * (high - low)))
-    at = slice(max(0, low - margin), min(n, high + margin))
-    whole = replace(data, s=data.s[at], y=data.y[at], w=data.w[at])
+    rows = slice(max(0, low - margin), min(n, high + margin))
+    whole = replace(data, s=data.s[rows], y=data.y[rows], w=data.w[rows])
     few = few_channels(whole)
     its = replace(rule, channels=few.y.shape[1], lines=len(few.s))
-    fit, _, sweep = selected(few, orders, its, tries)
+    fit, _ = selected(few, orders, its, tries)
     rule = replace(rule, lines=len(whole.s))
     fit, slope = polish(whole, fit.p, rule.largest, POLISH, rule.noise)
-    chi = chi_of(whole, fit)
-    own = whole if stated or chi < ROUNDING else with_noise_left(whole, whole, fit)
-    if own is not whole:
-        fit, slope = polish(own, fit.p, rule.largest, POLISH, rule.noise)
-    fit, slope = extended(own, fit, slope, rule, TRIES)
-    if stated:
-        spread = uncertainty(fit.p, slope, max(1.0, chi_of(own, fit) ** 2))
-    else:
-        spread = own_spread(own, fit, slope, max(chi, ROUNDING))
+    if not stated and chi_of(whole, fit) > ROUNDING:
+        whole = with_noise_left(whole, whole, fit)
+        fit, slope = polish(whole, fit.p, rule.largest, POLISH, rule.noise)
+    fit, slope = extended(whole, fit, slope, rule, TRIES)
     f = np.abs(data.s)
     begin = 0.0 if low == 0 else f[low]
     end = np.inf if high == n else f[high]
     slack = np.abs(fit.p.real)  # at the cut two bands may find one pole, each on the other's side
     core = (begin - slack <= np.abs(fit.p)) & (np.abs(fit.p) < end + slack)
-    fit = replace(fit, p=fit.p[core], delta_chi2=fit.delta_chi2[core])
-    return Solution(fit, (spread[0][core], spread[1][core]), chi, sweep)
+    return Part(rows, whole.w, fit.p[core], fit.x[:-2][np.repeat(core, 2)])
 
 
-def _once(p: np.ndarray, delta_chi2: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Positions by rising |p|; of two bands' poles that are one, the one that brings more."""
-    half = np.abs(p.real)
-    same = np.abs(p[:, None] - p) < 0.5 * (half[:, None] + half)
-    weaker = same & (of[:, None] != of) & (delta_chi2[:, None] < delta_chi2)
-    order = np.argsort(np.abs(p))
-    return np.asarray(order[~weaker.any(axis=1)[order]])
+def _once(parts: list[Part]) -> list[Part]:
+    """Of two neighbours' poles that are one, that of the first is left out."""
+    kept = []
+    for part, after in zip(parts, [*parts[1:], None], strict=True):
+        p = part.poles
+        alone = np.ones(len(p), bool)
+        if after is not None and len(after.poles):
+            gap = np.abs(p[:, None] - after.poles)
+            alone = (gap > 0.5 * np.abs(p.real[:, None] + after.poles.real)).all(axis=1)
+        kept.append(replace(part, poles=p[alone], x=part.x[np.repeat(alone, 2)]))
+    return kept
 
 
-def _joined(sweeps: list[Sweep]) -> Sweep:
-    """One diagram of all bands; of an order that several tried, the largest misfit."""
-    orders = np.unique(np.concatenate([s.orders for s in sweeps]))
-    chi = [max(float(s.chi[s.orders == n].max(initial=0.0)) for s in sweeps) for n in orders]
-    order, poles, delta_chi2 = (
-        np.concatenate([getattr(s, name) for s in sweeps])
-        for name in ("order", "poles", "delta_chi2")
-    )
-    return Sweep(order, poles, delta_chi2, np.array(chi), orders)
+def _polished(
+    data: PoleData, parts: list[Part], k: int, rule: Rule, stated: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Poles, rise of χ² and spread of one band once what rings in all others is taken off."""
+    part, rest = parts[k], [one for j, one in enumerate(parts) if j != k]
+    s, y = data.s[part.rows], data.y[part.rows]
+    for other in rest:
+        y = y - basis(s, other.poles, data.q) @ other.x
+    own = PoleData(s, y, part.w, data.q)
+    fit, slope = polish(own, part.poles, rule.largest, POLISH, 0.05)
+    noise = chi_of(own, fit) ** 2
+    if stated:
+        noise = max(1.0, noise)
+    else:
+        assumed = replace(own, w=data.w[part.rows])
+        noise *= max(1.0, STEADY / max(chi_of(assumed, solve(assumed, fit.p)[0]), ROUNDING)) ** 2
+    order = np.argsort(np.abs(fit.p))
+    sd_f, sd_z = uncertainty(fit.p, slope, noise)
+    return fit.p[order], fit.delta_chi2[order], sd_f[order], sd_z[order]
