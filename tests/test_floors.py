@@ -58,7 +58,6 @@ LIBRARIES = {
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
 WAITING_FOR = {  # module no command, environment or public name reaches: what will
-    "chladni/ema/realisation": "an identified model as a state space",
     "chladni/geometry/thickness_prior": "thickness mapping",
 }
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names

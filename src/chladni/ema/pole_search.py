@@ -14,6 +14,7 @@ from .pole_selection import (
     start,
     swept,
     uncertainty,
+    with_neighbours,
 )
 from .response_variance import left_variance
 
@@ -64,6 +65,7 @@ def selected(
     sweep = swept(data, orders, rule.largest)
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
+    fit, slope = with_neighbours(data, fit, slope, rule)
     fit, slope = merge_duplicate_poles(data, fit, slope, rule)
     return polish(data, fit.p, rule.largest, tol=0.05)
 

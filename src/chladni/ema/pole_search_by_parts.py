@@ -13,13 +13,14 @@ from scipy.linalg import eigh
 
 from .pole_fitting import PoleData, basis, polish, solve, stacked
 from .pole_search import ROUNDING, STEADY, Solution, chi_of, selected, with_noise_left
-from .pole_selection import Rule, extended, uncertainty
+from .pole_selection import Rule, extended, uncertainty, with_neighbours
 
 CHANNELS, LINES = 48, 3000  # up to here all are fitted at once
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
 MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
 POLISH = 3  # steps on all channels: they begin within the noise of the answer
+PASSES = 2  # each takes off what rings in other bands, better known than before
 TRIES = 4  # poles sought in what all channels leave
 
 
@@ -47,14 +48,17 @@ def searched_by_parts(
     """As :func:`.pole_search.searched`, of poles that are chosen band by band."""
     parts = [_part(data, low, high, rule, stated, orders, tries) for low, high in core_bands(data)]
     parts = _once(parts)
-    done = [_polished(data, parts, k, rule, stated) for k in range(len(parts))]
-    p, delta_chi2, sd_f, sd_z = (np.concatenate(all_of) for all_of in zip(*done, strict=True))
-    fit, _ = solve(data, p)
-    return Solution(
-        replace(fit, delta_chi2=delta_chi2),
-        (sd_f, sd_z),
-        chi_of(data, fit),
-    )
+    for _ in range(PASSES):
+        done = [_polished(data, parts, k, rule, stated) for k in range(len(parts))]
+        p, delta_chi2, sd_f, sd_z = (np.concatenate(all_of) for all_of in zip(*done, strict=True))
+        fit, _ = solve(data, p)
+        ends = np.cumsum([2 * len(one[0]) for one in done])
+        x = np.split(fit.x[:-2], ends[:-1])
+        parts = [
+            replace(part, poles=one[0], x=own)
+            for part, one, own in zip(parts, done, x, strict=True)
+        ]
+    return Solution(replace(fit, delta_chi2=delta_chi2), (sd_f, sd_z), chi_of(data, fit))
 
 
 def core_bands(data: PoleData) -> list[tuple[int, int]]:
@@ -110,6 +114,8 @@ def _part(
         whole = with_noise_left(whole, whole, fit)
         fit, slope = polish(whole, fit.p, rule.largest, POLISH, rule.noise)
     fit, slope = extended(whole, fit, slope, rule, TRIES)
+    if high == n or low == 0:
+        fit, _ = with_neighbours(whole, fit, slope, rule, below=low == 0)
     f = np.abs(data.s)
     begin = 0.0 if low == 0 else f[low]
     end = np.inf if high == n else f[high]

@@ -219,6 +219,24 @@ def extended(
     return fit, slope
 
 
+def with_neighbours(
+    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, below: bool = True
+) -> tuple[PoleFit, PoleSystem]:
+    """A pole beyond each end of the band where that pays: what rings next door is no constant.
+
+    What is left of it stands out at no line, so that :func:`extended` does not see it.
+    """
+    f = np.abs(data.s)
+    for at in (1.12 * float(f.max()), *([float(f.min()) / 1.12] if below else [])):
+        if fit.chi2 < data.samples * rule.noise:
+            break
+        better, its_slope = _with_pole(data, fit, at, rule) or (fit, slope)
+        now = rule.after(data, better)
+        if fit.chi2 - better.chi2 > now.price and len(_poor(data, better, its_slope, now)) == 0:
+            fit, slope = better, its_slope
+    return fit, slope
+
+
 def _with_pole(
     data: PoleData, fit: PoleFit, at: float, rule: Rule
 ) -> tuple[PoleFit, PoleSystem] | None:
