@@ -115,7 +115,7 @@ def _part(
         fit, slope = polish(whole, fit.p, rule.largest, POLISH, rule.noise)
     fit, slope = extended(whole, fit, slope, rule, TRIES)
     if high == n or low == 0:
-        fit, _ = with_neighbours(whole, fit, slope, rule, below=low == 0)
+        fit, _ = with_neighbours(whole, fit, slope, rule, low == 0, far=True)
     f = np.abs(data.s)
     begin = 0.0 if low == 0 else f[low]
     end = np.inf if high == n else f[high]
@@ -145,14 +145,17 @@ def _polished(
     s, y = data.s[part.rows], data.y[part.rows]
     for other in rest:
         y = y - basis(s, other.poles, data.q) @ other.x
-    own = PoleData(s, y, part.w, data.q)
+    own = assumed = PoleData(s, y, data.w[part.rows], data.q)
+    if not stated:
+        own = replace(own, w=part.w)
+        own = with_noise_left(own, own, solve(own, part.poles)[0])
     fit, slope = polish(own, part.poles, rule.largest, POLISH, 0.05)
     noise = chi_of(own, fit) ** 2
     if stated:
         noise = max(1.0, noise)
     else:
-        assumed = replace(own, w=data.w[part.rows])
-        noise *= max(1.0, STEADY / max(chi_of(assumed, solve(assumed, fit.p)[0]), ROUNDING)) ** 2
+        chi = max(chi_of(assumed, solve(assumed, fit.p)[0]), ROUNDING)
+        noise *= max(1.0, STEADY / chi) ** 2
     order = np.argsort(np.abs(fit.p))
     sd_f, sd_z = uncertainty(fit.p, slope, noise)
     return fit.p[order], fit.delta_chi2[order], sd_f[order], sd_z[order]

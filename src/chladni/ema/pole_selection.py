@@ -220,20 +220,30 @@ def extended(
 
 
 def with_neighbours(
-    data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, below: bool = True
+    data: PoleData,
+    fit: PoleFit,
+    slope: PoleSystem,
+    rule: Rule,
+    below: bool = True,
+    far: bool = False,
 ) -> tuple[PoleFit, PoleSystem]:
     """A pole beyond each end of the band where that pays: what rings next door is no constant.
 
-    What is left of it stands out at no line, so that :func:`extended` does not see it.
+    What is left of it stands out at no line, so that :func:`extended` does not see it. ``far``: the
+    pole may go where no mode would be believed, and is sought however small the misfit.
     """
-    f = np.abs(data.s)
+    f, last = np.abs(data.s), len(fit.p)
     for at in (1.12 * float(f.max()), *([float(f.min()) / 1.12] if below else [])):
-        if fit.chi2 < data.samples * rule.noise:
+        if not far and fit.chi2 < data.samples * rule.noise:
             break
         better, its_slope = _with_pole(data, fit, at, rule) or (fit, slope)
         now = rule.after(data, better)
-        if fit.chi2 - better.chi2 > now.price and len(_poor(data, better, its_slope, now)) == 0:
-            fit, slope = better, its_slope
+        if fit.chi2 - better.chi2 <= now.price:
+            continue
+        outside = not f.min() <= np.abs(better.p[-1]) <= f.max()
+        allowed = {last} if far and outside else set()
+        if set(_poor(data, better, its_slope, now)) <= allowed:
+            fit, slope, last = better, its_slope, last + 1
     return fit, slope
 
 
