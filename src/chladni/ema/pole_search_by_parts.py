@@ -30,7 +30,7 @@ def is_large(data: PoleData) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class BandPoles:
     """Poles of one band, and the samples (margins too, own weights) they were fitted to.
 
     ``poles`` (r,) are those of the band itself, ``x`` (2 r, n_c) their residues as real pairs.
@@ -100,7 +100,7 @@ def _part(
     stated: bool,
     orders: tuple[int, ...],
     tries: int,
-) -> Part:
+) -> BandPoles:
     """Poles of one band, those of its margins left out again; at the ends all are kept."""
     n, margin = len(data.s), max(6, int(MARGIN * (high - low)))
     rows = slice(max(0, low - margin), min(n, high + margin))
@@ -121,10 +121,10 @@ def _part(
     end = np.inf if high == n else f[high]
     slack = np.abs(fit.p.real)  # at the cut two bands may find one pole, each on the other's side
     core = (begin - slack <= np.abs(fit.p)) & (np.abs(fit.p) < end + slack)
-    return Part(rows, whole.w, fit.p[core], fit.x[:-2][np.repeat(core, 2)])
+    return BandPoles(rows, whole.w, fit.p[core], fit.x[:-2][np.repeat(core, 2)])
 
 
-def _once(parts: list[Part]) -> list[Part]:
+def _once(parts: list[BandPoles]) -> list[BandPoles]:
     """Of two neighbours' poles that are one, that of the first is left out."""
     kept = []
     for part, after in zip(parts, [*parts[1:], None], strict=True):
@@ -138,7 +138,7 @@ def _once(parts: list[Part]) -> list[Part]:
 
 
 def _polished(
-    data: PoleData, parts: list[Part], k: int, rule: Rule, stated: bool
+    data: PoleData, parts: list[BandPoles], k: int, rule: Rule, stated: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Poles, rise of χ² and spread of one band once what rings in all others is taken off."""
     part, rest = parts[k], [one for j, one in enumerate(parts) if j != k]

@@ -63,7 +63,7 @@ def subspace(data: PoleData, order: int) -> Subspace:
     z = ((alpha + s) / (alpha - s))[:, None] ** np.arange(q)
     W = stacked(g[:, None] * z)
     G = stacked((g[:, None] * z)[:, :, None] * y[:, None, :]).reshape(len(W), -1)
-    R = np.linalg.qr(np.concatenate([W, G], axis=1), mode="r")
+    R = np.asarray(np.linalg.qr(np.concatenate([W, G], axis=1), mode="r"))
     U, sigma, _ = np.linalg.svd(R[q:, q:].T, full_matrices=False)
     return Subspace(U[:, :order], sigma[:order], n_o, alpha)
 

@@ -54,7 +54,7 @@ def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, 
 
 def _table(r: RecordingModes) -> Table:
     m = r.modes.sel(r.firm)
-    phase, seen = shapes(m).collinearity if m.order else [], r.diagram.seen(m)
+    phase, seen = shapes(m).collinearity, r.diagram.seen(m)
     columns = (m.frequency, m.frequency_sd, 100 * m.damping, 100 * m.damping_sd, phase, seen)
     rows = [
         (
