@@ -57,9 +57,8 @@ LIBRARIES = {
     "chladni_evidence": {"threadpoolctl"},
     "chladni_envs": {"gymnasium", "stable_baselines3", "sb3_contrib", "matplotlib"},
 }
-WAITING_FOR = {  # module no command, environment or public name reaches: what will
-    "chladni/ema/realisation": "an identified model as a state space",
-}
+# module no command, environment or public name reaches: what will
+WAITING_FOR: dict[str, str] = {}
 EVERYWHERE = {"numpy", "scipy"} | sys.stdlib_module_names
 SOURCES = sorted(
     p

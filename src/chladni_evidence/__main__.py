@@ -13,6 +13,8 @@ from .evidence_run import run
 from .evidence_sets import SETS, orders, purpose, seed_range
 from .fuzz import DUE, fuzz
 from .fuzz_inputs import KINDS, fuzz_inputs
+from .identification_evidence import KINDS as NOISES
+from .identification_evidence import table
 from .screening_faults import FAULTS, tally
 
 
@@ -23,6 +25,8 @@ def main(words: list[str] | None = None) -> int:
         return _screened(asked)
     if asked.command == "fuzz":
         return _fuzzed(asked)
+    if asked.command == "identify":
+        return _identified(asked)
     try:
         seeds = seed_range(asked.seeds)
         _say(purpose(seeds))
@@ -65,6 +69,18 @@ def _fuzzed(asked: argparse.Namespace) -> int:
     return int(any(name not in DUE for count in found.values() for name in count))
 
 
+def _identified(asked: argparse.Namespace) -> int:
+    """Errors, coverage and inventions of identification, by kind of noise."""
+    try:
+        seeds = seed_range(asked.seeds)
+        _say(purpose(seeds))
+        table(seeds, asked.noise.split(";") if asked.noise else list(NOISES), _say)
+    except ChladniError as error:
+        sys.stderr.write(f"chladni_evidence: {error}\n")
+        return 2
+    return 0
+
+
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="chladni_evidence", description=__doc__)
     commands = top.add_subparsers(required=True, dest="command")
@@ -77,6 +93,11 @@ def _parser() -> argparse.ArgumentParser:
     fuzzed.add_argument("--kinds", default="", help="only these, with commas")
     fuzzed.add_argument("--decks", type=Path, help="a folder of more decks to injure")
     fuzzed.add_argument("--out", type=Path, required=True)
+    found = commands.add_parser("identify", help="poles, damping, intervals against known ones")
+    found.add_argument("--seeds", required=True, help="first and last, as 600-649")
+    found.add_argument(
+        "--noise", default="", help=f"only these, with semicolons: {'; '.join(NOISES)}"
+    )
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

@@ -255,6 +255,8 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     done = call("identify", case, "--out", out)
     assert done.exit_code == 0, done.output
     assert call("modes", case, "--count", 12, "--out", tmp_path / "modes").exit_code == 0
+    page = (out / "report.html").read_text()
+    assert all(word in page for word in ("MPC", "of the orders", "state_space.mat"))
     (entry,) = json.loads((out / "identified.json").read_text())["recordings"]
     f = np.array(json.loads((tmp_path / "modes" / "modes.json").read_text())["frequency_hz"])
     f = f[(f > 25) & (f < 180)]
@@ -264,6 +266,23 @@ def test_identify_finds_the_modes_and_damping_of_the_model(case, tmp_path):
     assert len(found) == len(f)
     np.testing.assert_allclose(np.array(entry["damping"])[entry["firm"]], 0.01, rtol=0.02)
     assert (out / "poles.csv").read_text().startswith("mode,frequency_hz")
+    assert np.load(out / "state_space.npz")["A"].shape[0] >= 2 * len(found)
+    assert not any(entry["struck_out"])
+
+
+def test_a_pole_is_dropped_by_its_frequency_and_only_a_pole(case, tmp_path):
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert call("identify", case, "--out", whole).exit_code == 0
+    (entry,) = json.loads((whole / "identified.json").read_text())["recordings"]
+    f = entry["frequency_hz"][2]
+    done = call("identify", case, "--drop", f"{f:.4g}", "--out", out)
+    assert done.exit_code == 3, done.output  # what it stood for is no noise
+    (left,) = json.loads((out / "identified.json").read_text())["recordings"]
+    assert len(left["frequency_hz"]) == len(entry["frequency_hz"]) - 1
+    assert "Taken out by hand" in (out / "report.html").read_text()
+    refused = call("identify", case, "--drop", 1e4, "--out", tmp_path / "no")
+    assert refused.exit_code == 2
+    assert not (tmp_path / "no").exists()
 
 
 def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):

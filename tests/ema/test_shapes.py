@@ -11,7 +11,6 @@ from chladni.dynamics.frf import FRF
 from chladni.dynamics.modes import ModalModel
 from chladni.ema.correlation import mac
 from chladni.ema.identification import DERIVATIVES, Identified, evaluate, identify
-from chladni.ema.pole_selection import Sweep
 from chladni.ema.realisation import realised
 from chladni.ema.shapes import collinearity, lines_per_bandwidth, modal_model, shapes
 from chladni.errors import LabelError
@@ -91,11 +90,10 @@ def test_collinearity_is_blind_to_phase_and_falls_with_circulation(turn: float, 
 def test_lines_per_half_bandwidth() -> None:
     """ζ f / Δf: 1 % at 100 Hz with 0.25 Hz lines is four."""
     p = 2 * np.pi * 100 * (-0.01 + 1j * np.sqrt(1 - 1e-4))
-    empty = Sweep(*(np.zeros(0) for _ in range(5)))
     one, none = np.ones(1), np.zeros((1, 1))
     found = Identified(
         one * p, np.ones((1, 1, 1), complex), none, none, one, one, one, 1.0,
-        ("1:+Z",), ("1:+Z",), "accelerance", (50.0, 150.0), empty,
+        ("1:+Z",), ("1:+Z",), "accelerance", (50.0, 150.0),
     )  # fmt: skip
     f = np.arange(50, 150, 0.25)
     assert lines_per_bandwidth(found, f)[0] == pytest.approx(4, abs=0.51)

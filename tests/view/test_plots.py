@@ -10,13 +10,14 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import bench_plots, level_plots, plots, study_plots
+from chladni.view import bench_plots, level_plots, modal_plots, plots, study_plots
 
 F = np.linspace(10, 200, 400)
 H = sum(1 / ((f0**2 - F**2) + 0.02j * f0 * F) for f0 in (30.0, 80.0, 150.0))
 CURVES = {"test": (F, H), "before": (F, 1.1 * H), "after": (F, H), "another": (F, 2 * H)}
 R = np.array([30.0, 80.0, 150.0])
 
+DRAWN = (bench_plots, level_plots, modal_plots, plots, study_plots)
 PLOTS = {  # name: the drawing, and words that must stand on it
     "frf": (
         lambda p: plots.frf(p, CURVES, "1:+Z", "m/N", [(20, 100)], [(40, 45)]),
@@ -31,11 +32,19 @@ PLOTS = {  # name: the drawing, and words that must stand on it
         lambda p: plots.frequency_ladder(p, R, 0.9 * R, R * [1, np.nan, 1.01]), ("30", "%"),
     ),
     "mac_matrix": (lambda p: plots.mac_matrix(p, np.eye(3), "abc", "def"), ("a", "f", "MAC")),
-    "stabilisation": (
-        lambda p: plots.stabilisation(
-            p, [(n, R, np.array([True, False, True])) for n in (4, 6)], R, (F, np.abs(H))
+    "stabilisation_classes": (
+        lambda p: modal_plots.stabilisation_classes(
+            p, np.array([4, 6, 8]), R, np.array(list("ofs")), R, R[:1], (F, np.abs(H))
         ),
-        ("frequency [Hz]", "order"),
+        ("frequency [Hz]", "states", "all steady", "struck out"),
+    ),
+    "mode_indicators": (
+        lambda p: modal_plots.mode_indicators(p, F, np.abs(H)[:, None], 0 * F, R),
+        ("CMIF", "MIF", "frequency [Hz]"),
+    ),
+    "nyquist_grid": (
+        lambda p: modal_plots.nyquist_grid(p, {f"{k} Hz": (H, H) for k in range(7)}),
+        ("6 Hz", "Re H", "Im H", "test", "identified"),
     ),
     "evidence_bars": (
         lambda p: plots.evidence_bars(p, {"a": -3.0, "b": -300.0}), ("a", "b", "evidence"),
@@ -96,7 +105,7 @@ PLOTS = {  # name: the drawing, and words that must stand on it
 def test_every_plot_is_drawn_here():
     own = {
         name
-        for module in (bench_plots, level_plots, plots, study_plots)
+        for module in DRAWN
         for name, f in vars(module).items()
         if inspect.isfunction(f) and f.__module__ == module.__name__
     }
@@ -116,7 +125,7 @@ def test_every_plot_says_what_it_shows(tmp_path, name, monkeypatch):
     """Labels with units, names of curves and of rows."""
     saved = []
     save = plots.save
-    for module in (bench_plots, level_plots, plots, study_plots):
+    for module in DRAWN:
         monkeypatch.setattr(
             module, "save", lambda figure, path: saved.append(figure) or save(figure, path)
         )

@@ -7,7 +7,7 @@ import typer
 
 from ..case import load_case
 from ..report.result_json import to_json
-from ..workflows.identify import identify
+from ..workflows.identify import PoleChoice, identify
 from ..workflows.loaded_model import is_case
 from ..workflows.recordings_of import load_recordings
 from .run import Out, limits, started
@@ -22,18 +22,29 @@ def run(
     averages: Annotated[
         int, typer.Option(help="Averages of the estimate, for the noise.", min=1)
     ] = 1,
+    drop: Annotated[
+        list[float] | None, typer.Option(help="A pole to leave out, by its frequency in Hz.")
+    ] = None,
+    pick: Annotated[
+        list[float] | None, typer.Option(help="A pole to put in, by its frequency in Hz.")
+    ] = None,
+    states: Annotated[
+        int | None,
+        typer.Option(help="All poles of a state space of that order, by the subspace road."),
+    ] = None,
     out: Out = None,
 ) -> None:
-    """Poles with their spread, damping and residues; a stabilisation diagram and the fit."""
+    """Poles with their spread, damping, shapes; a stabilisation diagram, the fit, a state space."""
     from ..report.identification_page import identification_page
 
     limit = limits(band) if band else None
+    choice = PoleChoice(states, tuple(drop or ()), tuple(pick or ()))
     with started("identify", source, out) as job:
         if source.exists() and is_case(source):
-            found = identify(load_case(source), limit, averages, job.progress)
+            found = identify(load_case(source), limit, averages, job.progress, choice)
         else:
             recordings = load_recordings(source, quantity or None)
-            found = identify(recordings, limit, averages, job.progress)
+            found = identify(recordings, limit, averages, job.progress, choice)
         job.json("identified.json", to_json(found))
         job.show(identification_page(job.folder, found))
     found.trusted()

@@ -3,6 +3,7 @@
 Weighted common-pole fit on any frequency grid; see `fitting` and `selection`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -10,21 +11,13 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
-from .pole_fitting import PoleData, PoleFit, PoleSystem, polish
-from .pole_selection import (
-    ORDERS,
-    Rule,
-    Sweep,
-    extended,
-    merge_duplicate_poles,
-    settled,
-    start,
-    swept,
-    uncertainty,
-)
+from .pole_choice import by_subspace, edited
+from .pole_fitting import PoleData
+from .pole_search import Solution, searched, weights
+from .pole_search_by_parts import is_large, searched_by_parts
+from .pole_selection import ORDERS, Rule
+from .response_variance import frf_variance
 
-UNSETTLED = 2.0  # times the noise that is left: the sweep may have begun badly
-OTHERS = (5, 8, 12, 18, 26, 36, 48)  # orders that are tried then
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
 
 
@@ -42,7 +35,6 @@ class Identified:
     chi : float                      rms of the whitened residual (1: the noise is all that is left)
     outputs, inputs, quantity        as in the recording
     band : (low, high)               [Hz] that was fitted
-    diagram : Sweep                  poles of every order, [rad/s]: the stabilisation diagram
     """
 
     poles: np.ndarray
@@ -57,7 +49,6 @@ class Identified:
     inputs: tuple[str, ...]
     quantity: str
     band: tuple[float, float]
-    diagram: Sweep
 
     @property
     def frequency(self) -> np.ndarray:
@@ -85,41 +76,6 @@ class Identified:
         return replace(self, **{name: getattr(self, name)[modes] for name in names})
 
 
-def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
-    """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
-
-    In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
-    Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
-    1 % of |H| and 0.1 % of its rms.
-    """
-    H = np.abs(frf.values)
-    rms = np.sqrt((H**2).mean(axis=0))
-    if frf.variance is not None:
-        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2
-    if frf.coherence is not None:
-        gamma = np.clip(frf.coherence, 1e-3, 1.0)
-        ratio = _smooth((1 - gamma) / gamma) / averages
-        return (ratio + 0.01**2) * H**2 + (1e-4 * rms) ** 2
-    return (0.01 * H) ** 2 + (1e-3 * rms) ** 2
-
-
-def noise_source(frf: FRF, averages: int = 1) -> str:
-    """In words, where :func:`frf_variance` takes the noise from."""
-    if frf.variance is not None:
-        return "the variance that the recording states (averages, repeats or dwells)"
-    if frf.coherence is not None:
-        return f"the coherence, {averages} averages being assumed, and 1 % of |H|"
-    return "1 % of |H| and 0.1 % of its rms are assumed, for the recording states nothing"
-
-
-def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
-    """Moving mean over the first axis, ends held."""
-    half = min(width, len(x)) // 2
-    padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
-    total = padded.cumsum(axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
 def identify(
     frf: FRF,
     band: tuple[float, float] | None = None,
@@ -128,6 +84,9 @@ def identify(
     averages: int = 1,
     use: np.ndarray | None = None,
     tries: int = 12,
+    states: int | None = None,
+    drop: Sequence[float] = (),
+    pick: Sequence[float] = (),
 ) -> Identified:
     """Modes of a recording.
 
@@ -140,11 +99,40 @@ def identify(
     averages : of the estimate, where the spread comes from the coherence
     use : (n_f,) bool, lines that count (a gap, the cord's band left out)
     tries : attempts to add a pole where the residual stands out
+    states : the other road: all poles of a state space of that order (``subspace``)
+    drop, pick : [Hz] of poles taken out or put in by hand; the others are polished anew
 
     Raises
     ------
     FileError
         If the band holds too few lines.
+    LabelError
+        If there is no pole to drop at a frequency, or none stays where one was picked.
+    """
+    keep = kept_lines(frf, band, use)
+    data, omega_max = pole_data(frf, keep, averages)
+    rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
+    stated = frf.variance is not None or frf.coherence is not None
+    if states is not None:
+        solution = by_subspace(data, rule, stated, states)
+    elif is_large(data):
+        solution = searched_by_parts(data, rule, stated, orders, tries)
+    else:
+        solution = searched(data, rule, stated, orders, tries)
+    if len(drop) or len(pick):
+        solution = edited(data, solution, rule, stated, omega_max / (2 * np.pi), drop, pick)
+    return _result(frf, keep, omega_max, solution, rule)
+
+
+def kept_lines(
+    frf: FRF, band: tuple[float, float] | None = None, use: np.ndarray | None = None
+) -> np.ndarray:
+    """Lines that are identified from (n_f,) bool.
+
+    Raises
+    ------
+    FileError
+        If they are too few.
     """
     keep = frf.frequency > 0
     if band is not None:
@@ -156,35 +144,18 @@ def identify(
             f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
             f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
-    data, omega_max = _data(frf, keep, averages)
-    rule = Rule(data.y.shape[1], len(data.s), largest=largest_damping)
-    found = _result(frf, keep, data, omega_max, *_modes(data, orders, rule, tries), rule)
-    if found.chi > UNSETTLED and orders == ORDERS:
-        other = _result(frf, keep, data, omega_max, *_modes(data, OTHERS, rule, tries), rule)
-        found = min(found, other, key=lambda one: one.chi)
-    return found
+    return keep
 
 
-def _modes(
-    data: PoleData, orders: tuple[int, ...], rule: Rule, tries: int
-) -> tuple[PoleFit, PoleSystem, Sweep]:
-    """A sweep over orders, then the poles that pay, polished."""
-    sweep = swept(data, orders, rule.largest)
-    fit, slope = settled(data, start(data, sweep, rule), rule)
-    fit, slope = extended(data, fit, slope, rule, tries)
-    fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    return *polish(data, fit.p, rule.largest, tol=0.05), sweep
-
-
-def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
-    """Scaled, weighted samples, and the scale of s."""
+def pole_data(frf: FRF, keep: np.ndarray, averages: int = 1) -> tuple[PoleData, float]:
+    """Scaled, weighted samples, and the scale of s [rad/s]."""
     variance = frf_variance(frf, averages)
     s = 2j * np.pi * frf.frequency[keep]
     omega_max = float(np.abs(s).max())
     y = frf.values[keep].reshape(len(s), -1)
     v = variance[keep].reshape(len(s), -1)
     fine = np.isfinite(y) & np.isfinite(v) & (v > 0)
-    w = np.where(fine, np.sqrt(2 / np.where(fine, v, 1.0)), 0.0)
+    w = weights(v, fine)
     if not w.any():
         raise ShapeError("no sample of the recording is a finite number other than zero")
     q = DERIVATIVES[frf.quantity]
@@ -195,18 +166,13 @@ def _data(frf: FRF, keep: np.ndarray, averages: int) -> tuple[PoleData, float]:
 def _result(
     frf: FRF,
     keep: np.ndarray,
-    data: PoleData,
     omega_max: float,
-    fit: PoleFit,
-    slope: PoleSystem,
-    sweep: Sweep,
+    solution: Solution,
     rule: Rule,
 ) -> Identified:
-    """Back to rad/s and labels, poles in order, spreads from the Gauss-Newton matrix."""
+    """Back to rad/s and labels, poles in order."""
     n_out, n_in = len(frf.outputs), len(frf.inputs)
-    parameters = fit.x.size + 2 * len(fit.p)
-    chi = np.sqrt(fit.chi2 / max(data.samples - parameters, 1))
-    sd_f, sd_z = uncertainty(fit.p, slope, chi**2)
+    fit, (sd_f, sd_z) = solution.fit, solution.spread
     order = np.argsort(np.abs(fit.p))
     shape = (n_out, n_in)
     f = frf.frequency[keep]
@@ -218,12 +184,11 @@ def _result(
         frequency_sd=omega_max * sd_f[order] / (2 * np.pi),
         damping_sd=sd_z[order],
         relative_delta_chi2=fit.delta_chi2[order] / rule.price,
-        chi=float(chi),
+        chi=solution.chi,
         outputs=frf.outputs,
         inputs=frf.inputs,
         quantity=frf.quantity,
         band=(float(f[0]), float(f[-1])),
-        diagram=replace(sweep, poles=omega_max * sweep.poles),
     )
 
 

@@ -12,9 +12,11 @@ Nothing here assumes evenly spaced lines. Frequencies are scaled to the top of t
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
 
 _TINY = 1e-300
+_RIDGE = 1e-12  # of the orthonormal basis: a channel that is dead stays solvable
+_TOGETHER = 4_000_000  # entries of normal matrices held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,40 +133,57 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     n_c, r = data.y.shape[1], len(p)
     x, delta_chi2 = np.empty((n, n_c)), np.zeros(r)
     H, g = np.zeros((2 * r, 2 * r)), np.zeros(2 * r)
-    ridge = 1e-12 * np.eye(n)
     inverse = solve_triangular(R1, np.eye(n))
-    for c in range(n_c):
-        V, u = v[:, c, None] * Q, v[:, c] * t[:, c]
-        G = V.T @ V
-        factor = cho_factor(G[:n, :n] + ridge, check_finite=False)
-        a = cho_solve(factor, V[:, :n].T @ u, check_finite=False)
-        x[:, c] = inverse @ a
-        delta_chi2 += _delta_chi2(inverse, factor, x[:, c], r)
+    for at in _blocks(n_c, Q.shape[1]):
+        G, b = _normal(Q, v[:, at], t[:, at])
+        G[:, range(n), range(n)] += _RIDGE
+        root = np.linalg.solve(np.linalg.cholesky(G[:, :n, :n]), inverse[: 2 * r].T)
+        known = np.concatenate([b[:, :n, None], G[:, :n, n:]], axis=2)
+        known = np.linalg.solve(G[:, :n, :n], known)
+        a, tied = known[:, :, 0], known[:, :, 1:]
+        x[:, at] = inverse @ a.T
+        delta_chi2 += _delta_chi2(root, x[: 2 * r, at].T).sum(axis=0)
         if slope:
-            rest = V[:, n:].T @ (u - V[:, :n] @ a)
-            S = G[n:, n:] - G[n:, :n] @ cho_solve(factor, G[:n, n:], check_finite=False)
-            T = _turn(x[: 2 * r, c].reshape(r, 2))
-            M = (R2.T @ S @ R2).reshape(r, 2, r, 2)
-            M = np.einsum("kma,kmln->kaln", T, M)
-            H += np.einsum("kaln,lnb->kalb", M, T).reshape(2 * r, 2 * r)
-            g += np.einsum("kma,km->ka", T, (R2.T @ rest).reshape(r, 2)).ravel()
+            rest = (b[:, n:] - np.einsum("cij,cj->ci", G[:, n:, :n], a)) @ R2
+            S = R2.T @ (G[:, n:, n:] - G[:, n:, :n] @ tied) @ R2
+            T = _turn(x[: 2 * r, at].T)
+            M = np.einsum("ckma,ckmln->ckaln", T, S.reshape(len(T), r, 2, r, 2))
+            H += np.einsum("ckaln,clnb->kalb", M, T).reshape(2 * r, 2 * r)
+            g += np.einsum("ckma,ckm->ka", T, rest.reshape(len(T), r, 2)).ravel()
     e = data.w * (data.y - A @ x)
     return PoleFit(p, x, e, delta_chi2), PoleSystem(H, g) if slope else None
 
 
-def _turn(ab: np.ndarray) -> np.ndarray:
-    """(r, 2, 2): coefficients of the derivative columns for dp = 1 and dp = i, R = a + ib."""
-    a, b = ab.T
-    return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], axis=1)
+def _blocks(n_c: int, m: int) -> list[slice]:
+    """Channels whose normal matrices (m, m) fit into memory together."""
+    step = max(1, _TOGETHER // m**2)
+    return [slice(k, min(k + step, n_c)) for k in range(0, n_c, step)]
 
 
-def _delta_chi2(inverse: np.ndarray, factor: tuple, x: np.ndarray, r: int) -> np.ndarray:
-    """Wald's xᵀ C⁻¹ x of every residue: rise of χ² when its pole is left out (r,)."""
-    root = solve_triangular(factor[0], inverse[: 2 * r].T, trans="T", check_finite=False)
-    k = 2 * np.arange(r)
-    a, d = (root[:, k] ** 2).sum(0), (root[:, k + 1] ** 2).sum(0)
-    b = (root[:, k] * root[:, k + 1]).sum(0)
-    u, v = x[k], x[k + 1]
+def _normal(Q: np.ndarray, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Qᵀ v² Q (n_c, m, m) and Qᵀ v² t (n_c, m) of every channel."""
+    n_c, m = v.shape[1], Q.shape[1]
+    G, b = np.empty((n_c, m, m)), np.empty((n_c, m))
+    for c in range(n_c):
+        V = v[:, c, None] * Q
+        G[c], b[c] = V.T @ V, V.T @ (v[:, c] * t[:, c])
+    return G, b
+
+
+def _turn(x: np.ndarray) -> np.ndarray:
+    """(n_c, r, 2, 2): coefficients of the derivative columns for dp = 1 and dp = i, R = a + ib."""
+    a, b = x[:, 0::2], x[:, 1::2]
+    return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], axis=2)
+
+
+def _delta_chi2(root: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Wald's xᵀ C⁻¹ x of every residue: rise of χ² when its pole is left out (n_c, r).
+
+    ``root`` (n_c, n, 2 r) is a root of the covariance C of ``x`` (n_c, 2 r), by column.
+    """
+    p, q = root[:, :, 0::2], root[:, :, 1::2]
+    a, b, d = (p**2).sum(1), (p * q).sum(1), (q**2).sum(1)
+    u, v = x[:, 0::2], x[:, 1::2]
     return (d * u**2 - 2 * b * u * v + a * v**2) / np.maximum(a * d - b * b, _TINY)
 
 

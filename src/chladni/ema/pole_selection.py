@@ -13,6 +13,7 @@ from .pole_fitting import PoleData, PoleFit, PoleSystem, bounded, polish, reloca
 
 ORDERS = (6, 10, 15, 22, 31, 42, 56)
 _VF_STEPS = 6
+_CLEAR = 10.0  # times its noise: a channel that is less has little to say
 BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
 
 
@@ -63,10 +64,11 @@ def compressed(data: PoleData, most: int = 8) -> PoleData:
     """At most ``most`` real combinations of the channels, lines weighted alike for all.
 
     Channels are scaled to one and every line to the rms over channels, so that small responses
-    count as large ones do.
+    count as large ones do; a channel of hardly more than noise is not raised above its neighbours.
     """
     used = data.w > 0
-    scale = np.sqrt((np.abs(data.y) ** 2).mean(axis=0))
+    noise = np.where(used, 2 / np.where(used, data.w, 1.0) ** 2, 0.0).mean(axis=0)
+    scale = np.sqrt(np.maximum((np.abs(data.y) ** 2).mean(axis=0), _CLEAR**2 * noise))
     y = np.where(used, data.y, 0) / np.maximum(scale, 1e-300)
     g = 1 / np.sqrt(np.maximum((np.abs(y) ** 2).mean(axis=1), 1e-12))
     _, _, V = np.linalg.svd(stacked(g[:, None] * y), full_matrices=False)
@@ -184,8 +186,8 @@ def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.nda
 
 
 def uncertainty(p: np.ndarray, slope: PoleSystem, noise: float) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,)."""
-    C = np.linalg.pinv(slope.H, hermitian=True) * max(1.0, noise)
+    """Standard deviations of |p| and of ζ from the Gauss-Newton matrix (r,); noise is χ² by dof."""
+    C = np.linalg.pinv(slope.H, hermitian=True) * noise
     k = 2 * np.arange(len(p))
     a, b, d = C[k, k], C[k, k + 1], C[k + 1, k + 1]
     size, x, y = np.abs(p), p.real, p.imag
@@ -214,6 +216,34 @@ def extended(
         else:
             closed[max(0, k - 4) : k + 5] = True
             misses += 1
+    return fit, slope
+
+
+def with_neighbours(
+    data: PoleData,
+    fit: PoleFit,
+    slope: PoleSystem,
+    rule: Rule,
+    below: bool = True,
+    far: bool = False,
+) -> tuple[PoleFit, PoleSystem]:
+    """A pole beyond each end of the band where that pays: what rings next door is no constant.
+
+    What is left of it stands out at no line, so that :func:`extended` does not see it. ``far``: the
+    pole may go where no mode would be believed, and is sought however small the misfit.
+    """
+    f, last = np.abs(data.s), len(fit.p)
+    for at in (1.12 * float(f.max()), *([float(f.min()) / 1.12] if below else [])):
+        if not far and fit.chi2 < data.samples * rule.noise:
+            break
+        better, its_slope = _with_pole(data, fit, at, rule) or (fit, slope)
+        now = rule.after(data, better)
+        if fit.chi2 - better.chi2 <= now.price:
+            continue
+        outside = not f.min() <= np.abs(better.p[-1]) <= f.max()
+        allowed = {last} if far and outside else set()
+        if set(_poor(data, better, its_slope, now)) <= allowed:
+            fit, slope, last = better, its_slope, last + 1
     return fit, slope
 
 

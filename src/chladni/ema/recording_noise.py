@@ -11,8 +11,9 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..dynamics.frf import FRF
-from .identification import DERIVATIVES, Identified, frf_variance
+from .identification import DERIVATIVES, Identified
 from .pole_fitting import basis, linear, residual_terms, stacked
+from .response_variance import frf_variance
 
 LN10 = np.log(10.0)
 

@@ -1,30 +1,38 @@
-"""Identified modes as a page: the table, the stabilisation diagram, the fit."""
+"""Identified modes as a page: the table, the stabilisation diagram, indicators, shapes, the fit."""
 
 from pathlib import Path
 
 import numpy as np
 
 from ..dynamics.frf import UNIT
-from ..ema.identification import Identified, evaluate
+from ..ema.correlation import auto_mac
+from ..ema.identification import evaluate
 from ..ema.level_table import level_tables
+from ..ema.mode_indicators import cmif, mif
+from ..ema.shapes import driven_shapes, shapes
+from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_poles
-from ..workflows.identify import Identification, RecordingModes, firm
+from ..workflows.identify import Identification, RecordingModes
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
 from .screening_blocks import screening_section
 from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
+_CIRCLES = 30  # modes drawn
+_MATRIX = 40  # modes of an AutoMAC that can still be read
+_AROUND = 4.0  # half bandwidths of a circle
 
 
 def identification_page(folder: Path, found: Identification) -> PageParts:
-    """Sections of the page; its pictures and the tables of poles are written into the folder."""
+    """Sections of the page; its pictures and tables are written into the folder."""
     sections, files = [screening_section(*(r.screening for r in found.recordings))], []
     for k, r in enumerate(found.recordings):
-        stem = "" if len(found.recordings) == 1 else f"_{k + 1}"
+        stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
-        files.append((f"poles{stem}.csv", f"poles of {r.recording.name}"))
-        sections.append(Section(r.recording.name, [_table(r.modes), *_pictures(folder, stem, r)]))
+        files.append((f"poles{stem}.csv", f"poles of {name}"))
+        sections.append(Section(name, [_table(r), *_pictures(folder, stem, r)]))
+        files += _modal_files(folder, stem, r)
         files.append((f"stabilisation{stem}.png", "stabilisation diagram"))
         files.append((f"fit{stem}.png", "the recording and the identified model"))
     for k, study in enumerate(found.levels):
@@ -36,22 +44,54 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
     return PageParts(lead, sections, found.notes, files)
 
 
-def _table(modal: Identified) -> Table:
-    sure = firm(modal)
-    columns = (modal.frequency, modal.frequency_sd, 100 * modal.damping, 100 * modal.damping_sd)
+def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, str]]:
+    """Shapes as a table, the state space for other programs."""
+    sure, name = r.modes.sel(r.firm), r.recording.name
+    if not sure.order:
+        return []
+    write_shape_table(folder / f"shapes{stem}.csv", sure)
+    files = [(f"shapes{stem}.csv", f"shapes of {name}, real and imaginary part")]
+    if r.whole.quantity != "transmissibility":
+        write_state_space(folder / f"state_space{stem}.npz", r.whole)
+        write_state_space(folder / f"state_space{stem}.mat", r.whole)
+        what = f"A, B, C, D of {name}, the band's residual terms as a low and a high pole"
+        files += [(f"state_space{stem}.{kind}", what) for kind in ("npz", "mat")]
+    return files
+
+
+def _table(r: RecordingModes) -> Table:
+    m = r.modes.sel(r.firm)
+    phase, seen = shapes(m).collinearity, r.diagram.seen(m)
+    columns = (m.frequency, m.frequency_sd, 100 * m.damping, 100 * m.damping_sd, phase, seen)
     rows = [
-        (str(k + 1), hertz(f), number(sf, 2), number(z, 3), number(sz, 2))
-        for k, (f, sf, z, sz) in enumerate(zip(*(c[sure] for c in columns), strict=True))
+        (
+            str(k + 1),
+            hertz(f),
+            number(sf, 2),
+            number(z, 3),
+            number(sz, 2),
+            f"{c:.3f}",
+            f"{100 * s:.0f}",
+        )
+        for k, (f, sf, z, sz, c, s) in enumerate(zip(*columns, strict=True))
     ]
-    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %")
-    caption = f"Residual over noise: {number(modal.chi, 3)} (1: only noise is left)."
-    if weak := int((~sure).sum()):
+    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "of the orders [%]")
+    caption = (
+        f"Residual over noise: {number(r.modes.chi, 3)} (1: only noise is left). MPC: 1 where all "
+        "channels move in phase. Of the orders: in how many of the richer ones of the "
+        "stabilisation diagram, another method's, the pole stands."
+    )
+    struck, weak = r.modes.frequency[r.struck], int((~r.firm & ~r.struck).sum())
+    if weak:
         caption += f" {weak} more poles shape the curve but are too uncertain to be called modes."
+    if len(struck):
+        said = ", ".join(number(f, 4) for f in struck)
+        caption += f" Struck out, no peak stands there and no other order shows them: {said} Hz."
     return Table(heads, rows, caption=caption)
 
 
 def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Block]:
-    from ..view import plots
+    from ..view import modal_plots, plots
 
     frf, modal = r.recording.frf, r.modes
     assert frf is not None
@@ -59,31 +99,53 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Block]:
     f = frf.frequency[inside]
     H, fitted = frf.values[inside], evaluate(r.whole, 2j * np.pi * f)
     size = np.sqrt((np.abs(H) ** 2).mean(axis=(1, 2)))
-    sweep = modal.diagram
-    poles = [
-        (
-            int(n),
-            np.abs(sweep.poles[at := sweep.order == n]) / (2 * np.pi),
-            _stable(modal, sweep.poles[at]),
-        )
-        for n in sweep.orders
-    ]
-    diagram, grid = folder / f"stabilisation{stem}.png", folder / f"fit{stem}.png"
-    plots.stabilisation(diagram, poles, modal.frequency[firm(modal)], (f, size))
+    names = ("stabilisation", "indicators", "fit", "automac", "circles")
+    path = {name: folder / f"{name}{stem}.png" for name in names}
+    d, kept = r.diagram, modal.frequency[r.firm]
+    modal_plots.stabilisation_classes(
+        path["stabilisation"],
+        d.states, d.frequency, d.kind, kept, modal.frequency[r.struck], (f, size),
+    )  # fmt: skip
+    modal_plots.mode_indicators(
+        path["indicators"], frf.frequency[inside], cmif(frf)[inside], mif(frf)[inside], kept
+    )
     channels = {
         f"{o} from {i}": {"test": (f, H[:, a, b]), "identified": (f, fitted[:, a, b])}
         for b, i in enumerate(frf.inputs)
         for a, o in enumerate(frf.outputs)
     }
     chosen = dict(list(channels.items())[:_SHOWN])
-    plots.frf_grid(grid, chosen, UNIT.get(frf.quantity, ""), columns=min(2, len(chosen)))
-    return [Picture(diagram, "Poles of every order; lines: what was kept."), Picture(grid)]
+    plots.frf_grid(path["fit"], chosen, UNIT.get(frf.quantity, ""), columns=min(2, len(chosen)))
+    blocks: list[Block] = [
+        Picture(path["stabilisation"], "Poles of every order; lines: what was kept."),
+        Picture(path["indicators"], "Singular values of the responses; share in quadrature."),
+        Picture(path["fit"]),
+    ]
+    if len(kept):
+        modal_plots.nyquist_grid(path["circles"], _circles(r))
+        blocks.append(Picture(path["circles"], "Each mode at the channel that shows it best."))
+    if 1 < len(kept) <= _MATRIX and len(frf.outputs) > 1:
+        labels = [number(x, 4) for x in kept]
+        psi = driven_shapes(modal.sel(r.firm))
+        plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC")
+        blocks.append(Picture(path["automac"], "Off the diagonal: modes that look alike here."))
+    return blocks
 
 
-def _stable(modal: Identified, poles: np.ndarray) -> np.ndarray:
-    """Within half a bandwidth of a pole that was kept."""
-    gap = np.abs(np.abs(poles)[:, None] - np.abs(modal.poles))
-    return np.asarray((gap < np.abs(modal.poles.real)).any(axis=1))
+def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Measured lines and the model about each mode, where its residue is largest."""
+    frf, m = r.recording.frf, r.modes.sel(r.firm)
+    assert frf is not None
+    found = {}
+    for k in range(min(m.order, _CIRCLES)):
+        i, j = np.unravel_index(np.abs(m.residues[k]).argmax(), m.residues[k].shape)
+        reach = _AROUND * m.damping[k] * m.frequency[k]
+        near = np.abs(frf.frequency - m.frequency[k]) < reach
+        fine = np.linspace(max(m.frequency[k] - reach, 1e-3), m.frequency[k] + reach, 200)
+        model = evaluate(r.whole, 2j * np.pi * fine)[:, i, j]
+        name = f"{m.frequency[k]:.4g} Hz, {frf.outputs[i]}"
+        found[name] = (frf.values[near, i, j], model)
+    return found
 
 
 def _sentence(r: RecordingModes) -> str:

@@ -4,6 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 from ..ema.level_table import level_tables
+from ..ema.shapes import shapes
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
 from ..updating.detectable import Detectable
@@ -11,7 +12,7 @@ from ..workflows.case_check import CaseCheck
 from ..workflows.correlate import Correlation
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
-from ..workflows.identify import Identification, RecordingModes, firm
+from ..workflows.identify import Identification, RecordingModes
 from ..workflows.map import MappedDeck
 from ..workflows.modes import NormalModes
 from ..workflows.other_modes import OtherModes
@@ -110,7 +111,10 @@ def _recording(r: RecordingModes) -> dict[str, Any]:
         "frequency_sd_hz": m.frequency_sd,
         "damping": m.damping,
         "damping_sd": m.damping_sd,
-        "firm": firm(m),
+        "firm": r.firm,
+        "struck_out": r.struck,
+        "mpc": shapes(m).collinearity if m.order else [],
+        "share_of_orders": r.diagram.seen(m),
         "chi": m.chi,
         "outputs": m.outputs,
         "inputs": m.inputs,

@@ -18,11 +18,12 @@ from ..effects.model_families import joint_nuisances, model_families
 from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
-from ..ema.identification import Identified, equalised, identify, noise_source
+from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study
 from ..ema.level_words import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
+from ..ema.response_variance import noise_source
 from ..errors import FileError
 from ..fem.assemble import Structure
 from ..fem.energy import mass_properties

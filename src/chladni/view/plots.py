@@ -152,38 +152,6 @@ def mac_matrix(
     return save(figure, path)
 
 
-def stabilisation(
-    path: Path | str,
-    poles: Sequence[tuple[int, np.ndarray, np.ndarray]],
-    chosen: np.ndarray,
-    indicator: tuple[np.ndarray, np.ndarray] | None = None,
-) -> Path:
-    """Poles over model order, the ones kept as vertical lines, an indicator curve behind.
-
-    Parameters
-    ----------
-    poles : (order, frequencies [Hz], stable as bool)   one entry per order
-    chosen : (r,)             frequencies kept [Hz]
-    indicator : (f, value)    e.g. the sum of magnitudes or the mode indicator, drawn on a log scale
-    """
-    figure = Figure(figsize=(8.2, 4.2), layout="constrained")
-    ax = figure.subplots()
-    if indicator is not None:
-        behind = ax.twinx()
-        behind.semilogy(*indicator, color="#9aa3ad", lw=0.9, zorder=1)
-        behind.set_ylabel("indicator", fontsize=8, color="#6b7480")
-    for order, frequency, stable in poles:
-        stable = np.asarray(stable, bool)
-        for mask, mark, colour in ((~stable, "x", "#b9b9b9"), (stable, "o", AFTER)):
-            at = np.asarray(frequency)[mask]
-            ax.plot(at, np.full(len(at), order), mark, ms=3, color=colour, mew=0.8, zorder=3)
-    for f in chosen:
-        ax.axvline(f, color=BEFORE, lw=0.8, alpha=0.8, zorder=2)
-    ax.set(xlabel="frequency [Hz]", ylabel="model order")
-    ax.set_title("o stable   x not stable   | kept", loc="left", fontsize=9)
-    return save(figure, path)
-
-
 def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | None = None) -> Path:
     """Log evidence of every hypothesis relative to the best one, longest bar worst."""
     ranked = sorted(evidence.items(), key=lambda item: -item[1])

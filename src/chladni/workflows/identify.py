@@ -9,14 +9,16 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..ema.finding import Screening
-from ..ema.identification import Identified, noise_source
+from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import responses
+from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
+from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent
 
@@ -32,11 +34,13 @@ class RecordingModes:
     recording : Recording
     whole : Identified      with the poles beside the band that shape it
     screening : Screening   what the recording says of its own faults
+    diagram : Stabilisation poles of every order of the subspace road
     """
 
     recording: Recording
     whole: Identified
     screening: Screening
+    diagram: Stabilisation
 
     @property
     def modes(self) -> Identified:
@@ -44,11 +48,47 @@ class RecordingModes:
         return self.whole.sel(self.whole.inside)
 
     @property
+    def struck(self) -> np.ndarray:
+        """Among ``modes``, poles where no peak is and that no other order shows (r,) bool."""
+        return ghosts(self.whole, self.diagram)[self.whole.inside]
+
+    @property
+    def firm(self) -> np.ndarray:
+        """Among ``modes``, those that are known well enough to be called so (r,) bool."""
+        return firm(self.modes) & ~self.struck
+
+    @property
     def poles(self) -> PoleTable:
         """The modes that are known well enough, as a table of a report has them."""
-        m = self.modes.sel(firm(self.modes))
+        m = self.modes.sel(self.firm)
         r = len(m.poles)
         return PoleTable(m.frequency, m.frequency_sd, m.damping, np.arange(1, r + 1), ("",) * r)
+
+
+@dataclass(frozen=True)
+class PoleChoice:
+    """Poles chosen otherwise than by what they pay.
+
+    Attributes
+    ----------
+    states : int or None   all poles of a state space of that order, by the subspace road
+    drop, pick : [Hz]      poles taken out, poles put in by hand
+    """
+
+    states: int | None = None
+    drop: tuple[float, ...] = ()
+    pick: tuple[float, ...] = ()
+
+    @property
+    def notes(self) -> list[str]:
+        """What was chosen, in sentences."""
+        said = []
+        if self.states is not None:
+            said.append(f"All poles of a state space of {self.states} states (subspace road).")
+        for frequencies, what in ((self.drop, "Taken out"), (self.pick, "Put in")):
+            if frequencies:
+                said.append(f"{what} by hand: {', '.join(f'{f:g}' for f in frequencies)} Hz.")
+        return said
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +121,7 @@ def identify(
     band: tuple[float, float] | None = None,
     averages: int = 1,
     progress: Progress = silent,
+    choice: PoleChoice = PoleChoice(),
 ) -> Identification:
     """Poles of every recording that holds an FRF.
 
@@ -89,6 +130,7 @@ def identify(
     source : a case, whose band and gaps are kept to, or recordings
     band : [Hz]; default that of the case, else the whole
     averages : of the estimate, where the noise comes from the coherence
+    choice : poles by hand, or all of a state space
 
     Raises
     ------
@@ -113,11 +155,12 @@ def identify(
     with threadpool_limits(1):
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
-            found.append(_modes(recording, band, gaps, averages, () if k else held))
+            found.append(_modes(recording, band, gaps, averages, () if k else held, choice))
     screenings = [note for r in found for note in r.screening.notes]
     levels = _levels(found)
     said = [*screenings, *said]
     notes = [
+        *choice.notes,
         *said,
         *(note for note in _notes(held, gaps, averages) if note not in said),
         *(note for study in levels for note in level_notes(study)),
@@ -144,15 +187,21 @@ def _modes(
     gaps: Sequence[tuple[float, float]],
     averages: int,
     others: Sequence[Recording],
+    choice: PoleChoice,
 ) -> RecordingModes:
     frf = recording.frf
     assert frf is not None
     use = np.ones(len(frf.frequency), bool)
     for low, high in gaps:
         use &= (frf.frequency < low) | (frf.frequency > high)
-    found = identified(frf, band, averages=averages, use=use)
+    found = identified(
+        frf, band, averages=averages, use=use,
+        states=choice.states, drop=choice.drop, pick=choice.pick,
+    )  # fmt: skip
     screening = screened(recording, found, others)
-    return RecordingModes(recording, without_window(found, recording.added_damping), screening)
+    diagram = stabilisation(frf, found, use, averages)
+    found = without_window(found, recording.added_damping)
+    return RecordingModes(recording, found, screening, diagram)
 
 
 def firm(modal: Identified) -> np.ndarray:
@@ -197,7 +246,7 @@ def _levels(found: Sequence[RecordingModes]) -> tuple[LevelStudy, ...]:
 
 def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
     """Poles that leave far more than noise are handed out, but said to be weak."""
-    weak = [r for r in found if not firm(r.modes).any() or r.modes.chi > TRUST]
+    weak = [r for r in found if not r.firm.any() or r.modes.chi > TRUST]
     if not weak:
         return ()
     names = ", ".join(r.recording.name for r in weak)

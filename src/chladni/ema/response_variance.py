@@ -1,0 +1,96 @@
+"""Noise of frequency responses: what a recording states, or what its own scatter shows."""
+
+import numpy as np
+
+from ..dynamics.frf import FRF
+
+SHARE, LEAST = 0.01, 1e-3  # of |H|, of its rms: assumed where nothing is stated
+_POINTS, _DEGREE = 5, 3  # a cubic through five lines is the local smooth course
+_WEAK = 0.25  # share of the lines, the faintest, that show the additive noise
+_FEW = 24  # lines below which scatter says nothing
+_MEDIAN = np.log(2.0)  # median of |z|² over its mean, z complex Gaussian
+_PRECISE = 1e-7  # of |H|: what is left below is rounding
+
+
+def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
+    """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
+
+    In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
+    Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
+    1 % of |H| and, by channel, the scatter of its faint lines, 0.1 % of its rms at least.
+    """
+    H = np.abs(frf.values)
+    rms = np.sqrt((H**2).mean(axis=0))
+    if frf.variance is not None:
+        return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2
+    if frf.coherence is not None:
+        gamma = np.clip(frf.coherence, 1e-3, 1.0)
+        ratio = _smooth((1 - gamma) / gamma) / averages
+        return (ratio + SHARE**2) * H**2 + (1e-4 * rms) ** 2
+    return (SHARE * H) ** 2 + np.maximum(faint_scatter(frf), LEAST * np.nan_to_num(rms)) ** 2
+
+
+def noise_source(frf: FRF, averages: int = 1) -> str:
+    """In words, where :func:`frf_variance` takes the noise from."""
+    if frf.variance is not None:
+        return "the variance that the recording states (averages, repeats or dwells)"
+    if frf.coherence is not None:
+        return f"the coherence, {averages} averages being assumed, and 1 % of |H|"
+    return (
+        "1 % of |H| and the scatter of each channel's faint lines about their neighbours (0.1 % of "
+        "its rms at least) are assumed, for the recording states nothing"
+    )
+
+
+def faint_scatter(frf: FRF) -> np.ndarray:
+    """Standard deviation of the additive noise by channel (n_out, n_in), from faint lines.
+
+    Five neighbours leave one combination that no cubic in ω has a part in; of unit norm it has the
+    variance of the noise. Between resonances the response is such a cubic, so its median square
+    over the faintest quarter of the lines shows the noise alone; 0 where lines are few.
+    """
+    H, f = frf.values, frf.frequency
+    if len(f) < _FEW:
+        return np.zeros(H.shape[1:])
+    window = np.arange(len(f) - _POINTS + 1)[:, None] + np.arange(_POINTS)
+    x = f[window] - f[window].mean(axis=1, keepdims=True)
+    x = x / np.abs(x).max(axis=1, keepdims=True)
+    Q, _ = np.linalg.qr(x[:, :, None] ** np.arange(_DEGREE + 1), mode="complete")
+    left = np.zeros((len(window), *H.shape[1:]), complex)
+    for k in range(_POINTS):
+        left += Q[:, k, -1, None, None] * H[k : k + len(window)]
+    size = np.abs(H[_POINTS // 2 : _POINTS // 2 + len(window)])
+    return np.sqrt(_median_square(np.abs(left) ** 2, size, faint=True))
+
+
+def left_variance(rest: np.ndarray, H: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """a²|H|² + b² by channel from what a fit H leaves over (n_f, n_c).
+
+    b from the faintest lines, a from the rest of the strongest; ``used`` marks samples that count.
+    H is the fit, not the sample: weights that know the noise bias what they weigh.
+    """
+    size = np.where(used, np.abs(H), np.nan)
+    square = np.where(used, np.abs(rest) ** 2, np.nan)
+    b2 = _median_square(square, size, faint=True)
+    over = np.maximum(square - _MEDIAN * b2, 0) / np.maximum(size, 1e-300) ** 2
+    a2 = np.maximum(_median_square(over, size, faint=False), _PRECISE**2)
+    return np.asarray(a2 * np.abs(H) ** 2 + b2)
+
+
+def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndarray:
+    """E z² from the median over the faintest, or strongest, lines of each channel."""
+    order = np.argsort(np.where(np.isfinite(size), size, np.inf if faint else -np.inf), axis=0)
+    n = max(1, int(_WEAK * len(size)))
+    picked = np.take_along_axis(square, order[:n] if faint else order[-n:], axis=0)
+    held = np.isfinite(picked)
+    alone = np.where(held.any(axis=0), 0.0, 1.0)  # a dead channel has no scatter
+    picked = np.where(alone > 0, 0.0, picked)
+    return np.asarray(np.nanmedian(picked, axis=0) / _MEDIAN)
+
+
+def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
+    """Moving mean over the first axis, ends held."""
+    half = min(width, len(x)) // 2
+    padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
+    total = padded.cumsum(axis=0)
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
