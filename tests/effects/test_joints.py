@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.adhesive_stiffness import SEALANT, beads_of
+from chladni.effects.contact_stiffness import close_places
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
 from chladni.effects.model_families import joint_families
 from chladni.effects.ordinary import ordinary
@@ -19,6 +20,7 @@ from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
 from chladni.updating.scan import baseline
+from chladni_specimens.forms import FORMS
 
 TOP = 300.0
 FLEXIBLE = slice(6, 12)
@@ -198,3 +200,14 @@ def test_a_bead_of_any_stiffness_is_that_of_the_deck(deck, reduced):
         assert_allclose(hertz(model, effect, [x]), full(effect.apply(deck, [x])), rtol=2e-3)
     assert effect.implausible(np.array([np.log(SEALANT / 6e6) + 0.1]))
     assert not effect.implausible(np.array([np.log(SEALANT / 6e6) - 0.1]))
+
+
+def test_no_contact_is_looked_for_beside_a_fold():
+    """The plate's end lies under the bend of the angle, which two codes hold unlike."""
+    bracket = FORMS["bolted bracket"].made(511)
+    places = close_places(bracket)
+    assert len(places)
+    bend = bracket.points[:, 0].max()
+    held = np.concatenate([bracket.points[side] for pair in places.sides for side in pair])
+    assert held[:, 0].max() < bend - 1e-6
+    assert places.middle[:, 0].max() > bend - 0.06  # the lap is looked at up to there

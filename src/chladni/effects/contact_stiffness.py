@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from ..fem.assemble import Structure, structure
 from ..geometry.clearance import all_gaps
+from ..geometry.refine import smooth_normals
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import Effect, PointTerm
@@ -67,8 +68,13 @@ class ContactStiffness(Effect):
 
 
 def close_places(assembly: Assembly) -> ClosePlaces:
-    """Places of all pairs of sheets that are close, away from joints and from shared grids."""
+    """Places of all pairs of sheets that are close, away from joints, shared grids and folds.
+
+    How stiff a fold is two codes do not agree on (one ties the thickness of its shells there), and
+    a spring beside it would take that up: by e^50 on a bolted bracket.
+    """
     nodes, found = assembly.shells.nodes, []
+    smooth = smooth_normals(assembly)[1]
     cell = np.full(len(assembly.points), -1)
     for gap in all_gaps(assembly):
         part = assembly.part(gap.parts[0])
@@ -76,7 +82,8 @@ def close_places(assembly: Assembly) -> ClosePlaces:
         cell[nodes[mine].ravel()] = np.repeat(mine, 4)
         for k in np.flatnonzero(gap.free & (gap.clearance < CLOSE)):
             sides = np.unique(nodes[cell[gap.rows[k]]]), np.unique(gap.opposite[k])
-            found.append((gap.rows[k], gap.normal[k], sides, gap.parts))
+            if smooth[np.concatenate(sides)].all():
+                found.append((gap.rows[k], gap.normal[k], sides, gap.parts))
     rows = np.array([f[0] for f in found], dtype=np.int64)
     return ClosePlaces(
         assembly.points[rows], np.array([f[1] for f in found]).reshape(-1, 3),

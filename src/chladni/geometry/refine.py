@@ -22,7 +22,7 @@ def refined(assembly: Assembly) -> Assembly:
     shells = assembly.shells
     tri = shells.triangle
     edges, of = _edges(shells.nodes)
-    normal, smooth = _normals(assembly)
+    normal, smooth = smooth_normals(assembly)
     middle = _bent(assembly.points, edges, normal, smooth)
     n, m = len(assembly.points), len(edges)
     quads = shells.nodes[~tri]
@@ -57,7 +57,7 @@ def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return edges, of.reshape(-1, 4)
 
 
-def _normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+def smooth_normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
     """Vertex normals (n, 3) and whether all facets of one part agree there (n,)."""
     nodes = assembly.shells.nodes
     face, total = (of(assembly.points, nodes) for of in (cell_normals, point_normals))
