@@ -25,7 +25,7 @@ def moved(folder: Path, tmp_path: Path, name: str) -> Path:
     case.mkdir()
     (folder / "sensors.csv").write_text(SENSORS)
     for path in folder.iterdir():
-        if path.suffix in (".bdf", ".npz", ".csv"):
+        if path.suffix in (".bdf", ".npz", ".csv", ".k"):
             (case / path.name).write_bytes(path.read_bytes())
     (case / name).rename(tmp_path / name)
     (case / "case.toml").write_text(CASE.replace(f'"{name}"', f'"../{name}"'))
@@ -53,7 +53,7 @@ def test_paths_do_not_climb_unless_allowed(
 
 
 def test_a_way_that_comes_back_is_within(folder: Path, tmp_path: Path) -> None:
-    case = moved(folder, tmp_path, "thicker.bdf")
+    case = moved(folder, tmp_path, "softer.bdf")
     (case / "sub").mkdir()
     text = CASE.replace('"plate.bdf"', '"sub/../plate.bdf"')
     (case / "case.toml").write_text(text)
@@ -61,7 +61,7 @@ def test_a_way_that_comes_back_is_within(folder: Path, tmp_path: Path) -> None:
 
 
 def test_what_a_case_allows_of_its_deck_is_noted(folder: Path, tmp_path: Path) -> None:
-    case = moved(folder, tmp_path, "thicker.bdf")
+    case = moved(folder, tmp_path, "softer.bdf")
     text = deck().replace("ENDDATA", "CELAS2,99,0.1,17,3\nCWELD,900,1\nENDDATA")
     (case / "plate.bdf").write_text(text)
     (case / "case.toml").write_text(CASE.replace('allow = ["CWELD"]\n', ""))
@@ -83,7 +83,7 @@ def test_init_allows_what_it_points_to(tmp_path: Path) -> None:
 
 def test_all_files_a_case_reads_are_told(folder: Path, tmp_path: Path) -> None:
     """Those the reader opens, and the case file itself."""
-    case = moved(folder, tmp_path, "thicker.bdf")
+    case = moved(folder, tmp_path, "softer.bdf")
     (case / "plate.bdf").write_text(deck().replace("BEGIN BULK", "BEGIN BULK\nINCLUDE 'more.inc'"))
     (case / "more.inc").write_text("CELAS2,99,0.1,17,3\n")
     (case / "case.toml").write_text(CASE)
@@ -96,7 +96,7 @@ def test_all_files_a_case_reads_are_told(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("command", ["modes", "frf", "correlate", "check"])
 def test_a_case_is_never_written_over(folder: Path, tmp_path: Path, command: str) -> None:
     """Results into the folder of the case itself leave every file of it as it was."""
-    case = moved(folder, tmp_path, "thicker.bdf")
+    case = moved(folder, tmp_path, "softer.bdf")
     (case / "case.toml").write_text(CASE)
     (case / "frf.npz").write_bytes((case / "a.npz").read_bytes())
     (case / "report.html").write_text("mine")
@@ -111,7 +111,7 @@ def test_a_case_is_never_written_over(folder: Path, tmp_path: Path, command: str
 
 
 def test_names_no_file_can_have(folder: Path, tmp_path: Path) -> None:
-    case = moved(folder, tmp_path, "thicker.bdf")
+    case = moved(folder, tmp_path, "softer.bdf")
     for name in ("a\\u0000b.npz", "x" * 300):
         (case / "case.toml").write_text(CASE.replace("a.npz", name))
         with pytest.raises((ChladniError, OSError)):

@@ -105,7 +105,7 @@ def prominence(found: Identified) -> np.ndarray:
     Below one no peak stands where the pole does.
     """
     p = found.poles
-    R = found.residues.reshape(len(p), -1)
+    R = found.residues.reshape(len(p), int(np.prod(found.residues.shape[1:])))
     at = 1j * np.abs(p)[:, None]
     matrix = 1 / (at - p)
     own = np.abs(np.diag(matrix)) * np.linalg.norm(R, axis=1)

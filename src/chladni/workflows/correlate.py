@@ -91,7 +91,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     progress("modes of the test", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
-    found = found.sel(firm(found) & (found.frequency >= found.band[0]))
+    found = found.sel(firm(found) & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)
     M = mac(phi, psi) if len(test.outputs) > 2 else None
