@@ -75,5 +75,6 @@ __all__ = [
     "study",
     "synthesise",
     "to_xarray",
+    "virtual_test",
     "write_deck",
 ]

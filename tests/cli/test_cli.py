@@ -16,6 +16,7 @@ from chladni.workflows.question_of_case import question
 
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
+    "map": ["formed.k"],
 }
 OSCILLATOR = """SOL 108
 CEND
@@ -406,7 +407,7 @@ def test_a_bad_file_is_one_sentence_and_exit_2(tmp_path, command, fault):
     assert not list(tmp_path.glob("runs/*")), "half a run was left"
 
 
-DECKLESS = ("report", "specimen", "init")  # they take no case
+DECKLESS = ("report", "specimen", "init", "map")  # they take no case
 
 
 @pytest.mark.parametrize("command", [c for c in WITH_FILE if c not in DECKLESS])

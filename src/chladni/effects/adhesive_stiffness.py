@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import ModelError
 from ..fem.assemble import Structure, _families, structure
 from ..fem.sparse_assembly import congruence
 from ..model.assembly import Assembly
@@ -130,6 +131,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """E of a bead times e^-2 to e^-3."""
     found = beads(structure(article.assembly))
+    if not found:
+        raise ModelError("the structure has no bead of adhesive")
     bead = found[int(rng.integers(len(found)))]
     factor = float(np.exp(rng.uniform(-3.0, -2.0)))
     E = (_modulus(article.assembly, bead) or 1.0) * factor

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..geometry.clearance import all_gaps
 from ..geometry.refine import smooth_normals
@@ -145,6 +146,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """A spring of 20 to 200 kN/m between two sheets that almost touch."""
     effects = contacts(structure(article.assembly))
+    if not effects:
+        raise ModelError("the structure has no two sheets that almost touch")
     effect = effects[int(rng.integers(len(effects)))]
     K = float(np.exp(rng.uniform(np.log(2e4), np.log(2e5))))
     made = effect.apply(article.assembly, np.array([np.log(K / MEDIAN)]))

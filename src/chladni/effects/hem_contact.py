@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import ModelError
 from ..model.assembly import Assembly
 from .effect import Effect, Parameter, PointTerm
 from .estimate import Estimate, Location
@@ -147,6 +148,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """No sliding all along a string, 1e9 to 1e10 N/m²."""
     lines = hem_lines(article.assembly)
+    if not lines:
+        raise ModelError("the structure has no string of adhesive along which a hem could hold")
     line = lines[int(rng.integers(len(lines)))]
     k = float(10 ** rng.uniform(9.0, 10.0))
     made = line.gripped(article.assembly, k * line.share)

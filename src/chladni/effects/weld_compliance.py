@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import ModelError
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, MatrixTerm, Parameter
@@ -174,6 +175,8 @@ def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[
     from ..fem.assemble import structure
 
     found = fasteners(structure(article.assembly))
+    if not found:
+        raise ModelError("the structure has no weld, screw or bush that could carry less")
     joint = found[int(rng.integers(len(found)))]
     return joint, {"point_m": joint.point.tolist()}
 

@@ -31,6 +31,7 @@ FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, wh
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
+WHOLE = 6  # that keep a basis of their own, a sixth of a gigabyte each on a tailgate
 
 Progress = Callable[[str, float], None]
 
@@ -95,7 +96,7 @@ def diagnose(
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.3 + 0.4 * k / len(tried))
         fits = _tried(problem, null, c.effect, c.start, c.base)
-        hypotheses = _by_family([*hypotheses, *fits])  # each holds a reduced model of its own
+        hypotheses = _lighter(problem, _by_family([*hypotheses, *fits]))
     progress("closing in on the place", 0.7)
     hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
     closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
@@ -256,6 +257,18 @@ def _by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
         if t.effect.name not in best or t.neg2_log_evidence < best[t.effect.name].neg2_log_evidence:
             best[t.effect.name] = t
     return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
+
+
+def _lighter(problem: UpdatingProblem, hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
+    """All families; those far down and at rest keep their fit, not the basis made for it."""
+    out = hypotheses[:WHOLE]
+    for t in hypotheses[WHOLE:]:
+        if t.fit.status is Status.OUT_OF_STEPS:
+            out.append(t)
+            continue
+        fit = replace(t.fit, data=t.data.over(problem.reduced.model))
+        out.append(HypothesisFit(t.effect, fit, problem.reduced.model))
+    return out
 
 
 def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool) -> HypothesisFit:
