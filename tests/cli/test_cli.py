@@ -297,7 +297,8 @@ def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
     assert all("why_not" in a for a in d["alternatives"])
     names = {p.name for p in (tmp_path / "answer").iterdir()}
     assert {"report.html", "updated.bdf", "diagnosis.json", "evidence.png", "setup.png"} < names
-    modes = call("modes", tmp_path / "answer" / "updated.bdf", "--units", "SI", "--count", 14)
+    options = ["--units", "SI", "--count", 14, "--out", tmp_path / "modes"]
+    modes = call("modes", tmp_path / "answer" / "updated.bdf", *options)
     assert modes.exit_code == 0, modes.output
 
 
