@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.effects.points import with_masses, with_springs
@@ -84,3 +85,14 @@ def test_components_sum_to_the_whole(reduced):
     assert set(split.linear) == {"Q11", "Q22", "Q12", "Q66"}
     alike(sum(map(each, split.linear.values())), each(reduced.model.linear[""]))
     alike(sum(map(each, split.cubic.values())), each(reduced.model.cubic[""]))
+
+
+def test_an_operator_over_a_longer_basis_is_projected_as_a_whole(reduced):
+    """What the shorter basis knows of it and what the new vectors add, twice over."""
+    A = sp.csr_array(reduced.structure.system.K.real)
+    rng = np.random.default_rng(3)
+    once = reduced.model.extended(rng.normal(size=(A.shape[0], 3)))
+    twice = once.extended(rng.normal(size=(A.shape[0], 2)))
+    for model in (once, twice):
+        whole = model.basis.T @ (A @ model.basis)
+        assert_allclose(model.operator(A), whole, atol=1e-9 * np.abs(whole).max())

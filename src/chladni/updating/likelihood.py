@@ -151,16 +151,12 @@ class Responses:
         dφ_i is that of a moving base; dφ_o and dφ_i of shapes that change where they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
-        n_p, r = len(state.dK), len(state.lam)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
         H = H + self.direct / self.s[:, None, None] ** self.power
-        out = np.empty((n_p, *H.shape), complex)
+        out = np.empty((len(state.dK), *H.shape), complex)
         for j in range(len(phi_i)):
             q = (phi_i[j] * d).T
-            W = _real_times(state.dK.reshape(-1, r), q) + _real_times(
-                state.dM.reshape(-1, r), q * self.s**2
-            )
-            W = W.reshape(n_p, r, len(d))
+            W = _each_times(state.dK, q) + _each_times(state.dM, q * self.s**2)
             if state.ddrive is not None:
                 W = W - state.ddrive[:, j, :, None]
             W = W * d.T
@@ -186,9 +182,13 @@ class Responses:
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
 
 
-def _real_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A z of a real and a complex matrix without making A complex."""
-    return np.asarray(A @ z.real + 1j * (A @ z.imag))
+def _each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """A_p z of real matrices (n_p, r, r), many of them zero, and a complex z (r, n_f)."""
+    out = np.zeros((*A.shape[:2], z.shape[1]), complex)
+    acts = A.any(axis=(1, 2))
+    B = A[acts].reshape(-1, A.shape[2])
+    out[acts] = (B @ z.real + 1j * (B @ z.imag)).reshape(-1, *out.shape[1:])
+    return out
 
 
 SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes

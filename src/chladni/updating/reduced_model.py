@@ -50,14 +50,26 @@ class Reduced:
     weight0: float
     base: BaseParticipation | None = None
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
+    _within: "Reduced | None" = None  # over the first vectors of this basis: what it knows is kept
 
     def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
         """Rows of the structure in the basis (k, r); projected once where they are to be kept."""
         return self._once(rows, lambda: rows @ self.basis) if keep else rows @ self.basis
 
     def operator(self, A: sp.csr_array) -> np.ndarray:
-        """Φᵀ A Φ of an operator of the structure (r, r); projected once."""
-        return self._once(A, lambda: _symmetric(self.basis.T @ (A @ self.basis)))
+        """Φᵀ A Φ of a symmetric operator of the structure (r, r); projected once.
+
+        An extended model projects it on its new vectors alone.
+        """
+        return self._once(A, lambda: self._projected(A))
+
+    def _projected(self, A: sp.csr_array) -> np.ndarray:
+        if self._within is None:
+            return _symmetric(self.basis.T @ (A @ self.basis))
+        old = self._within.operator(A)
+        r = len(old)
+        border = self.basis.T @ (A @ self.basis[:, r:])
+        return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
 
     def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
         known = self._seen.get(id(key))
@@ -93,6 +105,7 @@ class Reduced:
             self, basis=basis, linear=linear, cubic=cubic, mass=mass,
             K0=rest(self.K0, system.K.real, stiff), M0=rest(self.M0, system.M, [mass]),
             base=None if self.base is None else self.base.extended(self.groups, new), _seen={},
+            _within=self,
         )  # fmt: skip
 
     def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -219,12 +232,19 @@ def evaluate(
             offset, doffset[:, at] = offset + change.value, change.gradient
     lam, phi = _eigen(K, M)
     if gradient:
-        dK, dM = phi.T @ dK @ phi, phi.T @ dM @ phi
+        dK, dM = _in_modes(dK, phi), _in_modes(dM, phi)
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     return State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
         *_moved(model, effects, x, phi[:r]),
     )  # fmt: skip
+
+
+def _in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """φᵀ A φ of every slope (n_p, m, m); most parameters move stiffness or mass alone."""
+    acts = slopes.any(axis=(1, 2))
+    slopes[acts] = phi.T @ slopes[acts] @ phi
+    return slopes
 
 
 def _moved(
