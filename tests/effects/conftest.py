@@ -9,6 +9,7 @@ import pytest
 from chladni.effects import registry
 from chladni.model.assembly import Assembly
 from chladni.model.properties import Isotropic
+from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.bolts import screw
 from chladni_specimens.joints.builders import adhesive_bead, spot_welds
@@ -53,6 +54,7 @@ def example_edge_mass(tmp_path_factory):
     sys.modules.pop("edge_mass", None)
 
 
+JOINTED_TOP = 300.0  # Hz; six flexible modes of the two plates lie below
 SEALANT = Isotropic(6e6, 0.4, 1000.0, id=2)
 HIGH = 1.2e-3  # of the upper plate above the lower one [m]
 
@@ -61,6 +63,18 @@ HIGH = 1.2e-3  # of the upper plate above the lower one [m]
 def jointed():
     """Builds two plates joined in every way, of elements of a size."""
     return jointed_plates
+
+
+@pytest.fixture(scope="session")
+def deck():
+    """The two plates, for files that have no deck of their own."""
+    return jointed_plates()
+
+
+@pytest.fixture(scope="session")
+def reduced(deck):
+    """That deck made ready up to ``JOINTED_TOP``."""
+    return reduced_problem(deck, JOINTED_TOP)
 
 
 def jointed_plates(h: float = 0.05) -> Assembly:

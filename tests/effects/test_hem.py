@@ -11,23 +11,11 @@ from chladni.effects.hem_line import hem_lines
 from chladni.fem.assemble import structure
 from chladni.fem.energy import rigid_motions
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.forms import FORMS
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
-TOP = 300.0
 FLEXIBLE = slice(6, 12)
-
-
-@pytest.fixture(scope="module")
-def deck(jointed):
-    return jointed()
-
-
-@pytest.fixture(scope="module")
-def reduced(deck):
-    return reduced_problem(deck, TOP)
 
 
 @pytest.fixture(scope="module")

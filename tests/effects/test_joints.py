@@ -27,16 +27,6 @@ FLEXIBLE = slice(6, 12)
 
 
 @pytest.fixture(scope="module")
-def deck(jointed):
-    return jointed()
-
-
-@pytest.fixture(scope="module")
-def reduced(deck):
-    return reduced_problem(deck, TOP)
-
-
-@pytest.fixture(scope="module")
 def found(reduced):
     return loosened(reduced)
 

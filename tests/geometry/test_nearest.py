@@ -8,6 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from chladni.geometry import nearest
 from chladni.geometry.nearest import ShellSurface
 from chladni.io.package_files import mesh_path
 from chladni.workflows.loaded_model import load_deck
@@ -43,6 +44,18 @@ def test_middle_of_a_shell_is_in_that_shell():
     middle = PLATE.points[PLATE.shells.nodes].mean(axis=1) + np.array([1e-3, 2e-3, 0])
     found = ShellSurface.whole(PLATE).feet(middle)
     assert found.shell.tolist() == list(range(len(PLATE.shells)))
+
+
+@pytest.mark.parametrize("facing", [False, True])
+def test_many_places_are_looked_at_some_at_a_time(monkeypatch, facing):
+    """Each place has its own foot, whatever is asked beside it."""
+    places = np.random.default_rng(3).uniform(0, 0.4, (50, 3))
+    normal = places / np.linalg.norm(places, axis=1, keepdims=True) if facing else None
+    surface = ShellSurface.whole(PLATE)
+    whole = vars(surface.feet(places, normal))
+    monkeypatch.setattr(nearest, "AT_ONCE", 7)
+    for name, part in vars(surface.feet(places, normal)).items():
+        assert_allclose(part, whole[name], rtol=0, atol=0)
 
 
 def test_corner_has_all_the_weight():

@@ -11,14 +11,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import ModelError
-from ..fem.assemble import Structure, _families, structure
-from ..fem.sparse_assembly import congruence
+from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Part, SolidSection
 from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import Connection, alone, beads, with_factor_on, with_solids
+from .joints import Connection, beads, stiffness, with_factor_on, with_solids
 from .model_families import joint_families
 from .search_context import Candidate, SearchContext, best_places
 
@@ -86,7 +85,7 @@ def _of_one(
     built: Structure, bead: Connection, family: tuple[sp.csr_array, float], tried: int
 ) -> AdhesiveStiffness:
     K, sd = family
-    own = congruence(built.T, _families(alone(built.assembly, bead), True)[2])
+    own = stiffness(built, bead)
     others = sp.csr_array(K - own)
     E = _modulus(built.assembly, bead)
     unit, scale = ("of the deck's", 1.0) if E is None else ("Pa", E)

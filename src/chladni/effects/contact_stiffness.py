@@ -1,5 +1,6 @@
 """Two sheets that almost touch in the model and do touch in reality."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,11 +40,13 @@ class ClosePlaces(SheetPairs):
     grids: np.ndarray
     sheets: tuple[tuple[str, str], ...]
 
-    def only(self, k: int) -> "ClosePlaces":
-        """One of them."""
+    def only(self, which: Sequence[int]) -> "ClosePlaces":
+        """Some of them."""
+        which = list(which)
         return ClosePlaces(
-            self.middle[[k]], self.along[[k]], (self.sides[k],), self.grids[[k]], (self.sheets[k],)
-        )
+            self.middle[which], self.along[which], tuple(self.sides[k] for k in which),
+            self.grids[which], tuple(self.sheets[k] for k in which),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ def close_places(assembly: Assembly) -> ClosePlaces:
     """Places of all pairs of sheets that are close, away from joints, shared grids and folds.
 
     How stiff a fold is two codes do not agree on (one ties the thickness of its shells there), and
-    a spring beside it would take that up: by e^50 on a bolted bracket.
+    a spring beside it would take that up: on a bolted bracket it won odds of e^50 by that.
     """
     nodes, found = assembly.shells.nodes, []
     smooth = smooth_normals(assembly)[1]
@@ -97,23 +100,21 @@ def contacts(built: Structure) -> list[ContactStiffness]:
     every = close_places(built.assembly)
     if not len(every):
         return []
-    chosen = farthest_point_sample(every.middle, MOST)
-    K = strength("K", "N/m", MEDIAN, SD, STARTS)
+    places = every.only(farthest_point_sample(every.middle, MOST).tolist())
+    rows, K = places.relative_rows(built), strength("K", "N/m", MEDIAN, SD, STARTS)
     out = []
-    for k in chosen:
-        place = every.only(int(k))
-        (first, second), (x, y, z) = place.sheets[0], place.middle[0].tolist()
-        grid = int(place.grids[0])
+    for k, sheets in enumerate(places.sheets):
+        grid, (x, y, z) = int(places.grids[k]), places.middle[k].tolist()
         out.append(
             ContactStiffness(
                 (K,),
-                f"between {first} and {second} at grid {grid}",
-                (first, second),
+                f"between {sheets[0]} and {sheets[1]} at grid {grid}",
+                sheets,
                 (grid,),
                 point=(x, y, z),
-                trials_factor=len(chosen),
-                place=place,
-                rows=place.relative_rows(built),
+                trials_factor=len(places),
+                place=places.only([k]),
+                rows=rows[[k]],
             )
         )
     return out

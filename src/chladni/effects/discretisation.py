@@ -92,14 +92,13 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
     if len(built.system.dofs) > MOST or not len(built.assembly.shells):
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
-    coarse = replace(model, modes=_flexible(model.up_to(above[0] * f_max), f_max))
-    places = places or _nowhere
+    coarse = _CoarseModes.of(
+        built, _flexible(model.up_to(above[0] * f_max), f_max), places or _nowhere
+    )
 
     def change(finer: Assembly) -> _ModalChange:
         solved = modelled(finer, above[1] * f_max)
-        return _ModalChange.of(
-            coarse, replace(solved, modes=_flexible(solved.modes, f_max)), places
-        )
+        return coarse.changed_to(solved.structure, _flexible(solved.modes, f_max))
 
     fine = refined(built.assembly)
     of_shells = change(fine)
@@ -135,23 +134,6 @@ class _ModalChange:
     stiffness: np.ndarray
     seen: np.ndarray
 
-    @classmethod
-    def of(cls, coarse: Modelled, fine: Modelled, places: Places) -> Self:
-        """What a finer structure changes."""
-        phi, psi = coarse.modes.shapes, fine.modes.shapes
-        M_phi = coarse.structure.system.M @ phi
-        overlap = M_phi.T @ (_rows_of(fine.structure, coarse.structure) @ psi)
-        own, partner = linear_sum_assignment(-(overlap**2))
-        U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
-        B = U @ Vt
-        old, new = ((2 * np.pi * m.modes.frequency) ** 2 for m in (coarse, fine))
-        stiffness = np.zeros((len(old), len(old)))
-        stiffness[np.ix_(own, own)] = (B * new[partner]) @ B.T - np.diag(old[own])
-        seen = np.zeros((places(coarse.structure).shape[0], len(old)))
-        seen[:, own] = places(fine.structure) @ psi[:, partner] @ B.T
-        seen[:, own] -= places(coarse.structure) @ phi[:, own]
-        return cls(M_phi, (stiffness + stiffness.T) / 2, seen)
-
     def __sub__(self, other: Self) -> Self:
         """What is left without the change of another."""
         left = self.stiffness - other.stiffness
@@ -163,6 +145,34 @@ class _ModalChange:
         unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
         rows = sp.csr_array((self.M_phi @ V).T)
         return kind((unknown,), "every mode", rows=rows, change=change, shapes=self.seen @ V)
+
+
+@dataclass(frozen=True, eq=False)
+class _CoarseModes:
+    """The modes of the deck: λ (r,), MΦ (n, r), Φ where it was measured (p, r)."""
+
+    dofs: np.ndarray
+    lam: np.ndarray
+    M_phi: np.ndarray
+    at_places: np.ndarray
+    places: Places
+
+    @classmethod
+    def of(cls, built: Structure, modes: ModalModel, places: Places) -> Self:
+        """Of the deck's structure."""
+        lam, phi = (2 * np.pi * modes.frequency) ** 2, modes.shapes
+        return cls(built.system.dofs, lam, built.system.M @ phi, places(built) @ phi, places)
+
+    def changed_to(self, finer: Structure, modes: ModalModel) -> _ModalChange:
+        """What a finer structure with these modes Ψ changes."""
+        overlap = self.M_phi.T @ (finer.rows(self.dofs) @ modes.shapes)
+        own, partner = linear_sum_assignment(-(overlap**2))
+        U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
+        B, lam = U @ Vt, (2 * np.pi * modes.frequency[partner]) ** 2
+        stiffness, seen = np.zeros((len(self.lam),) * 2), np.zeros_like(self.at_places)
+        stiffness[np.ix_(own, own)] = (B * lam) @ B.T - np.diag(self.lam[own])
+        seen[:, own] = self.places(finer) @ modes.shapes[:, partner] @ B.T - self.at_places[:, own]
+        return _ModalChange(self.M_phi, (stiffness + stiffness.T) / 2, seen)
 
 
 def modal_discrepancy(
@@ -189,8 +199,3 @@ def modal_discrepancy(
 def _flexible(modes: ModalModel, f_max: float) -> ModalModel:
     keep = modes.frequency > 1e-3 * f_max
     return ModalModel(modes.frequency[keep], modes.damping[keep], modes.shapes[:, keep], modes.dofs)
-
-
-def _rows_of(finer: Structure, coarse: Structure) -> sp.csr_array:
-    """Rows of the finer structure at the free dofs of the coarse one."""
-    return finer.rows(coarse.system.dofs)

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ..model.assembly import Assembly, Average
-from .joints import soft_solids
+from .joints import solid_parts
 from .sheet_pairs import SheetPairs
 
 SHORTEST = 8  # solids of a string
@@ -45,7 +45,7 @@ class HemLine(SheetPairs):
 def hem_lines(assembly: Assembly) -> list[HemLine]:
     """The line of every part of adhesive that runs as strings between two sheets."""
     out = []
-    for group, rows in soft_solids(assembly):
+    for group, rows in solid_parts(assembly, soft=True):
         chains = list(_chains(assembly.solids[group].nodes[rows]))
         if chains and all(len(chain) > 1 for chain in chains) and len(rows) >= SHORTEST:
             middle = assembly.points[assembly.solids[group].nodes[rows]].mean(axis=1)

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
-from ..fem.assemble import Structure, _families
-from ..model.assembly import Assembly, Average, Beams, Bushes, Masses, RigidBody, Scalars, Shells
+from ..fem.assemble import Structure, over_all_motions
+from ..fem.energy import bare, picked
+from ..fem.sparse_assembly import congruence
+from ..geometry.cells import components
+from ..model.assembly import Assembly, Average, RigidBody
 from ..model.properties import BeamSection, Isotropic, Part, SolidSection
 from .model_families import SOFT
 
@@ -61,13 +63,13 @@ def members(assembly: Assembly, kind: str, group: int) -> Any:
 
 def alone(assembly: Assembly, joint: Connection) -> Assembly:
     """The points with the elements of a joint and nothing else that is stiff or heavy."""
-    nothing = Scalars()
-    bare = replace(
-        assembly, shells=Shells(), solids=(), beams=Beams(), bushes=Bushes(), springs=nothing,
-        dampers=nothing, scalar_masses=nothing, masses=Masses(),
-    )  # fmt: skip
-    some = _picked(members(assembly, joint.kind, joint.group), joint.elements)
-    return _with(bare, joint.kind, (some,) if joint.kind == "solids" else some)
+    some = picked(members(assembly, joint.kind, joint.group), joint.elements)
+    return _with(bare(assembly), joint.kind, (some,) if joint.kind == "solids" else some)
+
+
+def stiffness(built: Structure, joint: Connection) -> sp.csr_array:
+    """What a joint has in K (n_free, n_free)."""
+    return congruence(built.T, over_all_motions(alone(built.assembly, joint))[2])
 
 
 def _with(assembly: Assembly, kind: str, new: Any) -> Assembly:
@@ -81,7 +83,7 @@ def stiffness_rows(built: Structure, joint: Connection) -> sp.csr_array:
     Motions of the joint that cost nothing, and those of the elements alone that no sheet follows,
     have no row.
     """
-    K = _families(alone(built.assembly, joint), True)[2]
+    K = over_all_motions(alone(built.assembly, joint))[2]
     at = np.unique(K.indices)
     w, V = np.linalg.eigh(K[at][:, at].toarray())
     kept = w > FLAT * w[-1]
@@ -113,7 +115,7 @@ def beads(built: Structure) -> list[Connection]:
     """
     assembly = built.assembly
     out: list[Connection] = []
-    for group, rows in _solid_parts(assembly, soft=True):
+    for group, rows in solid_parts(assembly, soft=True):
         pieces = list(_pieces(assembly.solids[group].nodes[rows]))
         whole = [rows] if len(pieces) > 1 else []
         for chosen in (*whole, *(rows[piece] for piece in pieces)):
@@ -146,8 +148,8 @@ def _touched(built: Structure, joint: Connection) -> np.ndarray:
     return built.assembly.rows(built.system.dofs[np.unique(built.T[dofs].indices), 0])
 
 
-def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """(group, rows) of the parts of solids of adhesive, or of metal."""
+def solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """(group, rows) of every part of adhesive, or of metal."""
     for group, solids in enumerate(assembly.solids):
         for part in np.unique(solids.part):
             section = assembly.parts[int(part)].section
@@ -158,20 +160,14 @@ def _solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarr
                 yield group, np.flatnonzero(solids.part == part)
 
 
-def soft_solids(assembly: Assembly) -> Iterator[tuple[int, np.ndarray]]:
-    """(group, rows) of every part of adhesive."""
-    yield from _solid_parts(assembly, soft=True)
-
-
 def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
     """Rows (k,) of elements that hang together by their nodes (m, n)."""
-    m = len(nodes)
     at, column = np.unique(nodes, return_inverse=True)
-    where = (np.repeat(np.arange(m), nodes.shape[1]), column.ravel())
-    touch = sp.csr_array((np.ones(nodes.size), where), shape=(m, len(at)))
-    piece = connected_components(touch @ touch.T, directed=False)[1]
+    corners = column.reshape(nodes.shape)
+    piece = components(corners, len(at))[corners[:, 0]]
     order = np.argsort(piece, kind="stable")
-    yield from np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+    found = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+    yield from sorted(found, key=lambda rows: int(rows[0]))
 
 
 def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
@@ -181,7 +177,7 @@ def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
 
 
 def _weld_solids(assembly: Assembly) -> Iterator[Connection]:
-    for group, rows in _solid_parts(assembly, soft=False):
+    for group, rows in solid_parts(assembly, soft=False):
         for piece in _pieces(assembly.solids[group].nodes[rows]):
             if len(piece) <= MOST_SOLIDS:
                 yield _of_solids(assembly, group, rows[piece])
@@ -205,11 +201,6 @@ def _bushes(assembly: Assembly) -> Iterator[Connection]:
     for row in np.flatnonzero((assembly.bushes.nodes >= 0).all(axis=1)):
         ids = (int(assembly.bushes.ids[row]),)
         yield Connection("bushes", 0, np.array([row]), ids, assembly.bushes.place[row])
-
-
-def _picked(family: Any, rows: np.ndarray) -> Any:
-    """Some members of a family of elements."""
-    return type(family)(**{name: column[rows] for name, column in vars(family).items()})
 
 
 def with_factor_on(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
@@ -253,7 +244,7 @@ def without_joint(assembly: Assembly, joint: Connection) -> Assembly:
     """The assembly with the elements of a joint taken out."""
     old = members(assembly, joint.kind, joint.group)
     kept = np.setdiff1d(np.arange(len(old.ids)), joint.elements)
-    return _with_members(assembly, joint, _picked(old, kept))
+    return _with_members(assembly, joint, picked(old, kept))
 
 
 def _with_members(assembly: Assembly, joint: Connection, new: Any) -> Assembly:

@@ -7,25 +7,23 @@ flexibility is part of it), and the same for coarse and fine meshes.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..fem import shell, spring
+from ..fem import shell
 from ..fem.assemble import Structure
-from ..fem.derivative import Slope, by_part
+from ..fem.derivative import Slope, by_part, of_lumps
 from ..fem.energy import only
 from ..fem.shell_section import section_arrays
 from ..fem.sparse_assembly import blocks, congruence
-from ..model.assembly import Assembly, Bushes, Masses, Scalars
 from ..model.properties import Isotropic, ShellSection, SolidSection
 from .effect import Parameter
 from .linear_parameter import LinearScale
 
 SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
-ADHESIVE, FASTENER = 0.5, 0.5  # prior sd of ln k
-WELD = 0.3
+ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
 JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
@@ -53,7 +51,7 @@ def joint_nuisances(built: Structure) -> list[ModelFamily]:
 
 def _families(found: Iterable[tuple[str, sp.csr_array, float]]) -> list[ModelFamily]:
     return [
-        ModelFamily((Parameter("k", "-", 0.0, sd, step=max(0.5, sd / 2)),), text, slope=_slope(K))
+        ModelFamily((Parameter("k", "-", 0.0, sd, step=0.5),), text, slope=_slope(K))
         for text, K, sd in found
         if K.nnz
     ]
@@ -89,16 +87,7 @@ def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
     """All bushes together."""
     bushes = built.assembly.bushes
     if len(bushes.ids):
-        bare = _bare(built.assembly, bushes)
-        yield "bushes", congruence(built.T, spring.matrices(bare)[0]), FASTENER
-
-
-def _bare(assembly: Assembly, bushes: Bushes) -> Assembly:
-    nothing = Scalars()
-    return replace(
-        assembly, bushes=bushes, masses=Masses(), springs=nothing, dampers=nothing,
-        scalar_masses=nothing,
-    )  # fmt: skip
+        yield "bushes", of_lumps(built, "bushes", range(len(bushes))).K, FASTENER
 
 
 def _shear(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:

@@ -5,14 +5,13 @@ near it; between different points rigid rotation would load what resists it.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..fem.assemble import Structure
 from ..fem.average import average_rows
-from ..model.added_points import with_points
+from ..model.added_points import next_id, with_points
 from ..model.assembly import Assembly, Average, Bushes
 
 
@@ -53,7 +52,7 @@ class SheetPairs:
         """The assembly with both ends of springs at some places (all), and their rows (k, 2)."""
         at = np.arange(len(self)) if on is None else on
         grown, rows = with_points(assembly, np.repeat(self.middle[at], 2, axis=0))
-        first, T = 1 + _last_id(assembly), (1, 2, 3)
+        first, T = next_id(assembly), (1, 2, 3)
         carriers = [grids for k in at for grids in self.sides[k]]
         means = tuple(
             Average(first + j, int(row), T, tuple((int(g), T, 1.0) for g in grids))
@@ -75,7 +74,7 @@ class SheetPairs:
         stiffness = zero.copy()
         stiffness[:, 0] = k[on]
         new = Bushes(
-            np.append(old.ids, 1 + _last_id(grown) + np.arange(len(on))),
+            np.append(old.ids, next_id(grown) + np.arange(len(on))),
             np.concatenate([old.nodes, ends]),
             np.concatenate([old.frame, np.stack([e, np.cross(z, e), z], axis=1)]),
             np.concatenate([old.place, self.middle[on]]),
@@ -84,18 +83,3 @@ class SheetPairs:
             np.concatenate([old.loss, zero]),
         )
         return replace(grown, bushes=new)
-
-
-def _last_id(a: Assembly) -> int:
-    """The largest id of any element."""
-    groups: tuple[Any, ...] = (
-        a.shells,
-        a.beams,
-        a.springs,
-        a.dampers,
-        a.scalar_masses,
-        a.bushes,
-        a.masses,
-    )
-    ids = [int(g.ids.max(initial=0)) for g in (*groups, *a.solids)]
-    return max(*ids, *(r.id for r in a.rigid), 0)

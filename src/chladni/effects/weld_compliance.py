@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import ModelError
+from ..fem.assemble import structure
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, MatrixTerm, Parameter
@@ -51,7 +52,6 @@ class WeldCompliance(Effect):
     joint: Connection | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    softness: float = 1.0
 
     @staticmethod
     def strength(softness: float) -> Parameter:
@@ -63,7 +63,7 @@ class WeldCompliance(Effect):
         if x >= SOUND:
             return 1.0, 0.0
         y = MOST * np.tanh(x / MOST) if x > 0 else x
-        f = min(self.softness * float(np.exp(y)), 1.0)
+        f = min(self.parameters[0].value(y), 1.0)
         return f, f * (1 - (y / MOST) ** 2 if x > 0 else 1.0)
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
@@ -105,13 +105,6 @@ def with_all(assembly: Assembly, kind: str, factor: float) -> Assembly:
     return replace(assembly, bushes=bushes)
 
 
-def each(kind: type[WeldCompliance], context: SearchContext) -> list[WeldCompliance]:
-    """The effect of every fastener of a structure."""
-    built, tried = context.where.groups.structure, context.fasteners
-    families = {text: (K, sd) for text, K, sd in joint_families(built)} if tried else {}
-    return [of_one(kind, *one, families, len(tried)) for one in tried]
-
-
 def of_one(
     kind: type[WeldCompliance],
     joint: Connection,
@@ -126,8 +119,8 @@ def of_one(
     share : (r,)   z/(w + z) of the joint's rows, see :func:`.joints.softness`
     families : {name: what all joints of a kind have in K, prior sd of ln of their factor}
     """
-    own, soft = sp.csr_array(joint.rows.T @ joint.rows), float(share.min())
-    unknown: tuple[Parameter, ...] = (kind.strength(soft),)
+    own = sp.csr_array(joint.rows.T @ joint.rows)
+    unknown: tuple[Parameter, ...] = (kind.strength(float(share.min())),)
     others, text = own, FAMILY_OF.get(joint.kind, "")
     if text in families:
         K, sd = families[text]
@@ -138,30 +131,38 @@ def of_one(
     return kind(
         unknown, f"{word} {joint.ids[0]} {joint.where}", joint.parts, joint.grids,
         point=(x, y, z), trials_factor=tried, replaces=(text,) if text in families else (),
-        joint=joint, operator=own, others=others, softness=soft,
+        joint=joint, operator=own, others=others,
     )  # fmt: skip
 
 
 def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candidate]:
     """The fasteners that explain most, by exact re-analysis about the calibrated model and both."""
-    effects = each(kind, context)
-    if not effects:
+    tried = context.fasteners
+    if not tried:
         return []
-    points = np.array([e.point for e in effects])
+    built = context.where.groups.structure
+    families = {text: (K, sd) for text, K, sd in joint_families(built)}
+
+    def effect(k: int) -> WeldCompliance:
+        return of_one(kind, *tried[k], families, len(tried))
+
     if context.scan is None:
+        points = np.array([joint.point for joint, _ in tried])
         some = farthest_point_sample(points, BY_POLES)
-        chosen = [effects[k] for k in some]
+        chosen = [effect(k) for k in some]
         return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
-    left = np.array([[e.left(start[0])[0] for start in e.starts()] for e in effects])
+    alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
+    left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
     out: dict[int, Candidate] = {}
     for about, base in reversed(tuple(enumerate(context.bases))):
         score = context.scan.fastener_scores(about, left)
         wanted = FOLLOWED if not out else FOLLOWED + 1
-        for k in np.argsort(score.min(axis=1)):
+        for k in np.argsort(score.min(axis=1)).tolist():
             if len(out) >= wanted:
                 break
-            start = effects[k].starts()[int(np.argmin(score[k]))]
-            out.setdefault(int(k), Candidate(effects[k], start, base))
+            if k not in out:
+                found = effect(k)
+                out[k] = Candidate(found, found.starts()[int(np.argmin(score[k]))], base)
     return list(out.values())
 
 
@@ -172,8 +173,6 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 def drawn(article: Article, rng: np.random.Generator) -> tuple[Connection, dict[str, object]]:
     """A fastener of the article, and where it is."""
-    from ..fem.assemble import structure
-
     found = fasteners(structure(article.assembly))
     if not found:
         raise ModelError("the structure has no weld, screw or bush that could carry less")

@@ -92,7 +92,7 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     ModelError
         If nothing is left to move.
     """
-    M, V, K, loss = _families(assembly, residual_bending)
+    M, V, K, loss = over_all_motions(assembly, residual_bending)
     T, dofs = _transformation(assembly)
     held = _held(assembly, dofs)
     T, dofs = sp.csr_array(T[:, ~held]), dofs[~held]
@@ -108,8 +108,8 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     return Structure(assembly, T, system, congruence(T, loss))
 
 
-def _families(assembly: Assembly, residual_bending: bool) -> list[sp.csr_array]:
-    """M, V, K and the imaginary K of everything over all 6 n motions, basic frame."""
+def over_all_motions(assembly: Assembly, residual_bending: bool = True) -> list[sp.csr_array]:
+    """M, V, K and the imaginary K of all elements over the 6 n motions of points, basic frame."""
     n = 6 * len(assembly.points)
     total = [sp.csr_array((n, n)) for _ in range(4)]
     for M, V, K, loss in _each_family(assembly, residual_bending):

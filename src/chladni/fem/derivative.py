@@ -16,9 +16,9 @@ from ..errors import ModelError
 from ..model.assembly import Assembly, Average, Bushes, Equation, Masses, RigidBody, Scalars
 from ..model.properties import BeamSection, Isotropic, Material, ShellSection, SolidSection
 from . import shell, solid, spring
-from .assemble import Structure, _families
+from .assemble import Structure, over_all_motions
 from .average import average_derivative, average_weights, lever
-from .energy import only
+from .energy import bare, only, picked
 from .shell_section import modulus_derivative, section_arrays
 from .sparse_assembly import blocks, congruence, with_rotations
 
@@ -130,10 +130,10 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
     a = only(structure.assembly, part)
     section = a.parts[part].section
     if isinstance(section, BeamSection):
-        bare = replace(section, nonstructural=0.0, nonstructural_inertia=0.0)
-        a = replace(a, parts=tuple(replace(p, section=bare) if k == part else p
+        own = replace(section, nonstructural=0.0, nonstructural_inertia=0.0)
+        a = replace(a, parts=tuple(replace(p, section=own) if k == part else p
                                    for k, p in enumerate(a.parts)))  # fmt: skip
-    M, _, K, _ = _families(a, True)
+    M, _, K, _ = over_all_motions(a)
     none = _of(structure)
     if name == "E":
         return replace(none, K=congruence(structure.T, K))
@@ -143,7 +143,7 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
 def of_lumps(structure: Structure, family: str, rows: Sequence[int]) -> Slope:
     """What some members of "springs" or "bushes" have in K, or of "masses" in M."""
     old = getattr(structure.assembly, family)
-    some = replace(old, **{name: column[list(rows)] for name, column in vars(old).items()})
+    some = picked(old, np.asarray(rows, dtype=int))
     K, _, M, _ = spring.matrices(_bare(structure.assembly, **{family: some}))
     if family == "masses":
         return replace(_of(structure), M=congruence(structure.T, M))
@@ -158,8 +158,8 @@ def by_spring(structure: Structure, row: int) -> Slope:
 
 def by_damper(structure: Structure, row: int) -> Slope:
     """∂V/∂c = bᵀ b of one scalar damper."""
-    bare = _bare(structure.assembly, dampers=_unit(structure, "dampers", row))
-    return replace(_of(structure), V=congruence(structure.T, spring.matrices(bare)[1]))
+    _, V, *_ = spring.matrices(_bare(structure.assembly, dampers=_unit(structure, "dampers", row)))
+    return replace(_of(structure), V=congruence(structure.T, V))
 
 
 def by_bush(structure: Structure, row: int, direction: int, name: str = "K") -> Slope:
@@ -195,9 +195,7 @@ def _unit(structure: Structure, family: str, row: int) -> Scalars:
 
 def _bare(assembly: Assembly, **lumps: object) -> Assembly:
     """The points with these lumps alone."""
-    empty = {name: Scalars() for name in ("springs", "dampers", "scalar_masses")}
-    nothing = {**empty, "bushes": Bushes(), "masses": Masses()}
-    return replace(assembly, **{**nothing, **lumps})  # type: ignore[arg-type]
+    return replace(bare(assembly), **lumps)  # type: ignore[arg-type]
 
 
 Matrices = tuple[np.ndarray, np.ndarray]
@@ -248,7 +246,7 @@ def by_radius(structure: Structure, mean: Average, R: float) -> Slope:
     on = (6 * nodes[:, None] + np.arange(3)).ravel()
     where = (np.repeat(at, len(on)), np.tile(on, 6))
     dT = sp.csr_array(sp.csr_array((dG.ravel(), where), shape=(T.shape[0],) * 2) @ T)
-    M, V, K, _ = _families(a, True)
+    M, V, K, _ = over_all_motions(a)
     return Slope(*(_both(dT.T @ (A @ T)) for A in (M, V, K)))
 
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells
 from . import beam, shell, solid
-from .assemble import PIECE, Structure, _families
+from .assemble import PIECE, Structure, over_all_motions
 from .shell_section import section_arrays
 
 
@@ -31,7 +31,7 @@ def mass_properties(assembly: Assembly) -> tuple[float, np.ndarray]:
 
     The coupling of translation and rotation is m [e_j x c]; a massless structure has c = nan.
     """
-    M = _families(assembly, True)[0]
+    M = over_all_motions(assembly)[0]
     R = rigid_motions(assembly)
     total = R.T @ (M @ R)
     m = float(np.trace(total[:3, :3]) / 3)
@@ -68,25 +68,28 @@ def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_arr
     total = np.einsum("nr,nr->r", phi, whole @ phi)
     share = np.zeros((len(structure.assembly.parts), phi.shape[1]))
     for k in range(len(share)):
-        A = _families(only(structure.assembly, k), True)[which]
+        A = over_all_motions(only(structure.assembly, k))[which]
         share[k] = np.einsum("nr,nr->r", u, A @ u)
     return np.divide(share, total, out=np.full_like(share, np.nan), where=total > 0)
 
 
+def bare(assembly: Assembly) -> Assembly:
+    """The points alone: nothing that is stiff or heavy, no ties."""
+    none = Scalars()
+    return replace(
+        assembly, shells=Shells(), beams=Beams(), solids=(), springs=none, dampers=none,
+        scalar_masses=none, bushes=Bushes(), masses=Masses(), rigid=(),
+    )  # fmt: skip
+
+
 def only(assembly: Assembly, part: int) -> Assembly:
-    """The elements of one part alone, over the same points, without supports and ties."""
+    """The elements of one part alone, over the same points, without ties."""
     beams, shells = assembly.beams, assembly.shells
     return replace(
-        assembly,
-        shells=_picked(shells, shells.part == part) if len(shells) else Shells(),
-        beams=_picked(beams, beams.part == part) if len(beams) else Beams(),
-        solids=tuple(_picked(s, s.part == part) for s in assembly.solids if np.any(s.part == part)),
-        springs=Scalars(),
-        dampers=Scalars(),
-        scalar_masses=Scalars(),
-        bushes=Bushes(),
-        masses=Masses(),
-        rigid=(),
+        bare(assembly),
+        shells=picked(shells, shells.part == part) if len(shells) else Shells(),
+        beams=picked(beams, beams.part == part) if len(beams) else Beams(),
+        solids=tuple(picked(s, s.part == part) for s in assembly.solids if np.any(s.part == part)),
     )
 
 
@@ -126,6 +129,6 @@ def _quadratic(
     return 0.5 * np.einsum("eir,eir->er", u_e, K @ u_e)
 
 
-def _picked(family: Any, which: np.ndarray) -> Any:
-    """Some members of a family."""
+def picked(family: Any, which: np.ndarray) -> Any:
+    """Some members of a family of elements, by their rows or a mask."""
     return replace(family, **{name: value[which] for name, value in vars(family).items()})

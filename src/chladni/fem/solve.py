@@ -17,7 +17,7 @@ from ..errors import LabelError, ModelError
 from ..model.analysis import Analysis, Subcase
 from ..model.assembly import Assembly
 from ..sparse.factor import factorise
-from .assemble import Structure, _families, structure
+from .assemble import Structure, over_all_motions, structure
 from .energy import rigid_motions
 
 
@@ -79,7 +79,7 @@ def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
     """
     a = np.asarray(acceleration, dtype=float)
     field = rigid_motions(assembly)[:, : len(a)] @ a
-    return _families(assembly, True)[0] @ field
+    return over_all_motions(assembly)[0] @ field
 
 
 def enforced(

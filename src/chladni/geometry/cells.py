@@ -48,8 +48,11 @@ def point_means(cells: np.ndarray, corner: np.ndarray, count: int) -> np.ndarray
     return np.where(held > 0, total / np.maximum(held, 1), np.nan)
 
 
-def components(quads: np.ndarray, count: int) -> np.ndarray:
-    """Number (from 0) of the connected piece each of `count` points belongs to."""
-    a, b = edges_of(quads).T
+def components(cells: np.ndarray, count: int) -> np.ndarray:
+    """Number (from 0) of the connected piece each of `count` points belongs to.
+
+    Cells (m, k) of any number of points hold these together, sides (m, 2) among them.
+    """
+    a, b = edges_of(cells).T
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
     return connected_components(graph, directed=False)[1]

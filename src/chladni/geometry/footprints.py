@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..model.assembly import Assembly, Average, Equation, RigidBody
+from .cells import components, edges_of
 from .refine import parents
 from .sampling import farthest_point_sample
 
@@ -56,13 +55,9 @@ def regions_of_joints(
     """
     hung = np.array([_hung_on(assembly.rigid[k]) for k in bodies], dtype=int)
     pairs = [assembly.beams.nodes, assembly.bushes.nodes, assembly.springs.nodes]
-    pairs += [np.stack([s.nodes, np.roll(s.nodes, 1, axis=1)], -1).reshape(-1, 2)
-              for s in assembly.solids]  # fmt: skip
-    edges = np.concatenate(pairs)
-    edges = edges[(edges >= 0).all(axis=1)]
-    n = len(assembly.points)
-    graph = coo_array((np.ones(len(edges)), edges.T), shape=(n, n))
-    joint = np.unique(connected_components(graph, directed=False)[1][hung], return_inverse=True)[1]
+    edges = np.concatenate([*pairs, *(edges_of(s.nodes) for s in assembly.solids)])
+    piece = components(edges[(edges >= 0).all(axis=1)], len(assembly.points))
+    joint = np.unique(piece[hung], return_inverse=True)[1]
     middle = np.array(
         [assembly.points[hung[joint == j]].mean(axis=0) for j in range(joint.max() + 1)]
     )
@@ -90,11 +85,10 @@ class _Footprints:
     def __init__(self, coarse: Assembly, fine: Assembly) -> None:
         """Look both meshes over once."""
         self.points, self.cells, self.pieces = fine.points, coarse.shells.nodes, fine.shells.nodes
-        self.parent = parents(coarse.shells)
         order = np.argsort(self.cells, axis=None, kind="stable")
         self._shell = order // 4
         self._first = np.searchsorted(self.cells.ravel()[order], np.arange(len(coarse.points) + 1))
-        by_parent = np.argsort(self.parent, kind="stable")
+        by_parent = np.argsort(parents(coarse.shells), kind="stable")
         self._piece = by_parent.reshape(len(self.cells), 4)  # every shell has four
 
     def of(self, body: Rigid) -> Rigid:

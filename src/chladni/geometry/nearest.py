@@ -17,6 +17,7 @@ from ..model.assembly import Assembly
 from .facets import tangents, unit
 
 NEAR = 12  # quads around a place whose triangles are tried first
+AT_ONCE = 20_000  # places whose nearest shells are in memory at a time, a third of a gigabyte
 BLOCK = 256  # far places looked at together: each may need thousands of shells
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
 
@@ -106,6 +107,16 @@ class ShellSurface:
         distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
+        found = []
+        for k in range(0, max(len(places), 1), AT_ONCE):
+            some = slice(k, k + AT_ONCE)
+            facing = None if normal is None else normal[some]
+            found.append(vars(self._feet(places[some], facing, cosine, near)).values())
+        return Feet(*(np.concatenate(column) for column in zip(*found, strict=True)))
+
+    def _feet(
+        self, places: np.ndarray, normal: np.ndarray | None, cosine: float, near: int
+    ) -> Feet:
         k, count = len(places), min(near, len(self.owner))
         reach, at = (v.reshape(k, count) for v in self.tree.query(places, count))
         of = np.repeat(np.arange(k), count)

@@ -223,14 +223,9 @@ def values_at(
     if not len(formed.cells):
         return _from_points(formed, places, reach)
     surface = ShellSurface.over("the formed mesh", formed.points, formed.cells)
-    out, far = np.full(len(places), np.nan), np.full(len(places), np.inf)
-    for k in range(0, len(places), 20000):
-        block = slice(k, k + 20000)
-        feet = surface.feet(places[block], normal[block], facing)
-        ok = feet.distance <= reach
-        t = np.einsum("nk,nk->n", formed.nodal[feet.nodes], feet.weight)
-        out[block], far[block] = np.where(ok, t, np.nan), feet.distance
-    return out, far
+    feet = surface.feet(places, normal, facing)
+    t = np.einsum("nk,nk->n", formed.nodal[feet.nodes], feet.weight)
+    return np.where(feet.distance <= reach, t, np.nan), feet.distance
 
 
 def _from_points(

@@ -1,9 +1,8 @@
 """Thickness of sheets from a scan of both their faces.
 
-From a place x of the shells, half a gauge or more inside of neither face, the upper face is looked
-for from x + t₀ n and the lower from x - t₀ n (t₀ the gauge, n the shell's normal): the thickness is
-the distance of the two feet along n. Where the shells lie between the faces does not matter as long
-as they are less than t₀ off the middle.
+For a place x of the shells the upper face is looked for from x + t₀ n and the lower from x - t₀ n
+(t₀ the gauge, n the shell's normal): the thickness is the distance of the two feet along n. Where
+the shells lie between the faces does not matter as long as they are less than t₀ off the middle.
 """
 
 from dataclasses import replace

@@ -1,10 +1,21 @@
-"""Grids added to a structure."""
+"""Grids added to a structure, and ids for what hangs on them."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from .assembly import Assembly
+
+
+def next_id(assembly: Assembly) -> int:
+    """The first id above those of all elements, rigid bodies and masses."""
+    a = assembly
+    families: tuple[Any, ...] = (
+        a.shells, a.beams, a.springs, a.dampers, a.scalar_masses, a.bushes, a.masses, *a.solids
+    )  # fmt: skip
+    rigid = max((body.id for body in a.rigid), default=0)
+    return 1 + max(rigid, *(int(family.ids.max(initial=0)) for family in families))
 
 
 def with_points(assembly: Assembly, places: np.ndarray) -> tuple[Assembly, np.ndarray]:

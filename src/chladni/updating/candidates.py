@@ -103,9 +103,8 @@ class UpdatingContext:
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
         base, reduced = self.baselines[-1], self.problem.reduced
-        model = reduced.model.split_for(effect, starts[0])
-        if carried:
-            model = reduced.model_for(effect, starts[0])
+        widened = reduced.model_for if carried else reduced.model.split_for
+        model = widened(effect, starts[0])
         data = self.problem.data.over(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)
         out = np.full((len(ways), len(starts)), np.inf)

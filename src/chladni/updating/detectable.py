@@ -3,14 +3,14 @@
 The recording is taken to be the model's own responses. A change is found when it lowers -2 ln p by
 more than naming asks of a finding: the threshold of a diagnosis and, because its place is unknown,
 2 ln of the places tried. -2 ln p is that of a diagnosis, with E, rho and t of the parts, scatter
-within them, the error of the model's form and the weighing in the covariance (``scan``), so that
-what calibration could take up is not counted. Held-out data are counted with the rest.
+within them, the joints, the errors of the mesh and of the model's form and the weighing in the
+covariance (``scan``), so that what calibration could take up is not counted. Held-out data are
+counted with the rest.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..fem.modelled import modelled
 from .diagnosis import threshold
@@ -19,16 +19,14 @@ from .likelihood import LN10, Responses
 from .preparation import (
     SOLVED,
     ZETA,
-    carrying,
     equalised_lines,
-    freed_by,
     measured_on,
     nuisances,
+    ready_for_responses,
     updating_problem,
 )
 from .question import Question
 from .reduced_model import evaluate
-from .reduced_problem import reduced_problem
 from .scan import baseline, field_slopes, point_scores
 
 NOISE = 0.01  # of |H|, at every line that is compared
@@ -74,9 +72,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     nominal = modelled(asked.tested(asked.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = asked.outputs.rows(built), asked.inputs.rows(built)
-    known = sp.csr_array(sp.vstack(rows))
-    reduced = reduced_problem(nominal, f_max, known, base=asked.base)
-    reduced = carrying(reduced, freed_by(asked, reduced, f_max))
+    reduced = ready_for_responses(asked, nominal, f_max)
     f = equalised_lines((low, f_max), asked.exclude, ZETA)
     s = 2 * np.pi * f * (ZETA + 1j)
     shape = (len(s), len(asked.outputs.labels), len(asked.inputs.labels))
@@ -100,8 +96,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     shares = []
     for field in ("E", "t"):
         columns = field_slopes(base, reduced.model, data, field) @ local
-        told = (columns**2).sum(axis=0) - ((base.Z @ columns) ** 2).sum(axis=0)
-        share = 1 - np.exp(-np.sqrt(due / np.maximum(told, 1e-12)))
+        share = 1 - np.exp(-np.sqrt(due / np.maximum(base.score(columns), 1e-12)))
         shares.append(np.where(share < MOST, share, np.nan))
     gained = score - base.score(base.residual[:, None])[0]
     return Detectable(

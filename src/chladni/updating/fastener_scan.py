@@ -27,7 +27,7 @@ from ..geometry.sampling import farthest_point_sample
 from .likelihood import Responses
 from .reduced_model import State
 from .reduced_problem import ReducedProblem
-from .scan import Baseline, _residuals
+from .scan import Baseline, whitened
 
 MOST = 400  # fasteners that are tried; of more, so many spread over the structure
 AT_ONCE = 24  # of them are solved for together
@@ -87,9 +87,7 @@ def fastener_scores(
     state, out = base.state, np.empty(left.shape)
     for j, one in enumerate(joints):
         H = loosened_receptance(state, reduced, data, one, left[j])
-        for k in range(left.shape[1]):
-            r = _residuals(data, state, H[k : k + 1])
-            out[j, k] = base.score(base.with_mass(r, 0.0))[0]
+        out[j] = base.score(base.with_mass(whitened(data, state, H), 0.0))
     return out
 
 

@@ -60,8 +60,7 @@ def left_where(
         columns = field_slopes(base, hypothesis.model, data, field) @ local
         score = direction_scores(base, columns)[1]
         gained = base.score(base.residual[:, None])[0] - score
-        known = (columns**2).sum(axis=0) - ((base.Z @ columns) ** 2).sum(axis=0)
-        gained[known < 1 / BLIND**2] = np.nan
+        gained[base.score(columns) < 1 / BLIND**2] = np.nan
         gain = np.fmax(gain, gained)
     if np.isnan(gain).all():
         return None

@@ -18,6 +18,7 @@ CLAIM = {
 }
 NEAR = 0.2  # of ln f: a mode of the deck farther away is not the one that was measured
 HOLDS = 0.05  # of the strain energy: parts with less are not named
+JOINTS = "springs and bushes"
 NOWHERE = "levels alone do not say where"
 
 
@@ -51,8 +52,7 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
     """Parts and joints that hold the strain energy of these modes, in the deck's own."""
     f = [float(m.mode.frequency[0]) for m in modes]
     said, parts = [], []
-    for hertz in f:
-        shares = energy_shares(model, hertz)
+    for hertz, shares in zip(f, energy_shares(model, f), strict=True):
         kept = {name: x for name, x in shares.items() if x >= HOLDS}
         if kept:
             each = ", ".join(f"{100 * x:.0f} % in {name}" for name, x in kept.items())
@@ -62,9 +62,6 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
     high = max(float(m.mode.frequency.max()) for m in modes)
     text = "; ".join([NOWHERE, *said])
     return Location(text, tuple(dict.fromkeys(parts)), band_hz=(low, high))
-
-
-JOINTS = "springs and bushes"
 
 
 @dataclass(frozen=True)
@@ -98,12 +95,14 @@ def linear_joints(
     ----------
     fitted : the level the deck was compared with
     """
-    out = []
-    for one, t in zip(study.modes, level_tables(study), strict=True):
-        if one not in study.moving or one.signature not in EFFECT or one.explained is None:
-            continue
-        hertz = t.rows[0].frequency_hz
-        e = energy_shares(model, hertz).get(JOINTS, 0.0)
+    told = [
+        t for one, t in zip(study.modes, level_tables(study), strict=True)
+        if one in study.moving and one.signature in EFFECT and one.explained is not None
+    ]  # fmt: skip
+    f = [t.rows[0].frequency_hz for t in told]
+    out: list[LinearJoint] = []
+    for t, hertz, shares in zip(told, f, energy_shares(model, f), strict=True):
+        e = shares.get(JOINTS, 0.0)
         kappa = [(r.level, e + (r.stiffness or 0.0), r.loss or 0.0) for r in t.rows]
         if e < HOLDS or min(real for _, real, _ in kappa) <= 0:
             continue
@@ -124,21 +123,23 @@ def joint_comment(joints: Sequence[LinearJoint]) -> str:
     return "\n".join(lines)
 
 
-def energy_shares(model: Modelled, frequency: float) -> dict[str, float]:
-    """Shares of the strain energy of the deck's nearest mode, largest first; none if none is near.
+def energy_shares(model: Modelled, frequency: Sequence[float]) -> list[dict[str, float]]:
+    """Shares of the strain energy of the deck's nearest modes, largest first; none if none is near.
 
     Parameters
     ----------
-    frequency : [Hz]
+    frequency : (k,) [Hz]
     """
-    f = model.modes.frequency
-    away = np.abs(np.log(np.maximum(f, 1e-9) / frequency))
-    k = int(away.argmin())
-    if away[k] > NEAR:
-        return {}
-    share = part_energies(model.structure, model.modes.shapes[:, [k]])[:, 0]
-    if not np.isfinite(share).all():
-        return {}
+    if not len(frequency):
+        return []
+    away = np.abs(np.log(np.maximum(model.modes.frequency, 1e-9)[:, None] / frequency))
+    nearest, near = away.argmin(axis=0), away.min(axis=0) <= NEAR
+    share = part_energies(model.structure, model.modes.shapes[:, nearest]).T
+    told = near & np.isfinite(share).all(axis=1)
+    return [_named(model, one) if t else {} for one, t in zip(share, told, strict=True)]
+
+
+def _named(model: Modelled, share: np.ndarray) -> dict[str, float]:
     named = {p.name: float(x) for p, x in zip(model.assembly.parts, share, strict=True)}
     named[JOINTS] = 1.0 - float(share.sum())
     return dict(sorted(named.items(), key=lambda pair: -pair[1]))

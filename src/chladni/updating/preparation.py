@@ -83,10 +83,7 @@ def _by_responses(question: Question) -> Prepared:
     nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    measured = measured_on(question)
-    reduced = reduced_problem(nominal, f_max, measured(built), base=question.base)
-    free = [*freed_by(question, reduced, f_max), *joint_nuisances(built)]
-    reduced = carrying(reduced, free)
+    reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)
@@ -103,7 +100,7 @@ def _by_responses(question: Question) -> Prepared:
             direct=question.outputs.carried_by(question.inputs),
         )  # fmt: skip
         data.append(read.over(reduced.model))
-    nuisance = nuisances(reduced, nominal, f_max, measured)
+    nuisance = nuisances(reduced, nominal, f_max, measured_on(question))
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
@@ -362,6 +359,13 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
             "structure for sensor-mass)"
         )
     return freed_effect(found[0], p.name)
+
+
+def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:
+    """A structure made ready: the basis holds what is measured, what is free, and all joints."""
+    built = nominal.structure
+    reduced = reduced_problem(nominal, f_max, measured_on(question)(built), base=question.base)
+    return carrying(reduced, [*freed_by(question, reduced, f_max), *joint_nuisances(built)])
 
 
 def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProblem:

@@ -133,7 +133,7 @@ class Reanalysis:
         """Residuals (n, n_places) with the dynamic stiffness D (n_f,), ``added`` kg weighed."""
         share = D / (1 + D * self.G_bb)
         change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
-        r = _residuals(self.data, self.base.state, self.H[None] - change)
+        r = whitened(self.data, self.base.state, self.H[None] - change)
         return self.base.with_mass(r, added)
 
 
@@ -161,7 +161,7 @@ def reanalysis(
     )
 
 
-def _residuals(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
+def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     """Whitened residuals of many responses (m, n_f, n_out, n_in) as columns (n, m)."""
     from ..ema.correlation import wrapped
 

@@ -12,7 +12,7 @@ from chladni.errors import ModelError
 from chladni.geometry.cells import edges_of
 from chladni.geometry.facets import tangents
 from chladni.geometry.nearest import ShellChoice, ShellSurface
-from chladni.model.added_points import with_points
+from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import Assembly, Beams, Bushes, Masses, RigidBody
 from chladni.model.properties import BeamSection, Isotropic
 
@@ -25,7 +25,6 @@ from .builders import (
     adhesive_bead,
     cell_carriers,
     followed,
-    next_id,
     tied,
     with_part,
 )

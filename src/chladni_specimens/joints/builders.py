@@ -14,7 +14,7 @@ import numpy as np
 from chladni.errors import ModelError
 from chladni.geometry.facets import tangents
 from chladni.geometry.nearest import Feet, ShellChoice, ShellSurface, nearest_parts
-from chladni.model.added_points import with_points
+from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import Assembly, Average, Solids
 from chladni.model.properties import Isotropic, Part, Section, SolidSection
 
@@ -47,15 +47,6 @@ class Joint:
 
 
 Joined = tuple[Assembly, tuple[Joint, ...]]
-
-
-def next_id(assembly: Assembly) -> int:
-    """The first id no element, rigid body or mass of the assembly uses."""
-    a = assembly
-    shells = (a.shells.ids, a.beams.ids, *(s.ids for s in a.solids))
-    scalars = (a.springs.ids, a.dampers.ids, a.scalar_masses.ids, a.bushes.ids, a.masses.ids)
-    used = [int(ids.max()) for ids in (*shells, *scalars) if len(ids)]
-    return 1 + max([*used, *(r.id for r in a.rigid)], default=0)
 
 
 def with_part(assembly: Assembly, name: str, section: Section) -> tuple[Assembly, int]:

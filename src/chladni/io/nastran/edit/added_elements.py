@@ -1,11 +1,11 @@
 """Cards of grids, means, masses, springs and bushes that were added to a deck."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from ....errors import ModelError
+from ....model.added_points import next_id
 from ....model.assembly import Assembly, Average
 from ....units import Units
 from .. import Deck
@@ -51,7 +51,7 @@ def _means(before: Assembly, after: Assembly) -> Iterator[list]:
 
 def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CONM2 of every mass that was added, offset where it sits beside its grid."""
-    first = _free_id(after)
+    first = next_id(after)
     for k in range(len(before.masses), len(after.masses)):
         M = after.masses.matrix[k]
         m = M[0, 0]
@@ -67,7 +67,7 @@ def _masses(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
 def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CELAS2 of every spring that was added."""
     s, n = after.springs, len(before.springs)
-    first = _free_id(after) + len(after.masses)
+    first = next_id(after) + len(after.masses)
     unit = units.force / units.length
     for k in range(n, len(s)):
         grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
@@ -77,7 +77,7 @@ def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
 def _bushes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CBUSH that was added, with its PBUSH and, where it lies askew, the CORD2R of its frame."""
     b = after.bushes
-    first = _free_id(after) + len(after.masses) + len(after.springs)
+    first = next_id(after) + len(after.masses) + len(after.springs)
     system, pid = free_system(deck), 1 + max(property_ids(deck))
     unit = units.force / units.length
     for n, k in enumerate(range(len(before.bushes), len(b))):
@@ -101,13 +101,3 @@ def free_system(deck: Deck) -> int:
         words = [*deck[kind].words(1).tolist(), *second]
         used += [int(word) for word in words if word.isdigit()]
     return 1 + max(used)
-
-
-def _free_id(assembly: Assembly) -> int:
-    """An element id above all that are used."""
-    families: list[Any] = [
-        assembly.shells, assembly.beams, assembly.springs, assembly.dampers, assembly.bushes,
-        assembly.masses, assembly.scalar_masses, *assembly.solids,
-    ]  # fmt: skip
-    rigid = max((r.id for r in assembly.rigid), default=0)
-    return 1 + max(rigid, *(int(f.ids.max(initial=0)) for f in families))
