@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -9,7 +10,8 @@ from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
 from .correlation import mac
-from .identification import DERIVATIVES, Identified, evaluate, frf_variance
+from .identification import DERIVATIVES, Identified, evaluate
+from .response_variance import frf_variance
 from .setup import Control
 
 PARTNER = 0.05  # of a frequency: farther away is another mode
@@ -31,12 +33,19 @@ class AtLevel:
     ----------
     level : [N], or [m/s²] where a base or a response was held
     control : whether that is the amplitude of the force, or of the response of the drive point
+    averages : of the estimate, where the noise comes from the coherence
     """
 
     level: float | None
     frf: FRF
     modes: Identified
     control: Control = "force"
+    averages: int = 1
+
+    @cached_property
+    def variance(self) -> np.ndarray:
+        """Of every sample of the FRF (n_f, n_out, n_in), once for all modes that are followed."""
+        return frf_variance(self.frf, self.averages)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +218,7 @@ def _modal_lines(
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2
     H = (frf.values[near] - evaluate(rest, s))[:, :, j] / s[:, None] ** DERIVATIVES[first.quantity]
     R = first.residues[mode, :, j]
-    variance = frf_variance(frf)[near][:, :, j] / q
+    variance = one.variance[near][:, :, j] / q
     return s.imag, H @ R.conj(), variance @ np.abs(R) ** 2
 
 
