@@ -1,6 +1,6 @@
 """Poles and residues of a recording, with their spread, down to the noise floor.
 
-Weighted common-pole fit on any frequency grid; see `pole_search`, `pole_fitting` and `pole_selection`.
+Weighted common-pole fit on any frequency grid; see `pole_search` and `pole_fitting`.
 """
 
 from collections.abc import Sequence
