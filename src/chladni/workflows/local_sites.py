@@ -8,6 +8,7 @@ import numpy as np
 from ..bench.bench_article import BenchArticle
 from ..bench.bench_recording import BenchTest
 from ..bench.bench_rig import BenchSetup, bench_rig
+from ..bench.drive_signals import pink_rms
 from ..bench.local_forces import Clearance, CubicSpring, JenkinsSlider, LocalForce
 from .benched_article import with_site
 
@@ -61,5 +62,4 @@ def _rms(article: BenchArticle, setup: BenchSetup, test: BenchTest) -> np.ndarra
     x = np.abs(H[:, 1:] / (s**2)[:, None])
     if test.excitation == "stepped-sine":
         return np.asarray(test.level * (x / np.abs(H[:, :1])).max(axis=0) / np.sqrt(2))
-    density = 1 / f / np.trapezoid(1 / f, f)
-    return np.asarray(test.level * np.sqrt(np.trapezoid(x**2 * density[:, None], f, axis=0)))
+    return np.asarray(test.level * pink_rms(f, x))
