@@ -29,6 +29,7 @@ from ..effects.registry import family
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.refine import refined
+from ..geometry.sampling import nearest_points
 from ..progress import Progress, silent, within
 from .benched_article import benched, true_places
 from .loaded_model import as_model
@@ -260,8 +261,7 @@ def _article(
 def _grids(case: Case) -> np.ndarray:
     """Grid of the deck at or nearest to every output (n_out,)."""
     a, out = case.assembly, case.outputs
-    d2 = ((a.points[None] - out.points[:, None]) ** 2).sum(axis=-1)
-    return np.where(out.grids > 0, out.grids, a.ids[d2.argmin(axis=1)])
+    return np.where(out.grids > 0, out.grids, a.ids[nearest_points(a.points, out.points)])
 
 
 def _drawn(
