@@ -100,11 +100,15 @@ class ModeLevels:
         return self.frequency_moves or self.damping_moves
 
 
-def _p(value: np.ndarray, sd: np.ndarray) -> float:
-    """Of χ² about the weighted mean."""
+def chi2_about_mean(value: np.ndarray, sd: np.ndarray) -> float:
+    """Σ (x - x̄)² / σ² about the weighted mean, of n - 1 degrees of freedom."""
     w = 1 / np.maximum(sd, 1e-9 * np.abs(value)) ** 2
     mean = (w * value).sum() / w.sum()
-    return float(chi2.sf((w * (value - mean) ** 2).sum(), len(value) - 1))
+    return float((w * (value - mean) ** 2).sum())
+
+
+def _p(value: np.ndarray, sd: np.ndarray) -> float:
+    return float(chi2.sf(chi2_about_mean(value, sd), len(value) - 1))
 
 
 def _range(value: np.ndarray) -> float:

@@ -110,8 +110,9 @@ class Homogeneity:
     limit : float           ratio that chance does not reach
     linear : bool
     p : float               of so large a ratio by chance, N ratio being of a gamma distribution
-    channels : tuple of str  outputs beyond the limit, the worst first; none where it is linear
-    bands : ((low, high), ...)  where lines are beyond it [Hz], the worst first; none likewise
+    channels : tuple of str  outputs whose own ratio is beyond chance, the worst first; none where it
+        is linear
+    bands : ((low, high), ...)  runs of such lines [Hz], the worst first; none likewise
     """
 
     ratio: float
