@@ -1,4 +1,4 @@
-"""``python -m chladni_evidence run``: evidence that does not flatter, made, diagnosed, scored."""
+"""``python -m chladni_evidence``: evidence that does not flatter, made, diagnosed, scored."""
 
 import argparse
 import sys
@@ -19,42 +19,32 @@ from .screening_faults import FAULTS, tally
 
 
 def main(words: list[str] | None = None) -> int:
-    """Entry point; 0 (done) or 2 (the input is at fault: one sentence)."""
+    """Entry point; 0 (done), 1 (an injury did not end as due), 2 (bad input: one sentence)."""
     asked = _parser().parse_args(words)
-    if asked.command == "screen":
-        return _screened(asked)
-    if asked.command == "fuzz":
-        return _fuzzed(asked)
-    if asked.command == "identify":
-        return _identified(asked)
     try:
-        seeds = seed_range(asked.seeds)
-        _say(purpose(seeds))
-        chosen = orders(asked.set, seeds)
-        for key in ("kinds", "structures"):
-            wanted, field = getattr(asked, key), key[:-1]
-            chosen = [o for o in chosen if not wanted or getattr(o, field) in wanted.split(",")]
-        if not chosen:
-            raise LabelError(f"no case of the set {asked.set} is left by --kinds and --structures")
-        chosen = [replace(o, recorder=asked.recorder) for o in chosen]
-        run(chosen, asked.out, asked.workers, _say, asked.limit)
+        return COMMANDS[asked.command](asked)
     except ChladniError as error:
         sys.stderr.write(f"chladni_evidence: {error}\n")
         return 2
+
+
+def _run(asked: argparse.Namespace) -> int:
+    """Cases made, diagnosed, scored."""
+    chosen = orders(asked.set, _seeds(asked))
+    for key in ("kinds", "structures"):
+        wanted, field = getattr(asked, key), key[:-1]
+        chosen = [o for o in chosen if not wanted or getattr(o, field) in wanted.split(",")]
+    if not chosen:
+        raise LabelError(f"no case of the set {asked.set} is left by --kinds and --structures")
+    chosen = [replace(o, recorder=asked.recorder) for o in chosen]
+    run(chosen, asked.out, asked.workers, _say, asked.limit)
     return 0
 
 
 def _screened(asked: argparse.Namespace) -> int:
     """The table of the screening: outcomes by fault."""
-    try:
-        seeds = seed_range(asked.seeds)
-        _say(purpose(seeds))
-        kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
-        counts = tally(seeds, kinds, _say)
-    except ChladniError as error:
-        sys.stderr.write(f"chladni_evidence: {error}\n")
-        return 2
-    for name, count in counts.items():
+    kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
+    for name, count in tally(_seeds(asked), kinds, _say).items():
         _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
     return 0
 
@@ -63,22 +53,25 @@ def _fuzzed(asked: argparse.Namespace) -> int:
     """Injured inputs; 1 where any did not end as it is due."""
     kinds = asked.kinds.split(",") if asked.kinds else KINDS
     if unknown := [k for k in kinds if k not in KINDS]:
-        sys.stderr.write(f"chladni_evidence: no kind {unknown[0]}; there are {', '.join(KINDS)}\n")
-        return 2
+        raise LabelError(f"no kind {unknown[0]}; there are {', '.join(KINDS)}")
     found = fuzz(fuzz_inputs(asked.inputs, asked.seed, kinds, asked.decks), asked.out, _say)
     return int(any(name not in DUE for count in found.values() for name in count))
 
 
 def _identified(asked: argparse.Namespace) -> int:
     """Errors, coverage and inventions of identification, by kind of noise."""
-    try:
-        seeds = seed_range(asked.seeds)
-        _say(purpose(seeds))
-        table(seeds, asked.noise.split(";") if asked.noise else list(NOISES), _say)
-    except ChladniError as error:
-        sys.stderr.write(f"chladni_evidence: {error}\n")
-        return 2
+    table(_seeds(asked), asked.noise.split(";") if asked.noise else list(NOISES), _say)
     return 0
+
+
+COMMANDS = {"run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified}
+
+
+def _seeds(asked: argparse.Namespace) -> range:
+    """The seeds, and on the terminal what they are for."""
+    seeds = seed_range(asked.seeds)
+    _say(purpose(seeds))
+    return seeds
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -21,7 +21,7 @@ from chladni.bench.sine_sweep import swept
 from chladni.dynamics.frf import FRF
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import tangents, unit
-from chladni.model.assembly import Assembly
+from chladni.geometry.sampling import nearest_points
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import Bench
@@ -91,7 +91,7 @@ def _article(
     a = hidden.article
     true = _true(bench.outputs, kind, rng)
     out, drive = footing(a, true), footing(a, bench.drive)
-    hung = _nearest(a, bench.deck.points[bench.deck.rows(list(bench.hangers))])
+    hung = nearest_points(a.points, bench.deck.points[bench.deck.rows(list(bench.hangers))])
     rows = np.concatenate([out.rows.ravel(), hung])
     modes = article_modes(
         a, rows, drive.rows.ravel(), float(bench.lines[-1]), solver, cache, residual_bending
@@ -123,9 +123,3 @@ def _true(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Sp
     turned = spots.directions + kind.tilt_sd * (tilt[0][:, None] * u + tilt[1][:, None] * v)
     points = spots.points + off[0][:, None] * u + off[1][:, None] * v
     return replace(spots, points=points, directions=unit(turned))
-
-
-def _nearest(a: Assembly, places: np.ndarray) -> np.ndarray:
-    """Rows of the points nearest to places (k,)."""
-    d2 = ((a.points[None] - places[:, None]) ** 2).sum(axis=-1)
-    return np.asarray(d2.argmin(axis=1))

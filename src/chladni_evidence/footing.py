@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.geometry.nearest import ShellSurface
+from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 
 
@@ -76,5 +77,4 @@ def rows_of_part(assembly: Assembly, p: int) -> np.ndarray:
 def nearest_rows(assembly: Assembly, p: int, points: np.ndarray) -> np.ndarray:
     """Row of the part's point nearest to each place (k,)."""
     rows = rows_of_part(assembly, p)
-    d2 = ((assembly.points[rows][None] - points[:, None]) ** 2).sum(axis=-1)
-    return np.asarray(rows[d2.argmin(axis=1)])
+    return np.asarray(rows[nearest_points(assembly.points[rows], points)])

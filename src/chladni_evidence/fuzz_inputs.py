@@ -95,6 +95,7 @@ MPC,2,9,1,1.,8,1,-1.
 ENDDATA
 """,
 }
+_SMALL = 60_000  # bytes of a deck of the user's that is taken
 SENSORS = ("label", "grid", "x", "y", "z", "direction", "role", "mass", "position_sd")
 
 
@@ -186,9 +187,6 @@ def _sound(more: Path | None) -> dict[str, bytes]:
         if path.stat().st_size < _SMALL:
             found[f"{path.parent.name}_{path.stem}.bdf"] = path.read_bytes()
     return found
-
-
-_SMALL = 60_000  # bytes of a deck of the user's that is taken
 
 
 def _time_table() -> bytes:

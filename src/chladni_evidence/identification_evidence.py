@@ -12,7 +12,7 @@ import numpy as np
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import Identified, identify
-from chladni.ema.pole_fitting import PoleData, solve
+from chladni.ema.pole_fitting import PoleData, solved
 from chladni.ema.pole_selection import Rule, uncertainty
 from chladni.errors import LabelError
 from chladni.workflows.identify import firm
@@ -132,8 +132,7 @@ def _cramer_rao(known: Known, frf: FRF, variance: np.ndarray) -> tuple[np.ndarra
     data = PoleData(2j * np.pi * frf.frequency / top, frf.values[:, :, 0] / top**2, w, 2)
     size = np.abs(known.poles) / (2 * np.pi)
     p = known.poles[(BAND[0] / 3 < size) & (size < 3 * BAND[1])] / top
-    fit, slope = solve(data, p, slope=True)
-    assert slope is not None
+    fit, slope = solved(data, p)
     sd, _ = uncertainty(p, slope, 1.0)
     inside = np.isin(p, known.inside / top)
     rule = Rule(w.shape[1], len(data.s))

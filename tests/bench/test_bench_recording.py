@@ -8,7 +8,7 @@ import pytest
 from chladni.bench.accelerometers import AccelerometerType
 from chladni.bench.bench_recording import BenchTest, level_for, record
 from chladni.bench.bench_rig import BenchSetup, bench_rig
-from chladni.bench.drive_signals import ON, burst, multisine
+from chladni.bench.drive_signals import ON, burst, multisine, pink_rms
 from chladni.bench.front_end import FrontEnd, digitised, sampling_rate
 from chladni.bench.sine_schedule import TABLE_3, SineLine, dwells_of, stage_lines, stages_for
 from chladni.bench.sine_sweep import swept
@@ -219,6 +219,13 @@ def test_bursts_are_pink_and_silent_at_the_end():
 
     assert octave(20) == pytest.approx(octave(80), rel=0.2)
     assert power[f > 1.2 * BAND[1]].max() < 1e-3 * power.max()
+
+
+def test_pink_noise_of_rms_one_is_even_over_octaves():
+    """Through H = 1 it is itself, through √f its power is the band over the ln of its ends."""
+    f = np.geomspace(10, 160, 4000)
+    found = pink_rms(f, np.stack([np.ones_like(f), 1j * np.sqrt(f)], axis=1))
+    np.testing.assert_allclose(found, [1, np.sqrt(150 / np.log(16))], rtol=1e-6)
 
 
 def test_signals_on_a_finer_grid_pass_through_the_same_samples():

@@ -8,6 +8,7 @@ import pytest
 from chladni.bench.accelerometers import AccelerometerType
 from chladni.bench.bench_recording import BenchTest, channels_of, level_for, record
 from chladni.bench.bench_rig import BenchSetup, bench_rig
+from chladni.bench.drive_signals import pink_rms
 from chladni.bench.local_forces import Clearance, CubicSpring, JenkinsSlider
 from chladni.bench.sine_schedule import SineLine
 from chladni.bench.sine_sweep import swept
@@ -56,8 +57,7 @@ def site(small, kind, law_of):
     if kind == "stepped-sine":  # of the force that is held, to the crest
         size = float(level * np.abs(x[:, 1] / x[:, 0] / (2 * np.pi * f) ** 2).max())
     else:
-        density = 1 / f / np.trapezoid(1 / f, f)
-        size = level * float(np.sqrt(np.trapezoid(np.abs(x[:, 1]) ** 2 * density, f)))
+        size = level * float(pink_rms(f, x[:, 1]))
     k = 0.3 * 4.0 * (2 * np.pi * 28) ** 2
     article = small(damping=0.02, laws=(law_of(size, k),))
     return replace(article, sites=article.outputs[:1])

@@ -190,6 +190,25 @@ def test_a_mode_without_partner_is_not_followed():
     assert len(modes_over_levels([one, turned])) == 1
 
 
+def test_averages_are_counted_where_the_coherence_states_the_noise():
+    """Of n averages (1 - γ²)/(γ² n): the lines' spread is smaller by √n, as that of the poles."""
+    one = at(1.0)
+    spoken = replace(one.frf, variance=None, coherence=np.full(one.frf.values.shape, 0.9))
+    runs = [replace(one, level=x, frf=spoken) for x in (1.0, 2.0)]
+    few, many = (modes_over_levels([replace(r, averages=n) for r in runs])[0] for n in (1, 4))
+    assert_allclose(few.frequency_sd, 2 * many.frequency_sd, rtol=0.01)
+    assert_allclose(few.damping_sd, 2 * many.damping_sd, rtol=0.01)
+
+
+def test_a_level_without_a_pole_is_passed_over():
+    """Nothing was found at the second of three: its neighbours are followed as without it."""
+    runs = [at(x, seed=k) for k, x in enumerate((1.0, 4.0, 8.0))]
+    none = replace(runs[1], modes=runs[1].modes.sel(np.zeros(2, bool)))
+    followed = modes_over_levels([runs[0], none, runs[2]])
+    assert [m.level.tolist() for m in followed] == [[1.0, 8.0]] * 2
+    assert not modes_over_levels([replace(none, level=0.5), *runs])
+
+
 def decay(force, seed=0, rate=2000.0, seconds=4.0):
     """Accelerations of a 40 Hz oscillator let go at 1 m/s, its spring's extra force by ``force``.
 

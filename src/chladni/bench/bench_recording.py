@@ -12,7 +12,7 @@ from ..errors import LabelError, ModelError
 from ..progress import Progress, silent
 from .accelerometers import drawn_gains
 from .bench_rig import BenchRig
-from .drive_signals import Kind, blow, burst, multisine
+from .drive_signals import BLOW, Kind, blow, burst, multisine, pink_rms
 from .first_order_hold import HeldRun
 from .front_end import anti_alias, digitised, sampling_rate
 from .local_integration import LocalRun
@@ -101,12 +101,10 @@ class Channels:
 
 def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
     """The sensors of a test with the sensitivities they happen to have."""
-    kind, n = rig.setup.accelerometer, len(rig.article.outputs)
-    gauge = rig.setup.shaker.gauge if rig.setup.shaker else None
-    volts, noise = (gauge.sensitivity, gauge.noise) if gauge else (0.01124, 4.5e-5)
-    stated = np.r_[volts, np.full(n, kind.sensitivity)]
+    kind, gauge, n = rig.setup.accelerometer, rig.setup.gauge, len(rig.article.outputs)
+    stated = np.r_[gauge.sensitivity, np.full(n, kind.sensitivity)]
     true = stated * np.r_[1.0, rig.article.gains * drawn_gains(kind, n, rng)]
-    return Channels(true, stated, np.abs(true) * np.r_[noise, np.full(n, kind.noise)])
+    return Channels(true, stated, np.abs(true) * np.r_[gauge.noise, np.full(n, kind.noise)])
 
 
 def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> float:
@@ -122,14 +120,12 @@ def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> flo
         volts = np.abs(H[:, 1:] / H[:, :1]).max() * kind.sensitivity
         return float(ROOM * front.volts / volts)
     if excitation == "hammer":
-        width = 0.8 / band[1] * 2 / np.pi  # area of a half sine of one newton [N s]
+        width = BLOW / band[1] * 2 / np.pi  # area of a half sine of one newton [N s]
         m = rig.measured
         rows = np.abs(m.c[1:] * m.b[:, 0])[:, np.abs(m.poles) < 2 * np.pi * band[1]]
         return float(2 * ROOM * front.volts / (width * rows.sum(axis=1).max() * kind.sensitivity))
-    density = 1 / f / np.trapezoid(1 / f, f)
-    rms = np.sqrt(np.trapezoid(np.abs(H) ** 2 * density[:, None], f, axis=0))
-    force = rig.setup.shaker.gauge.sensitivity if rig.setup.shaker else 0.01
-    volts = rms * np.r_[force, np.full(len(rms) - 1, kind.sensitivity)]
+    rms = pink_rms(f, H)
+    volts = rms * np.r_[rig.setup.gauge.sensitivity, np.full(len(rms) - 1, kind.sensitivity)]
     return float(ROOM_RANDOM * front.volts / volts.max())
 
 
@@ -155,7 +151,7 @@ def record(
         raise ModelError("a hammer hits an article without a shaker, anything else needs one")
     rate = sampling_rate(test.band[1])
     channels = channels or channels_of(rig, rng)
-    run = PhysicalRun(rig, rate, _finer(rig, test))
+    run = PhysicalRun(rig, rate, test.excitation)
     blocks, over = [], np.zeros(1 + len(rig.article.outputs), int)
     signals = list(_signals(rig, test, rate, run.finer, rng))
     for k, (u, kept) in enumerate(signals):
@@ -183,12 +179,6 @@ def time_record_of(rig: BenchRig, blocks: list[np.ndarray], rate: float) -> Time
     x = np.stack(blocks)
     labels = (rig.article.input_label,), rig.article.output_labels
     return TimeRecord(x[:, :1], x[:, 1:], rate, *labels)
-
-
-def _finer(rig: BenchRig, test: BenchTest) -> int:
-    if test.excitation == "hammer":
-        return FINER_BLOW
-    return FINER_LOCAL if rig.article.laws else FINER
 
 
 def _signals(
@@ -221,9 +211,10 @@ def _decay(rig: BenchRig) -> float:
 class PhysicalRun:
     """Forces and accelerations behind the anti-alias filter, sampled, block after block."""
 
-    def __init__(self, rig: BenchRig, rate: float, finer: int) -> None:
-        self.finer = finer
-        h = 1 / (rate * finer)
+    def __init__(self, rig: BenchRig, rate: float, excitation: Kind) -> None:
+        rest = FINER_LOCAL if rig.article.laws else FINER
+        self.finer = FINER_BLOW if excitation == "hammer" else rest
+        h = 1 / (rate * self.finer)
         self.outputs = HeldRun(filtered(rig.measured, anti_alias(rate)), h)
         self.local = LocalRun(rig.openings, rig.article.laws, h) if rig.article.laws else None
 

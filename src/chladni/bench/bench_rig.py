@@ -9,7 +9,7 @@ from .bench_article import BenchArticle
 from .cords import INNER, Cord, cord_matrices, cords_for
 from .front_end import FrontEnd
 from .pole_model import PoleModel, by_poles
-from .shaker import Shaker
+from .shaker import ForceGauge, Shaker
 
 SWINGING = 0.7  # rigid motions as gravity holds them [Hz], about √(g / 0.5 m) / 2π
 RIGID_DAMPING = 0.03
@@ -29,6 +29,11 @@ class BenchSetup:
     cords: tuple[Cord, ...] | None = None
     rubber: bool = False
     front_end: FrontEnd = field(default_factory=FrontEnd)
+
+    @property
+    def gauge(self) -> ForceGauge:
+        """What feels the force; a hammer has one of the same kind at its tip."""
+        return ForceGauge() if self.shaker is None else self.shaker.gauge
 
 
 @dataclass(frozen=True, eq=False)

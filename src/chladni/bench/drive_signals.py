@@ -24,6 +24,13 @@ def pink_lines(n: int, rate: float, band: tuple[float, float]) -> np.ndarray:
     return np.where(inside, 1 / np.sqrt(np.maximum(f, f[1])), 0.0)
 
 
+def pink_rms(f: np.ndarray, H: np.ndarray) -> np.ndarray:
+    """Rms of what H (n_f, ...) answers to pink noise of rms 1 over the band of f (n_f,) [Hz]."""
+    density = 1 / f / np.trapezoid(1 / f, f)
+    power = density.reshape(-1, *[1] * (H.ndim - 1)) * np.abs(H) ** 2
+    return np.asarray(np.sqrt(np.trapezoid(power, f, axis=0)))
+
+
 def _in_time(lines: np.ndarray, n: int, finer: int) -> np.ndarray:
     """n · finer samples of a block whose spectrum over n samples is ``lines``."""
     spectrum = np.zeros(n * finer // 2 + 1, complex)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import ellip, residue
 
-from .pole_model import PoleFilter
+from .pole_model import PoleFilter, one_of_pairs
 
 PASS = 0.4  # of the rate: up to there the anti-alias filter is flat, as 1/2.56 of a front end's
 RIPPLE, STOP, ORDER = 0.05, 100.0, 11  # [dB], [dB]; an odd order falls to nothing at infinity
@@ -45,9 +45,8 @@ def anti_alias(rate: float) -> PoleFilter:
     edge = 2 * np.pi * PASS * rate
     b, a = ellip(ORDER, RIPPLE, STOP, 1.0, analog=True)  # per edge: numbers of order one
     r, p, _ = residue(b, a)
-    keep = p.imag >= -1e-9
-    weight = np.where(p.imag > 1e-9, 2.0, 1.0)[keep]
-    return PoleFilter(edge * p[keep], edge * weight * r[keep])
+    keep, pair = one_of_pairs(p)
+    return PoleFilter(edge * p[keep], edge * pair * r[keep])
 
 
 def digitised(

@@ -55,6 +55,13 @@ class PoleModel:
         return type(self)(self.poles, self.b[:, columns], self.c, self.d[:, columns])
 
 
+def one_of_pairs(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which poles to keep, one of each conjugate pair (m,) bool; what each counts, 2 or real 1."""
+    rounding = _REAL * np.abs(p)
+    keep = p.imag >= -rounding
+    return keep, np.where(p.imag > rounding, 2.0, 1.0)[keep]
+
+
 def by_poles(
     matrices: tuple[np.ndarray, np.ndarray, np.ndarray],
     load: np.ndarray,
@@ -83,8 +90,7 @@ def by_poles(
     rows = np.hstack([at / omega - force * omega, speed - force @ damping])
     p, X = np.linalg.eig(A)
     b = np.linalg.solve(X, np.vstack([np.zeros_like(push), push]).astype(complex))
-    keep = p.imag >= -_REAL * np.abs(p)
-    pair = np.where(p.imag > _REAL * np.abs(p), 2.0, 1.0)[keep]
+    keep, pair = one_of_pairs(p)
     return PoleModel(p[keep], b[keep], (rows @ X)[:, keep] * pair, force @ push + through)
 
 

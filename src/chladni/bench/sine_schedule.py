@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SWEEPS = 5
-
 
 @dataclass(frozen=True)
 class Stage:
@@ -47,7 +45,7 @@ def stage_lines(stages: Sequence[Stage]) -> np.ndarray:
 
 def stepped_sine_time(stages: Sequence[Stage], sweeps: int = 1) -> float:
     """Duration Σ (delay + measure) / f over all lines and sweeps [s]."""
-    return float(sweeps * sum(((d.delay + d.measure) / d.frequency) for d in dwells_of(stages)))
+    return float(sweeps * sum(d.seconds for d in dwells_of(stages)))
 
 
 @dataclass(frozen=True)
@@ -58,6 +56,11 @@ class SineLine:
     delay: float
     measure: float
     share: float
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes [s]."""
+        return (self.delay + self.measure) / self.frequency
 
 
 def dwells_of(

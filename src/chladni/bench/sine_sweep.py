@@ -15,8 +15,6 @@ from ..ema.signals import Spectra, estimated
 from ..ema.time_record import TimeRecord
 from ..progress import Progress, silent
 from .bench_recording import (
-    FINER,
-    FINER_LOCAL,
     BenchRecording,
     BenchTest,
     Channels,
@@ -90,7 +88,7 @@ def swept(
         f"input {rig.article.input_label}",
         *(f"output {o}" for o in rig.article.output_labels),
     )
-    seconds = test.sweeps * sum((x.delay + x.measure) / x.frequency for x in lines)
+    seconds = test.sweeps * sum(line.seconds for line in lines)
     said = (
         f"stepped sine: {len(lines)} lines, {test.sweeps} sweeps, {seconds / 60:.3g} minutes on "
         f"the bench; the transient left in a line is at most {100 * max(sweep.left):.2g} % of it"
@@ -158,7 +156,7 @@ class _ExactSweep:
         p, c = m.poles, m.c
         alpha, beta = 0.5 * b * U / (1j * w - p), 0.5 * b * np.conj(U) / (-1j * w - p)
         gamma = self.q - alpha - beta
-        begin, end = line.delay / line.frequency, (line.delay + line.measure) / line.frequency
+        begin, end = line.delay / line.frequency, line.seconds
         steady = c @ alpha + (c @ beta).conj() + m.d[:, 0] * U
         one = gamma * (np.exp(p * end) - np.exp(p * begin)) / (p - 1j * w)
         other = gamma.conj() * (np.exp(p.conj() * end) - np.exp(p.conj() * begin))
@@ -175,7 +173,7 @@ class _TimeSweep:
 
     def __init__(self, rig: BenchRig, test: BenchTest, channels: Channels, keep: bool) -> None:
         self.rate = sampling_rate(test.band[1])
-        self.run = PhysicalRun(rig, self.rate, FINER_LOCAL if rig.article.laws else FINER)
+        self.run = PhysicalRun(rig, self.rate, test.excitation)
         self.rig, self.channels, self.keep = rig, channels, keep
         self.blocks: list[np.ndarray] = []
         self.phase = 0.0
@@ -185,7 +183,7 @@ class _TimeSweep:
         self, line: SineLine, drive: float, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes by least squares over the measured samples."""
-        n = int(np.ceil((line.delay + line.measure) / line.frequency * self.rate))
+        n = int(np.ceil(line.seconds * self.rate))
         t = np.arange(1, n * self.run.finer + 1) / (self.rate * self.run.finer)
         angle = 2 * np.pi * line.frequency * t + self.phase
         volts = self.channels.true[:, None] * self.run.on(drive * np.sin(angle))
@@ -195,11 +193,11 @@ class _TimeSweep:
         if self.keep:
             self.blocks.append(x.astype(np.float32))
         m = int(line.measure / line.frequency * self.rate)
-        first, second = (
-            _fitted(x[:, k], angle[self.run.finer - 1 :: self.run.finer][k])
-            for k in (slice(n - m, n - m // 2), slice(n - m // 2, n))
+        sampled, half = angle[self.run.finer - 1 :: self.run.finer], n - m // 2
+        y, first, second = (
+            _fitted(x[:, k], sampled[k])
+            for k in (slice(n - m, n), slice(n - m, half), slice(half, n))
         )
-        y = _fitted(x[:, n - m :], angle[self.run.finer - 1 :: self.run.finer][n - m :])
         change = np.abs(second / second[0] - first / first[0])[1:]
         self.left.append(float((change / np.maximum(np.abs(y[1:] / y[0]), 1e-300)).max()))
         return y, over

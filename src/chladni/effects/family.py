@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..fem.energy import mass_properties
+from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly
 from .effect import Effect
 from .search_context import Candidate, SearchContext, best_starts
@@ -46,8 +47,7 @@ class Article:
     def grids_at(self, grids: np.ndarray) -> tuple[int, ...]:
         """Ids of the article's grids that lie where these of the deck lie."""
         where = self.deck.points[self.deck.rows(grids)]
-        d2 = ((self.assembly.points[None] - where[:, None]) ** 2).sum(axis=-1)
-        return tuple(int(i) for i in self.assembly.ids[d2.argmin(axis=1)])
+        return tuple(self.assembly.ids[nearest_points(self.assembly.points, where)].tolist())
 
     def shell_grid(self, rng: np.random.Generator) -> int:
         """Id of a grid of the deck's shells, any of them."""

@@ -1,6 +1,6 @@
 """Poles and residues of a recording, with their spread, down to the noise floor.
 
-Weighted common-pole fit on any frequency grid; see `fitting` and `selection`.
+Weighted common-pole fit on any frequency grid; see `pole_search` and `pole_fitting`.
 """
 
 from collections.abc import Sequence
@@ -69,6 +69,11 @@ class Identified:
     def inside(self) -> np.ndarray:
         """True for poles within the band; those beside it stand for what rings next door (r,)."""
         return (self.band[0] <= self.frequency) & (self.frequency <= self.band[1])
+
+    @property
+    def by_channel(self) -> np.ndarray:
+        """The residues, a column a channel (r, n_out n_in); of no poles too."""
+        return self.residues.reshape(self.order, self.lower.size)
 
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes; the residual terms stay."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -9,7 +10,8 @@ from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
 from .correlation import mac
-from .identification import DERIVATIVES, Identified, evaluate, frf_variance
+from .identification import DERIVATIVES, Identified, evaluate
+from .response_variance import frf_variance
 from .setup import Control
 
 PARTNER = 0.05  # of a frequency: farther away is another mode
@@ -31,12 +33,19 @@ class AtLevel:
     ----------
     level : [N], or [m/s²] where a base or a response was held
     control : whether that is the amplitude of the force, or of the response of the drive point
+    averages : of the estimate, where the noise comes from the coherence
     """
 
     level: float | None
     frf: FRF
     modes: Identified
     control: Control = "force"
+    averages: int = 1
+
+    @cached_property
+    def variance(self) -> np.ndarray:
+        """Of every sample of the FRF (n_f, n_out, n_in), once for all modes that are followed."""
+        return frf_variance(self.frf, self.averages)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +100,15 @@ class ModeLevels:
         return self.frequency_moves or self.damping_moves
 
 
-def _p(value: np.ndarray, sd: np.ndarray) -> float:
-    """Of χ² about the weighted mean."""
+def chi2_about_mean(value: np.ndarray, sd: np.ndarray) -> float:
+    """Σ (x - x̄)² / σ² about the weighted mean, of n - 1 degrees of freedom."""
     w = 1 / np.maximum(sd, 1e-9 * np.abs(value)) ** 2
     mean = (w * value).sum() / w.sum()
-    return float(chi2.sf((w * (value - mean) ** 2).sum(), len(value) - 1))
+    return float((w * (value - mean) ** 2).sum())
+
+
+def _p(value: np.ndarray, sd: np.ndarray) -> float:
+    return float(chi2.sf(chi2_about_mean(value, sd), len(value) - 1))
 
 
 def _range(value: np.ndarray) -> float:
@@ -153,8 +166,7 @@ def _alike(a: Identified, b: Identified) -> np.ndarray:
     """Whether modes of two levels are of one shape, as far as their channels tell (r_a, r_b)."""
     if (a.outputs, a.inputs) != (b.outputs, b.inputs) or len(a.outputs) * len(a.inputs) < 3:
         return np.ones((a.order, b.order), bool)
-    shapes = [m.residues.reshape(m.order, -1).T for m in (a, b)]
-    return np.asarray(mac(*shapes) > SAME_SHAPE)
+    return np.asarray(mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE)
 
 
 Seen = tuple[float, float, float, float, float]
@@ -210,7 +222,7 @@ def _modal_lines(
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2
     H = (frf.values[near] - evaluate(rest, s))[:, :, j] / s[:, None] ** DERIVATIVES[first.quantity]
     R = first.residues[mode, :, j]
-    variance = frf_variance(frf)[near][:, :, j] / q
+    variance = one.variance[near][:, :, j] / q
     return s.imag, H @ R.conj(), variance @ np.abs(R) ** 2
 
 

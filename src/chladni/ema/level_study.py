@@ -18,7 +18,7 @@ from .level_fit import (
     foretold,
     weights,
 )
-from .level_modes import AtLevel, ModeLevels, modes_over_levels
+from .level_modes import AtLevel, ModeLevels, chi2_about_mean, modes_over_levels
 from .ring_down import RingDown
 
 Signature = Literal[
@@ -175,9 +175,10 @@ def _studied(mode: ModeLevels) -> ModeStudy:
 
 def _p_of_runs(mode: ModeLevels) -> float:
     """Chance of such differences between runs at one level."""
-    total = 0.0
-    for y, s in zip((np.log(mode.frequency), np.log(mode.damping)), weights(mode), strict=True):
-        total += float((((y - np.average(y, weights=1 / s**2)) / s) ** 2).sum())
+    s_f, s_z = weights(mode)
+    total = chi2_about_mean(np.log(mode.frequency), s_f) + chi2_about_mean(
+        np.log(mode.damping), s_z
+    )
     return float(chi2.sf(total, 2 * (len(mode.level) - 1)))
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import LabelError
-from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
+from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solved
 from .pole_search import ROUNDING, STEADY, Solution, chi_of, own_spread, with_noise_left
 from .pole_search_by_parts import few_channels
 from .pole_selection import Rule, uncertainty
@@ -30,7 +30,7 @@ def by_subspace(data: PoleData, rule: Rule, stated: bool, states: int) -> Soluti
     if not 2 <= states <= most:
         raise LabelError(f"a state space of order {states}: {len(data.s)} lines carry 2 to {most}")
     p, _ = subspace(few_channels(data, COMBINATIONS), states).modes(states)
-    return _solution(data, *_refitted(data, p[-p.real < rule.largest * np.abs(p)]), stated)
+    return _solution(data, *solved(data, p[-p.real < rule.largest * np.abs(p)]), stated)
 
 
 def edited(
@@ -72,12 +72,6 @@ def _nearest(p: np.ndarray, f: float, f_max: float) -> int:
     return int(np.abs(there - f).argmin())
 
 
-def _refitted(data: PoleData, p: np.ndarray) -> tuple[PoleFit, PoleSystem]:
-    fit, slope = solve(data, p, slope=True)
-    assert slope is not None
-    return fit, slope
-
-
 def _solution(data: PoleData, fit: PoleFit, slope: PoleSystem, stated: bool) -> Solution:
     """With the spread, by the noise stated or by that which is left."""
     chi = chi_of(data, fit)
@@ -85,6 +79,6 @@ def _solution(data: PoleData, fit: PoleFit, slope: PoleSystem, stated: bool) -> 
         noise = max(1.0, chi) if stated else STEADY
         return Solution(fit, uncertainty(fit.p, slope, noise**2), chi)
     own = with_noise_left(data, data, fit)
-    again, its_slope = _refitted(own, fit.p)
+    again, its_slope = solved(own, fit.p)
     kept = replace(again, delta_chi2=fit.delta_chi2)
     return Solution(kept, own_spread(own, again, its_slope, chi), chi)

@@ -154,6 +154,18 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     return PoleFit(p, x, e, delta_chi2), PoleSystem(H, g) if slope else None
 
 
+def solved(data: PoleData, p: np.ndarray) -> tuple[PoleFit, PoleSystem]:
+    """Best residues for given poles, and how χ² changes with these."""
+    fit, slope = solve(data, p, slope=True)
+    assert slope is not None
+    return fit, slope
+
+
+def noise_left(data: PoleData, fit: PoleFit) -> float:
+    """χ² per degree of freedom: 1 where the weights know the noise and it is all that is left."""
+    return fit.chi2 / max(data.samples - fit.x.size - 2 * len(fit.p), 1)
+
+
 def _blocks(n_c: int, m: int) -> list[slice]:
     """Channels whose normal matrices (m, m) fit into memory together."""
     step = max(1, _TOGETHER // m**2)
@@ -194,10 +206,10 @@ def polish(
 
     ``largest`` is the highest damping ratio a pole may take.
     """
-    fit, slope = _solved(data, bounded(p, largest))
+    fit, slope = solved(data, bounded(p, largest))
     damping, taken = 1e-3, 0
     while taken < iterations and damping < 1e5:
-        trial, its_slope = _solved(data, bounded(fit.p + _step(slope, damping), largest))
+        trial, its_slope = solved(data, bounded(fit.p + _step(slope, damping), largest))
         if trial.chi2 > fit.chi2:
             damping *= 30
             continue
@@ -206,12 +218,6 @@ def polish(
         fit, slope = trial, its_slope
         if fall < tol:
             break
-    return fit, slope
-
-
-def _solved(data: PoleData, p: np.ndarray) -> tuple[PoleFit, PoleSystem]:
-    fit, slope = solve(data, p, slope=True)
-    assert slope is not None
     return fit, slope
 
 

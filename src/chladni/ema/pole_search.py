@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solve
+from .pole_fitting import PoleData, PoleFit, PoleSystem, noise_left, polish, solve
 from .pole_selection import (
     ORDERS,
     Rule,
@@ -115,4 +115,4 @@ def weights(variance: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 def chi_of(data: PoleData, fit: PoleFit) -> float:
     """Rms of the whitened residual over its degrees of freedom."""
-    return float(np.sqrt(fit.chi2 / max(data.samples - fit.x.size - 2 * len(fit.p), 1)))
+    return float(np.sqrt(noise_left(data, fit)))

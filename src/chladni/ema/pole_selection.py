@@ -9,7 +9,17 @@ from typing import Self
 
 import numpy as np
 
-from .pole_fitting import PoleData, PoleFit, PoleSystem, bounded, polish, relocated, solve, stacked
+from .pole_fitting import (
+    PoleData,
+    PoleFit,
+    PoleSystem,
+    bounded,
+    noise_left,
+    polish,
+    relocated,
+    solve,
+    stacked,
+)
 
 ORDERS = (6, 10, 15, 22, 31, 42, 56)
 _VF_STEPS = 6
@@ -19,21 +29,19 @@ BEYOND = 1.3  # as far outside the band a pole may stand for what rings there
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Poles of every order tried: the stabilisation diagram.
+    """Poles of every order tried.
 
     Attributes
     ----------
     order : (k,) int      number of pole pairs of the fit each pole comes from
     poles : (k,) complex  scaled as the data
     delta_chi2 : (k,)     rise of χ² without the pole
-    chi : (n_orders,)     rms of the whitened residual, by order
     orders : (n_orders,) int
     """
 
     order: np.ndarray
     poles: np.ndarray
     delta_chi2: np.ndarray
-    chi: np.ndarray
     orders: np.ndarray
 
 
@@ -56,8 +64,7 @@ class Rule:
 
     def after(self, data: PoleData, fit: PoleFit) -> Self:
         """The rule with the misfit of this fit as noise: what is systematic buys no poles."""
-        freedom = max(data.samples - fit.x.size - 2 * len(fit.p), 1)
-        return replace(self, noise=max(self.noise, fit.chi2 / freedom))
+        return replace(self, noise=max(self.noise, noise_left(data, fit)))
 
 
 def compressed(data: PoleData, most: int = 8) -> PoleData:
@@ -95,19 +102,16 @@ def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1
         for _ in range(_VF_STEPS):
             p = relocated(small, p)
         fit, _ = solve(data, bounded(p, 10 * largest))
-        parameters = fit.x.size + 2 * len(p)
         order += [n] * len(p)
         poles += list(fit.p)
         delta_chi2 += list(fit.delta_chi2)
         done.append(n)
-        chi.append(float(np.sqrt(fit.chi2 / max(data.samples - parameters, 1))))
-        score = fit.chi2 + 2 * parameters
+        chi.append(float(np.sqrt(noise_left(data, fit))))
+        score = fit.chi2 + 2 * (fit.x.size + 2 * len(p))
         if score > best and len(done) > 2 and chi[-1] < 1.2 * min(chi):
             break
         best = min(best, score)
-    return Sweep(
-        np.array(order), np.array(poles), np.array(delta_chi2), np.array(chi), np.array(done)
-    )
+    return Sweep(np.array(order), np.array(poles), np.array(delta_chi2), np.array(done))
 
 
 def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:

@@ -36,7 +36,7 @@ def equalised_noise(
     sigma = identified.chi * np.sqrt(frf_variance(frf, averages)[keep] / 2)
     w = omega_max**q / sigma.reshape(len(sigma), -1)
     p = identified.poles / omega_max
-    R = identified.residues.reshape(len(p), -1) / omega_max
+    R = identified.by_channel / omega_max
     line = 2j * np.pi * frf.frequency[keep] / omega_max
     F, second = linear(line, p, q), basis(line, p, q, 2)
     known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]

@@ -1,10 +1,12 @@
 """Noise of frequency responses: what a recording states, or what its own scatter shows."""
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..dynamics.frf import FRF
 
 SHARE, LEAST = 0.01, 1e-3  # of |H|, of its rms: assumed where nothing is stated
+_SMOOTH = 9  # lines over which the coherence is smoothed
 _POINTS, _DEGREE = 5, 3  # a cubic through five lines is the local smooth course
 _WEAK = 0.25  # share of the lines, the faintest, that show the additive noise
 _FEW = 24  # lines below which scatter says nothing
@@ -25,7 +27,7 @@ def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
         return frf.variance + (1e-4 * H) ** 2 + (1e-6 * rms) ** 2
     if frf.coherence is not None:
         gamma = np.clip(frf.coherence, 1e-3, 1.0)
-        ratio = _smooth((1 - gamma) / gamma) / averages
+        ratio = moving_mean((1 - gamma) / gamma, _SMOOTH) / averages
         return (ratio + SHARE**2) * H**2 + (1e-4 * rms) ** 2
     return (SHARE * H) ** 2 + np.maximum(faint_scatter(frf), LEAST * np.nan_to_num(rms)) ** 2
 
@@ -88,9 +90,6 @@ def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndar
     return np.asarray(np.nanmedian(picked, axis=0) / _MEDIAN)
 
 
-def _smooth(x: np.ndarray, width: int = 9) -> np.ndarray:
-    """Moving mean over the first axis, ends held."""
-    half = min(width, len(x)) // 2
-    padded = np.pad(x, ((half + 1, half), *[(0, 0)] * (x.ndim - 1)), mode="edge")
-    total = padded.cumsum(axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+def moving_mean(x: np.ndarray, lines: int) -> np.ndarray:
+    """Mean over so many lines about each (n_f, ...), ends held."""
+    return np.asarray(uniform_filter1d(x, min(lines, len(x)), axis=0, mode="nearest"))

@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.special import gammaincc
 
 from ..dynamics.frf import FRF
-from ..errors import ShapeError
+from ..errors import ShapeError, named
 from .correlation import wrapped
 from .finding import Check, Finding
+from .response_variance import moving_mean
 from .setup import Recording
 
 _LN10 = np.log(10.0)
@@ -108,8 +110,9 @@ class Homogeneity:
     limit : float           ratio that chance does not reach
     linear : bool
     p : float               of so large a ratio by chance, N ratio being of a gamma distribution
-    channels : tuple of str  outputs beyond the limit, the worst first; none where it is linear
-    bands : ((low, high), ...)  where lines are beyond it [Hz], the worst first; none likewise
+    channels : tuple of str  outputs whose own ratio is beyond chance, the worst first; none where it
+        is linear
+    bands : ((low, high), ...)  runs of such lines [Hz], the worst first; none likewise
     """
 
     ratio: float
@@ -126,6 +129,7 @@ class Homogeneity:
 
 _POOLED = 15  # lines over which a variance is taken: one of few averages is too uncertain alone
 _ABOUT = 31  # lines by which a band is known
+_NAMED = 4  # channels and bands, in words
 _CHANCE = 0.1  # what the uncertain variances of five sweeps leave of the mean ratio, and more
 
 
@@ -156,12 +160,12 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     H1, H2 = low.values[at], _interpolated(f, high.frequency, high.values)
     noise = noise_of(low)[at] + _interpolated(f, high.frequency, noise_of(high)).real
     rounding = 1e-12 * np.abs(H1) ** 2 + 1e-300
-    whitened = np.abs(H2 - H1) ** 2 / np.maximum(_about(noise, _POOLED), rounding)
+    whitened = np.abs(H2 - H1) ** 2 / np.maximum(moving_mean(noise, _POOLED), rounding)
     delta = wrapped(np.log(H2 / H1) / _LN10)
     ratio, rms = float(whitened.mean()), float(np.sqrt((np.abs(delta) ** 2).mean()))
     limit = 1 + max(_CHANCE, 5 / np.sqrt(whitened.size))
     linear = bool(ratio <= limit or rms <= least)
-    channel, line = whitened.mean(axis=0), _about(whitened.mean(axis=(1, 2)), _ABOUT)
+    channel, line = whitened.mean(axis=0), moving_mean(whitened.mean(axis=(1, 2)), _ABOUT)
     return Homogeneity(
         ratio=ratio,
         rms=rms,
@@ -174,13 +178,6 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
         channels=() if linear else _beyond(low.outputs, channel.max(axis=1), len(f)),
         bands=() if linear else _bands_beyond(f, line),
     )
-
-
-def _about(x: np.ndarray, lines: int) -> np.ndarray:
-    """Mean over so many lines about each (n_f, ...)."""
-    from scipy.ndimage import uniform_filter1d
-
-    return np.asarray(uniform_filter1d(x, min(lines, len(x)), axis=0, mode="nearest"))
 
 
 def _beyond(outputs: Sequence[str], ratio: np.ndarray, lines: int) -> tuple[str, ...]:
@@ -218,8 +215,8 @@ def levels_checked(
             f"{compared.rms:.2g} decades rms), {_worst(compared)}: not linear."
         )
         mend = "name one level by use in case.toml, and read the result as that level's own"
-        named = compared.channels[:_NAMED]
-        found.append(Finding("not linear", sentence, "warning", named, mend, compared.ratio))
+        worst = compared.channels[:_NAMED]
+        found.append(Finding("not linear", sentence, "warning", worst, mend, compared.ratio))
     needs = {"homogeneity": "needs two levels", "repeatability": "needs a second recording"}
     checks = [
         Check(name, "; ".join(lines) or needs[name], name not in odd if lines else None)
@@ -228,15 +225,11 @@ def levels_checked(
     return found, checks
 
 
-_NAMED = 4  # channels and bands
-
-
 def _worst(h: Homogeneity) -> str:
     """Channels and bands in which two levels differ most, in words."""
     said = f"most near {h.frequency[h.line.argmax()]:.4g} Hz"
     if h.channels:
-        more = f" and {len(h.channels) - _NAMED} more" if len(h.channels) > _NAMED else ""
-        said += f", at {', '.join(h.channels[:_NAMED])}{more}"
+        said += f", at {named(h.channels, _NAMED)}"
     if h.bands:
         bands = ", ".join(f"{a:.4g} to {b:.4g} Hz" for a, b in h.bands[:_NAMED])
         said += f", in {bands}"
@@ -274,8 +267,6 @@ def roughness(frf: FRF) -> np.ndarray:
     The residual of the middle of five against the least-squares parabola has variance 18/35 σ²
     on an even grid; medians over 21 lines keep resonances out.
     """
-    from scipy.ndimage import median_filter
-
     n = len(frf.frequency)
     if n < 5:
         raise ShapeError(f"{n} lines are too few to see the noise in")

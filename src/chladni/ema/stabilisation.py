@@ -104,8 +104,7 @@ def prominence(found: Identified) -> np.ndarray:
 
     Below one no peak stands where the pole does.
     """
-    p = found.poles
-    R = found.residues.reshape(len(p), int(np.prod(found.residues.shape[1:])))
+    p, R = found.poles, found.by_channel
     at = 1j * np.abs(p)[:, None]
     matrix = 1 / (at - p)
     own = np.abs(np.diag(matrix)) * np.linalg.norm(R, axis=1)

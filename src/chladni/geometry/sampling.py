@@ -1,4 +1,4 @@
-"""A few points that cover many."""
+"""A few points that cover many, or lie nearest to places."""
 
 import numpy as np
 
@@ -25,3 +25,12 @@ def farthest_point_sample(points: np.ndarray, count: int) -> np.ndarray:
         far = np.minimum(far, away) if len(order) > 1 else away
         far[order] = -1.0  # one of several points at one place is not taken twice
     return np.array(order, dtype=int)
+
+
+def nearest_points(points: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Row of the point (n, d) nearest to each place (k, d); of equally near ones the first.
+
+    >>> nearest_points(np.array([[0.0], [1.0], [3.0]]), np.array([[2.0], [-9.0]]))
+    array([1, 0])
+    """
+    return np.array([((points - x) ** 2).sum(axis=1).argmin() for x in places], dtype=int)

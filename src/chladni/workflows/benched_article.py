@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from ..bench.accelerometers import AccelerometerType
 from ..bench.article_scatter import Scatter, drawn_damping
 from ..bench.bench_article import BenchArticle
+from ..bench.local_forces import LocalForce
 from ..dynamics.residual import with_residual_vectors
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
@@ -151,7 +152,7 @@ def _dissipated(built: Structure, phi: np.ndarray, f: np.ndarray) -> np.ndarray:
     return out
 
 
-def with_site(article: BenchArticle, row: np.ndarray, law: object) -> BenchArticle:
+def with_site(article: BenchArticle, row: np.ndarray, law: LocalForce) -> BenchArticle:
     """One more local force along the motion row (r,)."""
     sites = np.vstack([article.sites, row[None]]) if len(article.laws) else row[None]
-    return replace(article, sites=sites, laws=(*article.laws, law))  # type: ignore[arg-type]
+    return replace(article, sites=sites, laws=(*article.laws, law))

@@ -58,7 +58,6 @@ from .screening_of_case import (
 )
 
 BLIND_SHARE = 0.05  # of the shells
-_NAMELESS = "nothing is named: "
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +113,6 @@ def explained(
     if diagnosing:
         found = withheld(prepared, found)
     found, distrust = _judged(asked, prepared, found)
-    if diagnosing and prepared.too_little:
-        distrust = (f"{_NAMELESS}{prepared.too_little}", *distrust)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -130,8 +127,8 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     result = _result(asked, prepared, found, stages)
     result = over_levels(asked, prepared, stages, result, diagnosing)
     distrust = known.distrust
-    if result.verdict == "nonlinear":  # what is named is named by the levels
-        distrust = tuple(why for why in distrust if not why.startswith(_NAMELESS))
+    if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
+        distrust = (f"nothing is named: {prepared.too_little}", *distrust)
     said = () if known.screening is None else known.screening.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
     return replace(

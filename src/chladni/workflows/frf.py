@@ -89,7 +89,18 @@ def _labels(side: Side) -> tuple[str, ...]:
 
 
 def placed_layout(model: Model, path: Path) -> tuple[Model, MeasuredDofs, MeasuredDofs]:
-    """The model with the sensors of a layout on it, its outputs and its inputs.
+    """The model with the sensors of a layout on it, and its places as :func:`layout_places`."""
+    outputs, inputs = layout_places(model, path)
+    if not (masses := carried(model.assembly, outputs, inputs)):
+        return model, outputs, inputs
+    grids, m = zip(*masses, strict=True)
+    said = f"Sensors of {1e3 * sum(m):.3g} g in all ({path.name}) are on the model."
+    loaded = with_masses(model.assembly, grids, np.array(m))
+    return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
+
+
+def layout_places(model: Model, path: Path) -> tuple[MeasuredDofs, MeasuredDofs]:
+    """Outputs and inputs of a layout on a model.
 
     Parameters
     ----------
@@ -108,12 +119,7 @@ def placed_layout(model: Model, path: Path) -> tuple[Model, MeasuredDofs, Measur
     )
     if outputs.base.any() or inputs.base.any():
         raise FileError(f"{path}: give a moving base as --input base:+Z")
-    if not (masses := carried(model.assembly, outputs, inputs)):
-        return model, outputs, inputs
-    grids, m = zip(*masses, strict=True)
-    said = f"Sensors of {1e3 * sum(m):.3g} g in all ({path.name}) are on the model."
-    loaded = with_masses(model.assembly, grids, np.array(m))
-    return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
+    return outputs, inputs
 
 
 def _between(

@@ -157,7 +157,7 @@ def identify(
             progress(f"poles of {recording.name}", k / len(held))
             found.append(_modes(recording, band, gaps, averages, () if k else held, choice))
     screenings = [note for r in found for note in r.screening.notes]
-    levels = _levels(found)
+    levels = _levels(found, averages)
     said = [*screenings, *said]
     notes = [
         *choice.notes,
@@ -231,14 +231,14 @@ def _notes(
     return tuple(notes)
 
 
-def _levels(found: Sequence[RecordingModes]) -> tuple[LevelStudy, ...]:
+def _levels(found: Sequence[RecordingModes], averages: int) -> tuple[LevelStudy, ...]:
     """Modes over levels, of each article and state by itself."""
     alike: dict[tuple[str, str], list[AtLevel]] = {}
     for one in found:
         r = one.recording
         assert r.frf is not None
         alike.setdefault((r.article, r.state), []).append(
-            AtLevel(r.level, r.frf, one.whole, r.control)
+            AtLevel(r.level, r.frf, one.whole, r.control, averages)
         )
     studies = [level_study(group) for group in alike.values()]
     return tuple(s for s in studies if s.modes)

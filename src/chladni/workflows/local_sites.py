@@ -7,7 +7,8 @@ import numpy as np
 
 from ..bench.bench_article import BenchArticle
 from ..bench.bench_recording import BenchTest
-from ..bench.bench_rig import BenchSetup, bench_rig
+from ..bench.bench_rig import BenchRig
+from ..bench.drive_signals import pink_rms
 from ..bench.local_forces import Clearance, CubicSpring, JenkinsSlider, LocalForce
 from .benched_article import with_site
 
@@ -32,19 +33,18 @@ LOCAL = {"clearance": _clearance, "cubic-spring": _cubic, "friction": _friction}
 
 
 def local_site(
-    article: BenchArticle, setup: BenchSetup, names: Sequence[str], test: BenchTest,
-    rng: np.random.Generator,
-) -> tuple[BenchArticle, list[dict[str, Any]]]:  # fmt: skip
-    """Local forces to ground at places of sensors drawn at random, and what each is.
+    rig: BenchRig, names: Sequence[str], test: BenchTest, rng: np.random.Generator
+) -> tuple[BenchArticle, list[dict[str, Any]]]:
+    """The article with local forces to ground at sensors drawn at random, and what each is.
 
     Their size goes by the rms displacement that the test causes there: pink noise of its level, or
     a sine of its force at the frequency that moves most.
     """
-    truth = []
+    truth, article = [], rig.article
     order = rng.permutation(len(article.outputs))
     first = article.frequency[article.elastic].min()
     k = STRONG * article.weight * (2 * np.pi * first) ** 2
-    rms = _rms(article, setup, test)
+    rms = _rms(rig, test)
     for at, name in zip(order, names, strict=False):
         law = LOCAL[name](k, float(rms[at]))
         article = with_site(article, article.outputs[at], law)
@@ -53,13 +53,12 @@ def local_site(
     return article, truth
 
 
-def _rms(article: BenchArticle, setup: BenchSetup, test: BenchTest) -> np.ndarray:
+def _rms(rig: BenchRig, test: BenchTest) -> np.ndarray:
     """Of the displacement at every sensor (n_out,) [m]."""
     f = np.geomspace(*test.band, 3000)
     s = 2j * np.pi * f
-    H = bench_rig(article, setup).measured.response(s)[:, :, 0]
+    H = rig.measured.response(s)[:, :, 0]
     x = np.abs(H[:, 1:] / (s**2)[:, None])
     if test.excitation == "stepped-sine":
         return np.asarray(test.level * (x / np.abs(H[:, :1])).max(axis=0) / np.sqrt(2))
-    density = 1 / f / np.trapezoid(1 / f, f)
-    return np.asarray(test.level * np.sqrt(np.trapezoid(x**2 * density[:, None], f, axis=0)))
+    return np.asarray(test.level * pink_rms(f, x))

@@ -82,7 +82,8 @@ def matched(
         for role, labels in sides
         for label in labels
     ]
-    idle = [s.label for s in table if (s.label, s.role) not in {(d.label, d.role) for d in found}]
+    asked = {(d.label, d.role) for d in found}
+    idle = [s.label for s in table if (s.label, s.role) not in asked]
     if idle:
         notes.append(f"rows of the table given that are not in {recording.name}: {named(idle)}")
     return found, notes

@@ -10,7 +10,7 @@ from ..progress import Progress, silent
 from ..updating.detectable import NOISE, Detectable, detectable
 from ..updating.map_fit import MassMeasurement
 from ..updating.question import Question
-from .frf import placed_layout
+from .frf import layout_places
 from .loaded_model import Model
 from .question_of_case import MASS_SD
 
@@ -40,7 +40,7 @@ def smallest_findings(
     if not len(model.assembly.shells):
         raise FileError(f"{model.source} has no shells, and what is looked for sits on shells")
     progress("predicted evidence", 0.1)
-    _, outputs, inputs = placed_layout(model, layout)
+    outputs, inputs = layout_places(model, layout)
     asked = Question(
         model.assembly, outputs, inputs, band=band,
         carried=carried(model.assembly, outputs, inputs),

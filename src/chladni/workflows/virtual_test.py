@@ -1,7 +1,7 @@
 """The virtual test: a case's structure on the bench, its articles, excitations and levels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 import numpy as np
@@ -23,13 +23,16 @@ from ..bench.drive_signals import Kind
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
 from ..bench.sine_sweep import swept
 from ..case import Case
+from ..dynamics.modes import rigid_modes
 from ..effects.family import Article
 from ..effects.registry import family
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.refine import refined
+from ..geometry.sampling import nearest_points
 from ..progress import Progress, silent, within
 from .benched_article import benched, true_places
+from .loaded_model import as_model
 from .local_sites import LOCAL, local_site
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -106,7 +109,7 @@ class BenchResult:
     truth: dict[str, Any]
     schedule: tuple[SineLine, ...] = ()
     cords: tuple[float, ...] = ()
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
 
 def virtual_test(
@@ -165,18 +168,20 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         setup = replace(setup, shaker=None)
     scatter = fitted()
     nominal, truth = _article(case, settings, setup, band, scatter, rng)
-    level = settings.level or level_for(bench_rig(nominal, setup), settings.excitation, band)
+    plain = bench_rig(nominal, setup)
+    level = settings.level or level_for(plain, settings.excitation, band)
     if settings.local:
         sized = BenchTest(settings.excitation, band, level)
-        nominal, sites = local_site(nominal, setup, settings.local, sized, rng)
+        nominal, sites = local_site(plain, settings.local, sized, rng)
         truth["local"] = sites
-    articles = _drawn(nominal, settings, scatter, ABOVE_BAND * band[1], rng)
+    differ = ABOVE_BAND * band[1]
+    articles = _drawn(nominal, settings, scatter, differ, rng)
     schedule = (
         dwells_of(stages_for(*band, settings.delay))
         if settings.excitation == "stepped-sine"
         else ()
     )
-    channels = channels_of(bench_rig(nominal, setup), rng)
+    channels = channels_of(plain, rng)
     truth["sensitivity"] = channels.true / channels.stated
     recordings: list[BenchRecording] = []
     jobs = [(a, factor) for a in articles for factor in settings.levels]
@@ -191,8 +196,8 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     mass = articles[0].weight * (1 + BALANCE * rng.normal())
     truth |= {
         "weight_kg": {a.name: a.weight for a in articles},
-        "frequency_hz": {a.name: a.frequency[a.frequency < 1.5 * band[1]] for a in articles},
-        "damping": {a.name: a.damping[a.frequency < 1.5 * band[1]] for a in articles},
+        "frequency_hz": {a.name: a.frequency[a.frequency < differ] for a in articles},
+        "damping": {a.name: a.damping[a.frequency < differ] for a in articles},
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
@@ -221,14 +226,7 @@ def _band(case: Case) -> tuple[float, float]:
     if named:
         low, high = min(b[0] for b in named), max(b[1] for b in named)
         return max(LEAST, BELOW * low), BEYOND * high
-    from ..dynamics.eigen import normal_modes
-    from ..dynamics.modes import rigid_modes
-    from ..fem.assemble import structure
-    from ..fem.modelled import node_points
-
-    built = structure(case.assembly)
-    count = min(MODES + 6, len(built.system.dofs))
-    modal = normal_modes(built.system, count, points=node_points(built))
+    modal = as_model(case).modes(MODES + 6)
     f = modal.frequency[~rigid_modes(modal)]
     return max(LEAST, BELOW * float(f[0])), BEYOND * float(f[-1])
 
@@ -263,8 +261,7 @@ def _article(
 def _grids(case: Case) -> np.ndarray:
     """Grid of the deck at or nearest to every output (n_out,)."""
     a, out = case.assembly, case.outputs
-    d2 = ((a.points[None] - out.points[:, None]) ** 2).sum(axis=-1)
-    return np.where(out.grids > 0, out.grids, a.ids[d2.argmin(axis=1)])
+    return np.where(out.grids > 0, out.grids, a.ids[nearest_points(a.points, out.points)])
 
 
 def _drawn(
