@@ -286,6 +286,15 @@ def test_a_pole_is_dropped_by_its_frequency_and_only_a_pole(case, tmp_path):
     assert not (tmp_path / "no").exists()
 
 
+def test_how_to_estimate_is_known_and_told_where_nothing_is_estimated(case, tmp_path):
+    refused = call("test", case / "frf.uff", "--excitation", "shock", "--out", tmp_path / "no")
+    assert (refused.exit_code, (tmp_path / "no").exists()) == (2, False)
+    done = call("test", case / "frf.uff", "--excitation", "hammer", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert "Nothing was estimated" in done.output
+    assert "Nothing was estimated" not in call("test", case, "--out", tmp_path / "plain").output
+
+
 def test_a_recording_of_the_model_itself_lacks_nothing(case, tmp_path):
     """The model's own responses are explained by the model; the answer is whole and readable."""
     (case / "case.toml").write_text(CASE.replace("fit = [25.0, 180.0]", "fit = [20.0, 170.0]"))

@@ -93,6 +93,9 @@ def test_a_long_run_without_a_terminal_says_what_it_does(monkeypatch, capfd):
 def test_nothing_in_a_file_steers_the_terminal(capsys):
     say("\x1b[31mred\x07 \u202eright to left\tkept")
     assert capsys.readouterr().out == "?[31mred? ?right to left\tkept\n"
+    with opened_console(verbose=True) as one:
+        one.aside("a name\x1b[2J")
+    assert capsys.readouterr().err.endswith("a name?[2J\n")
     assert plain_line("Ärger µm² – “q”") == "Ärger µm² – “q”"
 
 

@@ -82,6 +82,18 @@ def test_a_place_inside_a_shell_moves_as_its_corners_do(planned, tmp_path):
         np.testing.assert_allclose(held["values"][:, 0, 0], due, rtol=1e-4)
 
 
+def test_a_sensor_may_have_a_name(planned, tmp_path):
+    """What no universal file can hold is left out of it and said; the others have it."""
+    table = tmp_path / "sensors.csv"
+    rows = ["label,grid,nx,ny,nz,role", "A1:+Z,9,0,0,1,output", "shaker:+Z,2,0,0,1,input"]
+    table.write_text("\n".join(rows))
+    words = ["--units", "mm-t-s", "--sensors", table, "--band", "20:150", "--lines", 5]
+    call("frf", planned[0], *words, "--out", tmp_path / "out")
+    with np.load(tmp_path / "out" / "frf.npz", allow_pickle=False) as held:
+        assert held["outputs"].tolist() == ["A1:+Z"]
+    assert not (tmp_path / "out" / "frf.uff").exists()
+
+
 @pytest.mark.parametrize(
     ("text", "name", "told"),
     [
@@ -113,7 +125,9 @@ def test_a_plan_tells_what_it_would_find(planned, tmp_path):
     """The table on the page, a map, and JSON place by place."""
     deck, _ = planned
     words = ["--units", "mm-t-s", "--sensors", 8, "--modes", 5, "--drawn", 0, "--detect"]
-    call("plan", deck, *words, "--out", tmp_path)
+    done = call("plan", deck, *words, "--out", tmp_path)
+    assert "What this layout would find" in done.output
+    assert "\nsoftening " in done.output  # the table, on the terminal too
     rows = json.loads((tmp_path / "smallest.json").read_text())["mass"]
     weight = chladni.modes(chladni.load(deck, "mm-t-s"), 7).mass
     assert all(row["mass_kg"] is None or 0 < row["mass_kg"] < weight for row in rows)

@@ -183,6 +183,7 @@ def test_a_case_without_sensors_is_refused(case):
     ("words", "said"),
     [
         (["--levels", "a"], "is not of the form"),
+        (["--level", "-2"], "--level"),
         (["--excitation", "noise"], "no excitation"),
         (["--sensors", "x.csv"], "names its sensors"),
         (["--band", "100:20"], "must increase"),
@@ -194,6 +195,15 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, sai
     )
     assert done.exit_code == 2
     assert said in done.output
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_table_that_is_no_text_is_told(demo, tmp_path):
+    (tmp_path / "x.csv").write_bytes(bytes(range(128, 200)))
+    words = ["--units", "mm-t-s", "--sensors", tmp_path / "x.csv", "--out", tmp_path / "o"]
+    done = CliRunner().invoke(application(), ["bench", str(demo / "deck.bdf"), *map(str, words)])
+    assert done.exit_code == 2, done.output
+    assert "is not UTF-8 text" in done.output
     assert not (tmp_path / "o").exists()
 
 

@@ -1,5 +1,6 @@
 """``chladni bench``: a virtual test of a case or a deck, and the case it leaves."""
 
+import shutil
 import tempfile
 from pathlib import Path
 from typing import Annotated, cast
@@ -9,10 +10,11 @@ import typer
 from ..bench.drive_signals import Kind
 from ..case import Case, load_case
 from ..errors import FileError
+from ..output import write_text
 from ..planning import PlanSettings, plan, sensors_csv
 from ..progress import Progress, within
 from ..report.result_json import to_json
-from ..workflows.loaded_model import is_case, load_deck, load_model
+from ..workflows.loaded_model import beside, is_case, load_deck
 from ..workflows.virtual_test import BenchSettings, virtual_test
 from .run import Out, Units, limits, started
 
@@ -25,7 +27,9 @@ def run(
     band: Annotated[str, typer.Option(help="From and to, in Hz; default that of the case.")] = "",
     level: Annotated[
         float | None,
-        typer.Option(help="[N]; default: the strongest channel takes a quarter of its range."),
+        typer.Option(
+            help="[N]; default: the strongest channel takes a quarter of its range.", min=1e-9
+        ),
     ] = None,
     levels: Annotated[str, typer.Option(help="Factors on the level, as 0.5,1,2.")] = "1",
     articles: Annotated[int, typer.Option(help="How many, each scattered.")] = 1,
@@ -117,24 +121,25 @@ def _case(
         if sensors is not None or units is not None:
             raise FileError(f"{source} is a case, which names its sensors and units itself")
         return load_case(source)
-    deck = load_deck(source, units).deck
+    bare = load_deck(source, units)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
-    if sensors is not None:
-        if not sensors.is_file():
-            raise FileError(f"no file {sensors}")
-        table, hangers = sensors.read_text(encoding="utf-8"), ""
-    else:
+    table, hangers = scratch / "sensors.csv", ""
+    if sensors is None:
         progress("planning the sensors", 0.1)
-        made = plan(load_model(source, units).assembly, PlanSettings(draws=0))
-        table, hangers = sensors_csv(made), f"hangers = {[int(h) for h in made.hangers]}\n"
-    (scratch / "sensors.csv").write_text(table, encoding="utf-8")
+        made = plan(bare.model().assembly, PlanSettings(draws=0))
+        write_text(table, sensors_csv(made))
+        hangers = f"hangers = {[int(h) for h in made.hangers]}\n"
+    elif not sensors.is_file():
+        raise FileError(f"no file {sensors}{beside(sensors)}")
+    else:  # as it is: what is wrong in it is told where it is read
+        shutil.copyfile(sensors, table)
     from ..io.nastran import write_deck
 
-    write_deck(deck, scratch / "deck.bdf", [])
-    (scratch / "case.toml").write_text(
+    write_deck(bare.deck, scratch / "deck.bdf", [])
+    write_text(
+        scratch / "case.toml",
         f'[model]\ndeck = "deck.bdf"\nunits = "{units}"\n'
         f'[test]\nsensors = "sensors.csv"\n{hangers}',
-        encoding="utf-8",
     )
     return load_case(scratch)

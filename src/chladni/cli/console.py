@@ -90,12 +90,12 @@ def console() -> Console:
 def say(text: str, error: bool = False) -> None:
     """A line on standard output or standard error, and in the log."""
     console().logged(text)
-    _echo(plain_line(text), error)
+    _echo(text, error)
 
 
 def _echo(text: str, error: bool) -> None:
     try:
-        typer.echo(text, err=error)
+        typer.echo(plain_line(text), err=error)
     except BrokenPipeError:  # as of `| head`: who reads has gone, the work goes on
         stream = sys.stderr if error else sys.stdout
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -90,8 +90,7 @@ def _written(
     places = {int(n): nodes[int(n)] for n in named if n.isdecimal() and int(n) in nodes}
     for side in ends:
         if isinstance(side, MeasuredDofs):
-            nodes_of = (label.partition(":")[0] for label in side.labels)
-            places |= {int(n): x for n, x in zip(nodes_of, side.points, strict=True)}
+            places |= side.nodes
     path = job.folder / f"{stem}.uff"
     try:
         write_uff(path, one, places, title=job.source.name)

@@ -40,11 +40,9 @@ def run(
     limit = limits(band) if band else None
     choice = PoleChoice(states, tuple(drop or ()), tuple(pick or ()))
     with started("identify", source, out) as job:
-        if source.exists() and is_case(source):
-            found = identify(load_case(source), limit, averages, job.progress, choice)
-        else:
-            recordings = load_recordings(source, quantity or None)
-            found = identify(recordings, limit, averages, job.progress, choice)
+        is_one = source.exists() and is_case(source)
+        read = load_case(source) if is_one else load_recordings(source, quantity or None)
+        found = identify(read, limit, averages, job.progress, choice)
         job.json("identified.json", to_json(found))
         job.show(identification_page(job.folder, found))
     found.trusted()

@@ -1,5 +1,6 @@
 """``chladni plan``: where to put sensors and shakers, and which lines to measure."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -72,10 +73,14 @@ def run(
         found = plan(model, settings, within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))
         job.progress("pictures", 0.7)
-        job.show(plan_page(job.folder, model, found))
+        parts = plan_page(job.folder, model, found)
         if detect:
             band, stage = durations(found).band_hz, within(job.progress, 0.8, 1.0)
             smallest = smallest_findings(model, job.folder / "plan.json", band, noise, stage)
             job.json("smallest.json", to_json(smallest), "smallest findings, place by place")
-            job.files.append(("smallest_mass.png", "smallest mass that would be found"))
-            job.sections.append(detectable_section(job.folder, model, smallest, noise))
+            section = detectable_section(job.folder, model, smallest, noise)
+            picture = ("smallest_mass.png", "smallest mass that would be found")
+            parts = replace(
+                parts, sections=[*parts.sections, section], files=[*parts.files, picture]
+            )
+        job.show(parts)

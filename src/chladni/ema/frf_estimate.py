@@ -72,6 +72,13 @@ class FrfEstimate:
     notes: tuple[str, ...] = ()
 
 
+def refuse_unknown(settings: EstimateSettings) -> None:
+    """Refuse an excitation or a method of no such name."""
+    for word, known in ((settings.excitation, Excitation), (settings.method, Method)):
+        if word is not None and word not in get_args(known):
+            raise LabelError(f"no {word!r}; there are {', '.join(get_args(known))}")
+
+
 def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()) -> FrfEstimate:
     """FRFs by the road that suits the excitation.
 
@@ -82,9 +89,7 @@ def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()
     LabelError
         If excitation or method have no such name.
     """
-    for word, known in ((settings.excitation, Excitation), (settings.method, Method)):
-        if word is not None and word not in get_args(known):
-            raise LabelError(f"no {word!r}; there are {', '.join(get_args(known))}")
+    refuse_unknown(settings)
     if not record.force.any():
         raise FileError("the inputs are zero throughout, so nothing was excited")
     if not record.response.any():

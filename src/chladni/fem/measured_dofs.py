@@ -38,6 +38,14 @@ class MeasuredDofs:
         """True where the dof is the enforced motion of the supports (k,)."""
         return np.isnan(self.points[:, 0])
 
+    @property
+    def nodes(self) -> dict[int, np.ndarray]:
+        """Places (3,) [m] by the node of the label; a label that begins with a name has none."""
+        named = (
+            (label.partition(":")[0], x) for label, x in zip(self.labels, self.points, strict=True)
+        )
+        return {int(node): x for node, x in named if node.isdecimal()}
+
     def rows(self, built: Structure) -> sp.csr_array:
         """Motion of each dof over the free dofs of the structure (k, n); the base has none (zero).
 

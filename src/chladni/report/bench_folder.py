@@ -31,8 +31,8 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
     write_text(place / "sensors.csv", _sensors(found))
     names = file_names(found.recordings)
     files: Files = [("case/case.toml", "a case with these recordings")]
+    nodes = found.outputs.nodes | found.inputs.nodes  # as the user believes
     for name, r in zip(names, found.recordings, strict=True):
-        nodes = _nodes(found)
         write_uff(place / f"{name}.uff", r.frf, nodes, stamp(r.averages, r.added_damping))
         files.append((f"case/{name}.uff", f"FRFs of article {r.article}, {r.test.level:.3g} N"))
         if r.time is not None:
@@ -51,17 +51,6 @@ def file_names(recordings: tuple[BenchRecording, ...]) -> list[str]:
         f"article_{r.article}" + f"_{r.test.level:.3g}N" * (count[r.article] > 1)
         for r in recordings
     ]
-
-
-def _nodes(found: BenchResult) -> dict[int, np.ndarray]:
-    """Places of the dofs by the number of their label, as the user believes."""
-    out = {}
-    for dofs in (found.outputs, found.inputs):
-        for label, x in zip(dofs.labels, dofs.points, strict=True):
-            node = label.partition(":")[0]
-            if node.isdecimal():
-                out[int(node)] = x
-    return out
 
 
 def _sensors(found: BenchResult) -> str:

@@ -81,7 +81,8 @@ def lead(found: BenchResult) -> str:
     low, high = found.band
     hidden, loud = len(s.hide) + len(s.local), sum(bool(x.overloads) for x in r)
     return (
-        f"{len(r)} recordings of {s.articles} articles by {s.excitation}, "
+        f"{len(r)} recording{'s' * (len(r) > 1)} of {s.articles} article{'s' * (s.articles > 1)} "
+        f"by {s.excitation}, "
         f"{len(found.outputs.labels)} sensors, {number(low)} to {number(high)} Hz"
         + (f"; {hidden} concealed" if hidden else "")
         + (f"; {loud} of them overloaded" if loud else "")

@@ -7,7 +7,7 @@ from ..case import Case
 from ..output import plain
 from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
-from ..workflows.case_model import markers
+from ..workflows.case_model import cords, markers
 from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table
 from .words import number
 
@@ -28,11 +28,12 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
     from ..view import scene
 
     path = folder / "sensors.png"
-    scene.sensors(path, surface(case.assembly), markers(case.outputs), markers(case.inputs))
+    ends = markers(case.outputs), markers(case.inputs)
+    scene.sensors(path, surface(case.assembly), *ends, cords=cords(case))
     looks = [
         f"{'Fault: ' if f.fault else ''}{f.text}. What to do: {f.remedy}" for f in found.findings
     ]
-    blocks: list[Block] = [Picture(path, "Blue: sensors; red: shakers; arrows: their directions.")]
+    blocks: list[Block] = [Picture(path, "Sensors, shakers and cords; arrows: their directions.")]
     if found.dofs:
         blocks.append(_table(found.dofs))
     modes = ", ".join(number(f) for f in found.frequency)

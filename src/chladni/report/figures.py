@@ -158,7 +158,7 @@ def mac_picture(folder: Path, shown: Shown) -> dict[str, Path]:
         return {}
     mac, test, model = shown.mac
     rows, columns = ([hertz(f) for f in side] for side in (test, model))
-    title = "MAC [%]: test (rows), model (columns)" + (", pairs framed" if shown.pairs else "")
+    title = "Test (rows), model (columns) [Hz]" + (", pairs framed" if shown.pairs else "")
     path = folder / "mac.png"
     return {"mac": plots.mac_matrix(path, mac, rows, columns, title, shown.pairs)}
 

@@ -13,7 +13,7 @@ from ..ema.shapes import driven_shapes, shapes
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_poles
 from ..workflows.identify import Identification, RecordingModes
-from .blocks import Block, PageParts, Picture, Section, Table
+from .blocks import PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
 from .screening_blocks import screening_section
 from .words import hertz, number
@@ -21,6 +21,13 @@ from .words import hertz, number
 _SHOWN = 6  # channels drawn
 _CIRCLES = 30  # modes drawn
 _MATRIX = 40  # modes of an AutoMAC that can still be read
+_FILES = {
+    "stabilisation": "stabilisation diagram",
+    "indicators": "mode indicators",
+    "fit": "the recording and the identified model",
+    "circles": "Nyquist circles of the modes",
+    "automac": "AutoMAC of the modes",
+}
 _AROUND = 4.0  # half bandwidths of a circle
 
 
@@ -31,10 +38,10 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
-        sections.append(Section(name, [_table(r), *_pictures(folder, stem, r)]))
+        pictures = _pictures(folder, stem, r)
+        sections.append(Section(name, [_table(r), *pictures]))
         files += _modal_files(folder, stem, r)
-        files.append((f"stabilisation{stem}.png", "stabilisation diagram"))
-        files.append((f"fit{stem}.png", "the recording and the identified model"))
+        files += [(p.path.name, _FILES[p.path.stem.removesuffix(stem)]) for p in pictures]
     for k, study in enumerate(found.levels):
         tables = level_tables(study)
         drawn = draw_levels(folder, tables, "" if len(found.levels) == 1 else f"_{k + 1}")
@@ -90,24 +97,24 @@ def _table(r: RecordingModes) -> Table:
     return Table(heads, rows, caption=caption)
 
 
-def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Block]:
+def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Picture]:
     from ..view import modal_plots, plots
 
     frf, modal = r.recording.frf, r.modes
     assert frf is not None
     inside = (modal.band[0] <= frf.frequency) & (frf.frequency <= modal.band[1])
     f = frf.frequency[inside]
+    unit = UNIT.get(frf.quantity, "")
     H, fitted = frf.values[inside], evaluate(r.whole, 2j * np.pi * f)
     size = np.sqrt((np.abs(H) ** 2).mean(axis=(1, 2)))
-    names = ("stabilisation", "indicators", "fit", "automac", "circles")
-    path = {name: folder / f"{name}{stem}.png" for name in names}
+    path = {name: folder / f"{name}{stem}.png" for name in _FILES}
     d, kept = r.diagram, modal.frequency[r.firm]
     modal_plots.stabilisation_classes(
         path["stabilisation"],
-        d.states, d.frequency, d.kind, kept, modal.frequency[r.struck], (f, size),
+        d.states, d.frequency, d.kind, kept, modal.frequency[r.struck], (f, size), unit,
     )  # fmt: skip
     modal_plots.mode_indicators(
-        path["indicators"], frf.frequency[inside], cmif(frf)[inside], mif(frf)[inside], kept
+        path["indicators"], f, cmif(frf)[inside], mif(frf)[inside], kept, unit
     )
     channels = {
         f"{o} from {i}": {"test": (f, H[:, a, b]), "identified": (f, fitted[:, a, b])}
@@ -115,8 +122,8 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Block]:
         for a, o in enumerate(frf.outputs)
     }
     chosen = dict(list(channels.items())[:_SHOWN])
-    plots.frf_grid(path["fit"], chosen, UNIT.get(frf.quantity, ""), columns=min(2, len(chosen)))
-    blocks: list[Block] = [
+    plots.frf_grid(path["fit"], chosen, unit, columns=min(2, len(chosen)))
+    blocks = [
         Picture(path["stabilisation"], "Poles of every order; lines: what was kept."),
         Picture(path["indicators"], "Singular values of the responses; share in quadrature."),
         Picture(path["fit"]),
@@ -125,9 +132,9 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Block]:
         modal_plots.nyquist_grid(path["circles"], _circles(r))
         blocks.append(Picture(path["circles"], "Each mode at the channel that shows it best."))
     if 1 < len(kept) <= _MATRIX and len(frf.outputs) > 1:
-        labels = [number(x, 4) for x in kept]
+        labels = [hertz(x) for x in kept]
         psi = driven_shapes(modal.sel(r.firm))
-        plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC")
+        plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC of the test [Hz]")
         blocks.append(Picture(path["automac"], "Off the diagonal: modes that look alike here."))
     return blocks
 
@@ -143,7 +150,7 @@ def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         near = np.abs(frf.frequency - m.frequency[k]) < reach
         fine = np.linspace(max(m.frequency[k] - reach, 1e-3), m.frequency[k] + reach, 200)
         model = evaluate(r.whole, 2j * np.pi * fine)[:, i, j]
-        name = f"{m.frequency[k]:.4g} Hz, {frf.outputs[i]}"
+        name = f"{hertz(m.frequency[k])} Hz, {frf.outputs[i]}"
         found[name] = (frf.values[near, i, j], model)
     return found
 

@@ -62,7 +62,6 @@ def _summary(tables: Sequence[LevelTable]) -> Table:
 
 
 def _levels(t: LevelTable) -> Table:
-    held = [r.foretold_hz is not None for r in t.rows]
     rows = [
         (
             number(r.level),
@@ -70,13 +69,13 @@ def _levels(t: LevelTable) -> Table:
             f"{number(r.frequency_hz, 6)} ± {number(r.frequency_sd_hz, 2)}",
             number(r.fitted_hz, 6),
             number(r.foretold_hz, 6),
-            number(t.mean_hz, 6) if h else "–",
+            number(t.mean_hz if r.foretold_hz else None, 6),
             f"{number(100 * r.damping, 3)} ± {number(100 * r.damping_sd, 2)}",
             number(_percent(r.fitted_damping), 3),
             number(_percent(r.foretold_damping), 3),
-            number(_percent(t.mean_damping), 3) if h else "–",
+            number(_percent(t.mean_damping if r.foretold_hz else None), 3),
         )
-        for r, h in zip(t.rows, held, strict=True)
+        for r in t.rows
     ]
     heads = ("level", "amplitude [mm]", "Hz", "element", "foretold", "linear",
              "damping [%]", "element ", "foretold ", "linear ")  # fmt: skip
@@ -118,27 +117,25 @@ def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> d
         if t.signature in CALM or len(made) == SHOWN:
             continue
         path = folder / f"levels{stem}_{k + 1}.png"
-        column = {name: np.array([_nan(getattr(r, name)) for r in t.rows]) for name in
-                  LevelRow.__dataclass_fields__}  # fmt: skip
-        f, z = (
-            (column[name], column[sd], column[said])
-            for name, sd, said in (
-                ("frequency_hz", "frequency_sd_hz", "foretold_hz"),
-                ("damping", "damping_sd", "foretold_damping"),
-            )
-        )
+        f = [(r.frequency_hz, r.frequency_sd_hz, r.foretold_hz) for r in t.rows]
+        z = [(r.damping, r.damping_sd, r.foretold_damping) for r in t.rows]
         mean = (t.mean_hz, t.mean_damping)
         made[k] = level_plots.mode_over_levels(
             path, f"{t.signature}: {number(t.rows[0].frequency_hz)} Hz at {t.output}",
-            column["amplitude_m"], f, z, np.array(t.curve) if t.curve else None,
+            np.array([r.amplitude_m for r in t.rows]), _columns(f), _columns(z),
+            np.array(t.curve) if t.curve else None,
             t.elements[0].name if t.elements else "",
-            (float(mean[0]), float(mean[1])) if mean[0] and mean[1] else None,
+            (mean[0], mean[1]) if mean[0] and mean[1] else None,
         )  # fmt: skip
     return made
 
 
-def _nan(x: float | None) -> float:
-    return float("nan") if x is None else x
+def _columns(
+    rows: Sequence[tuple[float, float, float | None]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Value, spread and what was foretold (nan: nothing), each (k,)."""
+    value, sd, foretold = np.array(rows, dtype=float).T
+    return value, sd, foretold
 
 
 def level_json(tables: Sequence[LevelTable]) -> list[dict[str, Any]]:

@@ -31,11 +31,11 @@ def map_page(folder: Path, found: MappedDeck) -> PageParts:
     from ..view import scene
 
     seen, t = surface(found.after), found.after.thickness()
-    change = 100 * (t / found.before.thickness() - 1)
+    change = on_faces(seen, 100 * (t / found.before.thickness() - 1))
     after = scene.thickness_map(folder / "thickness.png", seen, on_faces(seen, t))
     changed = scene.scalar_map(
-        folder / "change.png", seen, on_faces(seen, change), "change of thickness", "%", "YlGnBu_r",
-        scene.usual_limits(seen, on_faces(seen, change)),
+        folder / "change.png", seen, change, "change of thickness", "%", "YlGnBu_r",
+        scene.usual_limits(seen, change),
     )  # fmt: skip
     was, now = found.mass
     facts = [("Sheets before", f"{number(was)} kg"), ("after", f"{number(now)} kg")]

@@ -28,7 +28,7 @@ def other_modes_page(folder: Path, model: Model, found: OtherModes) -> PageParts
     files = []
     if max(found.mac.shape) <= _MOST:
         rows, columns = ([hertz(f) for f in side] for side in (found.f_other, found.f_model))
-        title = f"MAC [%]: {found.source.name} (rows), model (columns), pairs framed"
+        title = f"{found.source.name} (rows), model (columns) [Hz], pairs framed"
         pairs = list(zip(found.pairs.test.tolist(), found.pairs.model.tolist(), strict=True))
         path = plots.mac_matrix(folder / "mac.png", found.mac.T, rows, columns, title, pairs)
         blocks.append(Picture(path))

@@ -238,7 +238,7 @@ def _shaker(
     words = ("rattles from", "allowed", "also a sensor")
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]
-    picture = scene.sensors(path, seen, cords, best, ("cord", "shaker, by rank"))
+    picture = scene.sensors(path, seen, (), best, cords, "shaker, by rank")
     return [Facts(facts), Picture(picture, "Ten best shaker places (red), cords (blue)."), table]
 
 

@@ -35,44 +35,18 @@ def to_json(result: Any) -> dict[str, Any]:
     raise TypeError(f"{type(result).__name__} is no result of a workflow")
 
 
-@to_json.register
-def _(result: DiagnosisResult) -> dict[str, Any]:
-    return diagnosis_json(result)
+to_json.register(DiagnosisResult, diagnosis_json)
+to_json.register(OtherModes, other_modes_json)
+to_json.register(Detectable, detectable_json)
+to_json.register(MappedDeck, map_json)
+to_json.register(ParameterStudy, study_json)
+to_json.register(CaseCheck, check_json)
+to_json.register(BenchResult, bench_json)
 
 
 @to_json.register
 def _(result: Plan) -> dict[str, Any]:
     return plan_json(summary(result))
-
-
-@to_json.register
-def _(result: OtherModes) -> dict[str, Any]:
-    return other_modes_json(result)
-
-
-@to_json.register
-def _(result: Detectable) -> dict[str, Any]:
-    return detectable_json(result)
-
-
-@to_json.register
-def _(result: MappedDeck) -> dict[str, Any]:
-    return map_json(result)
-
-
-@to_json.register
-def _(result: ParameterStudy) -> dict[str, Any]:
-    return study_json(result)
-
-
-@to_json.register
-def _(result: CaseCheck) -> dict[str, Any]:
-    return check_json(result)
-
-
-@to_json.register
-def _(result: BenchResult) -> dict[str, Any]:
-    return bench_json(result)
 
 
 @to_json.register

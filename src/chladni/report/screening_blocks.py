@@ -14,18 +14,18 @@ _WORD = {True: "in order", False: "look at it", None: "not possible"}
 def screening_section(*screenings: Screening | None) -> Section:
     """Findings first, then every check; nothing where nothing was screened."""
     blocks: list[Block] = []
-    for s in screenings:
-        if s is None or not (s.checks or s.findings):
-            continue
+    told = [s for s in screenings if s is not None and (s.checks or s.findings)]
+    for s in told:
+        of = s.name if len(told) > 1 else ""
         blocks.append(Items([s.sentence + "."]))
         if s.findings:
             rows = [
                 (f.kind, ", ".join(f.channels) or "all", f.severity, f.text, f.repair)
                 for f in s.findings
             ]
-            blocks.append(Table(_FINDING, rows, _FINDING))
+            blocks.append(Table(_FINDING, rows, _FINDING, of))
         looked = [(c.name, c.result, _WORD[c.passed]) for c in s.checks]
-        blocks.append(Table(_CHECK, looked, _CHECK))
+        blocks.append(Table(_CHECK, looked, _CHECK, of))
     return Section("The recording", blocks)
 
 

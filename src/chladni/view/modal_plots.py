@@ -10,7 +10,7 @@ from .paper import AFTER, BEFORE, LEGEND, TEST, save
 
 _CLASSES = {  # letter of a pole: (mark, colour, size, what it says)
     "o": (".", "#c9c9c9", 2, "new"),
-    "f": ("x", "#9aa3ad", 3, "frequency"),
+    "f": ("x", "#9aa3ad", 3, "steady frequency"),
     "d": ("^", "#e69f00", 3.5, "and damping"),
     "v": ("v", "#56b4e9", 3.5, "and shape"),
     "s": ("o", AFTER, 3.5, "all steady"),
@@ -25,6 +25,7 @@ def stabilisation_classes(
     kept: np.ndarray,
     struck: np.ndarray,
     indicator: tuple[np.ndarray, np.ndarray],
+    unit: str = "",
 ) -> Path:
     """Poles over model order by class, kept ones as lines, struck ones as dotted lines.
 
@@ -32,13 +33,13 @@ def stabilisation_classes(
     ----------
     states, frequency, kind : (k,)   order, [Hz], letter of each pole: o f d v s
     kept, struck : (r,), (g,)        frequencies [Hz]
-    indicator : (f, value)           drawn behind on a log scale
+    indicator : (f, value)           drawn behind on a log scale; unit of the value
     """
     figure = Figure(figsize=(8.2, 4.6), layout="constrained")
     ax = figure.subplots()
     behind = ax.twinx()
     behind.semilogy(*indicator, color="#9aa3ad", lw=0.9)
-    behind.set_ylabel("rms of |H|", fontsize=8, color="#6b7480")
+    behind.set_ylabel(f"rms of |H| [{unit}]" if unit else "rms of |H|", fontsize=8, color="#6b7480")
     ax.set_zorder(behind.get_zorder() + 1)
     ax.patch.set_visible(False)
     low, high = indicator[0][[0, -1]]
@@ -46,18 +47,19 @@ def stabilisation_classes(
     for letter, (mark, colour, size, text) in _CLASSES.items():
         at = inside & (kind == letter)
         ax.plot(frequency[at], states[at], mark, ms=size, mew=0.7, color=colour, label=text)
-    for f in kept:
-        ax.axvline(f, color=BEFORE, lw=0.7, alpha=0.7, zorder=1)
+    for k, f in enumerate(kept):
+        ax.axvline(f, color=BEFORE, lw=0.7, alpha=0.7, zorder=1, label=None if k else "kept")
     for k, f in enumerate(struck):
         ax.axvline(f, color=TEST, lw=0.9, ls=":", label=None if k else "struck out")
     ax.set(xlabel="frequency [Hz]", ylabel="states", xlim=(low, high))
-    figure.legend(loc="outside upper left", ncols=6, **LEGEND)
+    figure.legend(loc="outside upper left", ncols=7, columnspacing=1.2, handlelength=1.2, **LEGEND)
     return save(figure, path)
 
 
 def mode_indicators(
-    path: Path | str, frequency: np.ndarray, cmif: np.ndarray, mif: np.ndarray, kept: np.ndarray
-) -> Path:
+    path: Path | str, frequency: np.ndarray, cmif: np.ndarray, mif: np.ndarray, kept: np.ndarray,
+    unit: str = "",
+) -> Path:  # fmt: skip
     """Singular values of H (n_f, n_in) above, the share that moves in quadrature below (n_f,)."""
     figure = Figure(figsize=(8.2, 4.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -68,7 +70,7 @@ def mode_indicators(
         for f in kept:
             ax.axvline(f, color=BEFORE, lw=0.6, alpha=0.6, zorder=1)
         ax.grid(lw=0.3, alpha=0.5)
-    upper.set(ylabel="CMIF")
+    upper.set(ylabel=f"CMIF [{unit}]" if unit else "CMIF", xlim=frequency[[0, -1]])
     lower.set(xlabel="frequency [Hz]", ylabel="MIF", ylim=(0, 1.02))
     return save(figure, path)
 

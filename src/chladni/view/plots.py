@@ -138,7 +138,7 @@ def mac_matrix(
     size = 0.42 * max(len(rows), len(columns)) + 1.9
     figure = Figure(figsize=(size + 0.6, size), layout="constrained")
     ax = figure.subplots()
-    shown = ax.imshow(mac, cmap="Blues", vmin=0, vmax=1, aspect="equal")
+    shown = ax.imshow(100 * mac, cmap="Blues", vmin=0, vmax=100, aspect="equal")
     for (i, j), value in np.ndenumerate(mac):
         if value >= 0.05:
             colour = "white" if value > 0.6 else "#333333"
@@ -148,7 +148,7 @@ def mac_matrix(
     ax.set_xticks(range(len(columns)), columns, rotation=60, fontsize=8)
     ax.set_yticks(range(len(rows)), rows, fontsize=8)
     ax.set_title(title, loc="left", **TITLE)
-    figure.colorbar(shown, ax=ax, shrink=0.7, label="MAC")
+    figure.colorbar(shown, ax=ax, shrink=0.7, label="MAC [%]")
     return save(figure, path)
 
 

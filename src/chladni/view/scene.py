@@ -24,6 +24,7 @@ _MOTION = "viridis"
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
 _GHOST = 70.0  # degrees of a fold that the undeformed outline shows
 _CORD = "#009e73"
+_LABEL = 1.5  # lengths of an arrow to the far end of its label
 _LONG = 0.35  # part of the structure's size that a line of that outline must reach
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # above so many faces element edges would only blacken the picture
@@ -185,22 +186,28 @@ def sensors(
     seen: Surface,
     outputs: Sequence[Marker],
     inputs: Sequence[Marker] = (),
-    names: tuple[str, str] = ("sensor", "shaker"),
     cords: Sequence[Marker] = (),
+    shaker: str = "shaker",
 ) -> Path:
-    """Where sensors (blue) and shakers (red) sit and which way they point; or two other things.
+    """Where sensors (blue), shakers (orange) and cords (green) sit and which way they point.
 
-    Cords are green and point nowhere.
+    Parameters
+    ----------
+    shaker : what the inputs are called
     """
-    focus = np.array([m.point for m in (*outputs, *inputs, *cords)]).reshape(-1, 3)
+    drawn = (*outputs, *inputs, *cords)
+    places = np.array([m.point for m in drawn]).reshape(-1, 3)
     seen = seen.without_joints()
-    figure, (ax,) = _sheets([camera := best_view(seen, focus)])
+    camera = best_view(seen, places)
+    reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
+    tips = places + _LABEL * reach * np.array([m.direction for m in drawn]).reshape(-1, 3)
+    camera = camera.framing(np.concatenate([seen.points[seen.used], tips]))
+    figure, (ax,) = _sheets([camera])
     draw(ax, seen, camera, Paint(edges=len(seen.faces) < _MANY))
     triad(ax, camera)
-    reach = 0.06 * max(camera.window[1] - camera.window[0], camera.window[3] - camera.window[2])
     for markers, colour, name in (
-        (outputs, paper.AFTER, names[0]),
-        (inputs, paper.BEFORE, names[1]),
+        (outputs, paper.AFTER, "sensor"),
+        (inputs, paper.BEFORE, shaker),
         (cords, _CORD, "cord"),
     ):
         _arrows(ax, camera, markers, colour, reach, name)

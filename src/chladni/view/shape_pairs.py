@@ -1,6 +1,7 @@
 """Modes of a test beside those of a model: what the sensors saw, and what the model says there."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,7 +21,7 @@ _LONG = 0.12  # the longest arrow, as a part of the structure's size
 def shape_pairs(path: Path | str, seen: Surface, found: PairedShapes) -> Path:
     """Two pictures a pair: arrows of the test on the sheet at rest, and of the model on its shape.
 
-    Arrow and colour of a sensor are its share of the largest; red moves along it, blue against it.
+    Arrow and colour of a sensor are its share of the largest: orange along it, blue against it.
     """
     seen, count = seen.without_joints(), len(found.f_test)
     columns = 2 * min(_PAIRS_A_ROW, count)
@@ -53,8 +54,8 @@ def _arrows(
     tip = camera.project(found.directions * value[:, None]) * _LONG * seen.size
     for (x, y), (dx, dy), v in zip(place, tip, value, strict=True):
         colour = paper.BEFORE if v > 0 else paper.AFTER
-        style = {"arrowstyle": "-|>", "color": colour, "lw": 1.3, "shrinkA": 0, "shrinkB": 0}
-        style["mutation_scale"] = 7
+        style: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "lw": 1.3}
+        style |= {"shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
         if np.hypot(dx, dy) > 0.004 * seen.size:
             ends = ((x + dx, y + dy), (x, y))
             ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..ema.finding import Check, Finding, Screening
-from ..ema.frf_estimate import EstimateSettings, FrfEstimate
+from ..ema.frf_estimate import EstimateSettings, FrfEstimate, refuse_unknown
 from ..ema.identification import Identified, identify
 from ..ema.level_study import LevelStudy, decay_study
 from ..ema.level_words import mode_sentence
@@ -68,7 +68,11 @@ def evaluate_recordings(
     ------
     FileError
         If nothing holds FRFs or time data, or no FRF can be estimated.
+    LabelError
+        If excitation or method have no such name.
     """
+    settings = settings or EstimateSettings()
+    refuse_unknown(settings)
     case = source if isinstance(source, Case) else None
     read = source.recordings if isinstance(source, Case) else tuple(source)
     made = [with_frf(r, settings) for r in read]
@@ -88,6 +92,8 @@ def evaluate_recordings(
             found.append(RecordingEvaluation(r, e, decays, screening, levels))
     said = [note for f in found for note in f.screening.notes]
     said += [note for f in found for note in _decay_notes(f)]
+    if settings != EstimateSettings() and not any(e for _, e in held):
+        said.append("Nothing was estimated, so excitation, method, lines and band were not used.")
     own = case.said("test") if case is not None else [n for r, _ in held for n in r.notes]
     return Evaluation(tuple(found), tuple(dict.fromkeys([*said, *own])))
 

@@ -150,6 +150,8 @@ def load_deck(
     """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
     from ..io.nastran import read_deck
 
+    if source.is_dir():
+        raise FileError(f"{source} is a folder; give a deck")
     if not source.is_file():
         raise FileError(f"no file {source}{beside(source)}")
     system = None if units is None else unit_system(units)
