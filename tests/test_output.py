@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from errno import ENOLCK, ENOSPC, EROFS
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chladni.errors import FileError
-from chladni.output import atomic, plain, run_folder, write_json, write_npz, write_text
+from chladni.output import atomic, lock, plain, run_folder, write_json, write_npz, write_text
 from chladni.progress import silent, terminal, within
 
 VALUES = st.recursive(
@@ -130,22 +131,91 @@ def test_a_file_the_run_reads_is_never_replaced(tmp_path):
     assert (tmp_path / "results-1" / "b.json").exists()
 
 
-def test_a_move_that_fails_half_way_is_taken_back(tmp_path, monkeypatch):
-    wrote(tmp_path, "a.json", "b.json")
-    (tmp_path / "a.json").write_text("of the first run")
+def breaking_at(monkeypatch, out, fault):
+    """Moves break where the new b.json would come to its place."""
     move = Path.rename
 
     def fails(self, target):
-        if self.name == "b.json" and target.parent == tmp_path and ".old" not in self.parts:
-            raise OSError(28, "No space left on device")
+        if self.name == "b.json" and target.parent == out and ".old" not in self.parts:
+            raise fault
         return move(self, target)
 
+    monkeypatch.setattr(Path, "rename", fails)
+
+
+def test_a_move_that_fails_half_way_is_taken_back(tmp_path, monkeypatch):
+    wrote(tmp_path, "a.json", "b.json")
+    (tmp_path / "a.json").write_text("of the first run")
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "rename", fails)
+        breaking_at(patch, tmp_path, OSError(28, "No space left on device"))
         with pytest.raises(FileError, match="No space left on device; nothing was replaced"):
             wrote(tmp_path, "a.json", "b.json")
     assert (tmp_path / "a.json").read_text() == "of the first run"
     assert (tmp_path / "b.json").exists()
+
+
+def test_a_move_that_is_interrupted_is_taken_back(tmp_path, monkeypatch):
+    """Ctrl-C between two files: the first run's are where they were, the second's are gone."""
+    wrote(tmp_path, "a.json", "b.json", "c.json")
+    before = {name: (tmp_path / name).read_text() for name in listed(tmp_path)}
+    for name in ("a.json", "b.json", "c.json"):
+        before[name] = "of the first run"
+        (tmp_path / name).write_text(before[name])
+    with monkeypatch.context() as patch:
+        breaking_at(patch, tmp_path, KeyboardInterrupt())
+        with pytest.raises(KeyboardInterrupt):
+            wrote(tmp_path, "a.json", "b.json", "d.json")
+    assert {name: (tmp_path / name).read_text() for name in listed(tmp_path)} == before
+
+
+def test_a_disk_that_is_full_is_said(tmp_path):
+    with (
+        pytest.raises(FileError, match="No space left on device; nothing was written"),
+        run_folder(tmp_path, "modes"),
+    ):
+        raise OSError(ENOSPC, "No space left on device")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_place_that_takes_nothing_is_said(tmp_path, monkeypatch):
+    def fails(**where):
+        raise OSError(EROFS, "Read-only file system")
+
+    monkeypatch.setattr("tempfile.mkdtemp", fails)
+    with pytest.raises(FileError, match=r"nothing can be written there .Read-only file system"):
+        wrote(tmp_path / "new", "a.json")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_system_without_locks_has_none(tmp_path, monkeypatch):
+    def fails(handle, how):
+        raise OSError(ENOLCK, "No locks available")
+
+    monkeypatch.setattr("chladni.output.fcntl.flock", fails)
+    wrote(tmp_path, "a.json")
+    assert listed(tmp_path) == {"a.json", "run.json"}
+    with (tmp_path / "a.json").open() as file:
+        assert not lock(file.fileno(), tmp_path)
+
+
+def test_the_lock_is_free_again_however_a_run_ends(tmp_path):
+    for fault in (RuntimeError, KeyboardInterrupt, FileError):
+        with pytest.raises(fault), run_folder(tmp_path, "modes"):
+            raise fault
+    (tmp_path / "run.json").write_text("{")
+    for _ in range(2):
+        with pytest.raises(FileError, match="no list of results"):
+            wrote(tmp_path, "a.json")
+
+
+def test_results_without_a_list_stay(tmp_path):
+    """Of whom they are cannot be told; the sentence says what to do."""
+    (tmp_path / "modes.json").write_text("of a run that left no list")
+    with pytest.raises(FileError, match=r"modes\.json .*move it away, or give another --out"):
+        wrote(tmp_path, "modes.json")
+    assert (tmp_path / "modes.json").read_text() == "of a run that left no list"
+    (tmp_path / "modes.json").unlink()
+    wrote(tmp_path, "modes.json")
 
 
 def test_a_second_process_is_refused(tmp_path):

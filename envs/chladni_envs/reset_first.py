@@ -13,4 +13,4 @@ def refuse_before_reset(env: gym.Env, state: str, asked: str) -> None:
         It names what was asked and the call that is due.
     """
     if not hasattr(env, state):
-        raise ResetNeeded(f"{asked}: call reset() first; what is legal is known from then on")
+        raise ResetNeeded(f"{asked}: call reset() first; there is no state to tell of before")

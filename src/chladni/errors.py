@@ -5,6 +5,7 @@ alternatives. The command line prints it and exits with 2 (:class:`ChladniError`
 (:class:`AccuracyError`: ran, but the result is not to be trusted).
 """
 
+import difflib
 from collections.abc import Iterable
 
 
@@ -33,6 +34,26 @@ def named(items: Iterable[object], most: int = 6) -> str:
     every = [f"{x:.6g}" if isinstance(x, float) else str(x) for x in items]
     more = f" and {len(every) - most} more" if len(every) > most else ""
     return (", ".join(every[:most]) or "none") + more
+
+
+def nearest(word: str, known: Iterable[str], alike: float = 0.5) -> str:
+    """The name that a word resembles most, "" where it resembles none.
+
+    Parameters
+    ----------
+    alike : share of what two words have in common, from which on they are alike
+    """
+    return next(iter(difflib.get_close_matches(word, list(known), 1, alike)), "")
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """What was meant, as a question before the list of what there is; "" where that is not clear.
+
+    >>> did_you_mean("bnad", ["band", "test"]), did_you_mean("x", ["band", "test"])
+    ("did you mean 'band'? ", '')
+    """
+    near = nearest(word, known)
+    return f"did you mean {near!r}? " if near else ""
 
 
 def not_text(error: UnicodeDecodeError) -> str:

@@ -115,7 +115,9 @@ def run_folder(
         part = _scratch(out)
         try:
             yield part
-            stays = _list(part, command, before if adds else set()) if listed else set()
+            stays = before - _files(part) if adds else set()
+            if listed:
+                _list(part, command, stays)
             _move(part, out, before - stays, {p.resolve() for p in inputs})
         except OSError as error:
             if error.errno != ENOSPC:
@@ -128,19 +130,30 @@ def run_folder(
 @contextmanager
 def _made(out: Path) -> Iterator[None]:
     """The folder; one that was made for nothing goes again."""
-    if out.exists() and not out.is_dir():
-        raise FileError(f"{out} is a file, --out needs a folder")
     new = not out.exists()
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{out}: no folder can be made there ({error.strerror})") from error
+    make_folder(out)
     try:
         yield
     finally:
         with suppress(OSError):  # it holds something, as it should
             if new:
                 out.rmdir()
+
+
+def make_folder(out: Path) -> None:
+    """Make a folder for results, unless it is there.
+
+    Raises
+    ------
+    FileError
+        If it is a file, or cannot be made.
+    """
+    if out.exists() and not out.is_dir():
+        raise FileError(f"{out} is a file, --out needs a folder")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{out}: no folder can be made there ({error.strerror})") from error
 
 
 @contextmanager
@@ -157,18 +170,31 @@ def locked(out: Path) -> Iterator[None]:
         return
     handle = os.open(out, os.O_RDONLY)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        raise FileError(
-            f"{out} is in use by another process; wait for it, or give another --out"
-        ) from None
-    except OSError:  # a file system without locks
-        pass
-    try:
+        lock(handle, out)
         yield
     finally:
         os.close(handle)
+
+
+def lock(handle: int, folder: Path) -> bool:
+    """Lock an open file for this process; False where the file system of ``folder`` has no locks.
+
+    Raises
+    ------
+    FileError
+        If another process holds it.
+    """
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise FileError(
+            f"{folder} is in use by another process; wait for it, or give another --out"
+        ) from None
+    except OSError:
+        return False
+    return True
 
 
 def _scratch(out: Path) -> Path:
@@ -197,17 +223,20 @@ def _earlier(out: Path, command: str) -> set[str]:
     return {name for name in names if not (Path(name).is_absolute() or ".." in Path(name).parts)}
 
 
-def _list(part: Path, command: str, stays: set[str]) -> set[str]:
-    """Write which files are the command's; those of earlier runs that stay."""
-    files = {p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file()}
-    listed = sorted({*files, *stays, LIST})
-    write_json(part / LIST, {"command": command, "version": own_version(), "files": listed})
-    return stays - files
+def _files(part: Path) -> set[str]:
+    """Names of the files a run wrote."""
+    return {p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file()}
+
+
+def _list(part: Path, command: str, stays: set[str]) -> None:
+    """Write which files are the command's, with those of earlier runs that stay."""
+    files = sorted({*_files(part), *stays, LIST})
+    write_json(part / LIST, {"command": command, "version": own_version(), "files": files})
 
 
 def _move(part: Path, out: Path, before: set[str], inputs: set[Path]) -> None:
     """Files of a finished run into their folder: all of them or none."""
-    names = sorted(p.relative_to(part).as_posix() for p in part.rglob("*") if p.is_file())
+    names = sorted(_files(part))
     mine = {name for name in {*before, LIST} if (out / name).is_file()}
     mine = {name for name in mine if (out / name).resolve() not in inputs}
     try:
@@ -226,7 +255,10 @@ def _refuse_blocked(out: Path, names: Sequence[str], mine: set[str], inputs: set
         if target.resolve() in inputs:
             raise FileError(f"{target} is a file this run reads")
         if name not in mine and os.path.lexists(target):
-            raise FileError(f"{target} is there already and is no result of this command")
+            raise FileError(
+                f"{target} is there already and no {LIST} says that this command wrote it; move "
+                "it away, or give another --out"
+            )
         above = next((p for p in target.parents if p.exists()), out)
         if not above.is_dir():
             raise FileError(f"{above} is there already and is no folder")
@@ -235,17 +267,16 @@ def _refuse_blocked(out: Path, names: Sequence[str], mine: set[str], inputs: set
 def _swapped(part: Path, out: Path, names: Sequence[str], mine: set[str]) -> None:
     """Move the new files in and the old ones away; back again where any of it fails."""
     old = part / ".old"
-    done: list[tuple[Path, Path]] = []
     moves = [(out / name, old / name) for name in sorted(mine)]
     moves += [(part / name, out / name) for name in names]
     try:
         for source, target in moves:
             target.parent.mkdir(parents=True, exist_ok=True)
             source.rename(target)
-            done.append((source, target))
-    except OSError:
-        for source, target in reversed(done):
-            target.rename(source)
+    except BaseException:  # an interruption, too
+        for source, target in reversed(moves):
+            if not source.exists():  # it was moved
+                target.rename(source)
         shutil.rmtree(old, ignore_errors=True)
         raise
     for folder in {(out / name).parent for name in mine} - {out}:

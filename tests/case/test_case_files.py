@@ -87,7 +87,7 @@ def test_all_files_a_case_reads_are_told(folder: Path, tmp_path: Path) -> None:
     (case / "plate.bdf").write_text(deck().replace("BEGIN BULK", "BEGIN BULK\nINCLUDE 'more.inc'"))
     (case / "more.inc").write_text("CELAS2,99,0.1,17,3\n")
     (case / "case.toml").write_text(CASE)
-    due = {"case.toml", "plate.bdf", "more.inc", "a.npz", "b.npz", "sensors.csv"}
+    due = {"case.toml", "plate.bdf", "more.inc", "formed.k", "a.npz", "b.npz", "sensors.csv"}
     assert {p.name for p in files_of(case)} == due
     (case / "case.toml").write_text("[model\n")
     assert [p.name for p in files_of(case)] == ["case.toml"]

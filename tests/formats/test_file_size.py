@@ -10,6 +10,8 @@ from chladni.errors import FileError
 from chladni.io.dyna import read_formed
 from chladni.io.file_size import LARGEST, OVERRIDE, refuse_large
 from chladni.io.nastran import read_deck
+from chladni.io.nastran.results.op2 import read_op2_modes, read_op4
+from chladni.io.nastran.results.punch import read_punch_modes
 from chladni.io.scanned_surface import read_scan
 from chladni.io.tables.read_tables import read_recordings
 from chladni.io.tables.sensor_table import read_sensors
@@ -18,6 +20,7 @@ READERS = {
     "a.bdf": read_deck, "a.uff": read_recordings, "a.npz": read_recordings,
     "a.csv": read_recordings, "a.mat": read_recordings, "a.wav": read_recordings,
     "sensors.csv": read_sensors, "a.stl": read_scan, "a.k": read_formed, "formed.csv": read_formed,
+    "a.op2": read_op2_modes, "a.op4": read_op4, "a.pch": read_punch_modes,
 }  # fmt: skip
 
 

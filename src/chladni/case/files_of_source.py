@@ -8,13 +8,16 @@ from typing import Any
 from ..errors import ChladniError
 from ..io.nastran.text.source_files import sources
 from ..io.tables.read_tables import ENDINGS
+from .schema import SCHEMA
+
+_FILES = [(k.section, k.name) for k in SCHEMA if k.kind in ("file", "list of files")]
 
 
 def files_of(source: Path) -> tuple[Path, ...]:
     """As many of them as can be told; what is wrong with one is for its reader to say."""
     case = source / "case.toml" if source.is_dir() else source
     if case.suffix == ".toml":
-        return (case, *(p for name in _named(case) for p in _deck(case.parent / name)))
+        return (case, *_of_case(case))
     return _deck(source)
 
 
@@ -27,16 +30,20 @@ def _deck(path: Path) -> tuple[Path, ...]:
         return (path,)
 
 
-def _named(case: Path) -> Iterator[str]:
-    """Every text of a case that may be a file's name."""
+def _of_case(case: Path) -> Iterator[Path]:
+    """Every file that a word of a case names."""
     try:
         values = tomllib.loads(case.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
         return
-    model, test, more = (values.get(name) for name in ("model", "test", "recording"))
-    tables: list[Any] = [model, test, *(more if isinstance(more, list) else [])]
-    for table in tables:
-        for key in ("deck", "sensors", "file", "recordings"):
-            found = table.get(key) if isinstance(table, dict) else None
-            texts = found if isinstance(found, list) else [found]
-            yield from (text for text in texts if isinstance(text, str) and "\0" not in text)
+    for section, word in _FILES:
+        for table in _listed(values.get(section)):
+            found = table.get(word) if isinstance(table, dict) else None
+            for name in _listed(found):
+                if isinstance(name, str) and "\0" not in name:
+                    path = case.parent / name
+                    yield from _deck(path) if word == "deck" else (path,)
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]

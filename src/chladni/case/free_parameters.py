@@ -1,12 +1,11 @@
 """Which numbers a case frees: a field of parts, of joints by their cards, or an effect by name."""
 
-import difflib
 import re
 
 import numpy as np
 
 from ..effects.registry import families
-from ..errors import FileError, LabelError
+from ..errors import FileError, LabelError, did_you_mean
 from ..io.nastran import Deck
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
@@ -138,8 +137,7 @@ def _position(section: TomlSection, made: Assembly, name: object) -> int:
     try:
         return made.part(name)
     except LabelError as error:
-        near = difflib.get_close_matches(str(name), [p.name for p in made.parts], 1, 0.5)
-        hint = f"did you mean {near[0]!r}? " if near else ""
+        hint = did_you_mean(str(name), [p.name for p in made.parts])
         cards = ", ".join(f"{kind} ID" for kind in _LUMPS)
         raise LabelError(
             f"{section.at('parts')}: {hint}{error}; joints and masses are {cards}"

@@ -4,7 +4,6 @@ Everything is resolved here once: files are read, labels become grids or places 
 shell, bands are held against the data. What does not fit is refused in one sentence.
 """
 
-import difflib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
 from ..ema.setup import Recording, Sensor, TestSetup
-from ..errors import ChladniError, FileError, LabelError, named
+from ..errors import ChladniError, FileError, LabelError, did_you_mean, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
 from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
@@ -193,8 +192,7 @@ def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
         )
     if not path.is_file():
         there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
-        near = difflib.get_close_matches(Path(name).name, there, 1, 0.5)
-        hint = f"did you mean {near[0]!r}? " if near else ""
+        hint = did_you_mean(Path(name).name, there)
         raise FileError(
             f"{section.at(key)}: there is no file {name!r}; {hint}there are {named(there, 8)}"
         )

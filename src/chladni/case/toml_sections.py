@@ -1,6 +1,5 @@
 """A TOML file read key by key: every complaint names file, line, offender and alternatives."""
 
-import difflib
 import re
 import tomllib
 from collections.abc import Sequence
@@ -8,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, not_text
+from ..errors import FileError, did_you_mean, nearest, not_text
 
 _LONGEST = 60  # characters of a value that a sentence repeats
 
@@ -51,8 +50,7 @@ class TomlSection:
         """Refuse keys that nobody reads."""
         for key in self.values:
             if key not in known:
-                near = difflib.get_close_matches(key, known, 1, 0.5)
-                hint = f"did you mean {near[0]!r}? " if near else ""
+                hint = did_you_mean(key, known)
                 raise FileError(f"{self.at(key)} is unknown; {hint}known are {', '.join(known)}")
 
     def _get(self, key: str, due: bool) -> Any:
@@ -68,8 +66,7 @@ class TomlSection:
         if not isinstance(value, str):
             raise FileError(f"{self.at(key)} = {_short(value)} is not text in quotes")
         if among and value not in among:
-            near = difflib.get_close_matches(value, among, 1, 0.5)
-            hint = f"did you mean {near[0]!r}? " if near else ""
+            hint = did_you_mean(value, among)
             raise FileError(f"{self.at(key)} = {_short(value)}; {hint}there are {', '.join(among)}")
         return value
 
@@ -188,8 +185,8 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
     for name, value in values.items():
         where = headers.get(name, [lines.get(("", 0, name), 1)])
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.5)
-            hint = f"did you mean [{near[0]}]? " if near else ""
+            near = nearest(name, known)
+            hint = f"did you mean [{near}]? " if near else ""
             kind = f"[{name}]" if isinstance(value, dict | list) else f"{name!r} outside a section"
             raise FileError(
                 f"{path.name}, line {where[0]}: {kind} is unknown; {hint}"

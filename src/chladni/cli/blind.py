@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import FileError
-from ..output import locked, write_json, write_text
+from ..output import locked, make_folder, write_json, write_text
 from .console import say
 from .run import Out
 
@@ -24,9 +23,7 @@ def run(
     from chladni_evidence.score import Row, confusion, summary
 
     place, rows = out or Path("runs") / "blind", []
-    if place.exists() and not place.is_dir():
-        raise FileError(f"{place} is a file, --out needs a folder")
-    place.mkdir(parents=True, exist_ok=True)
+    make_folder(place)
     cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
 
     def told(row: Row) -> None:

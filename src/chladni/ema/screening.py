@@ -110,8 +110,8 @@ class Homogeneity:
     limit : float           ratio that chance does not reach
     linear : bool
     p : float               of so large a ratio by chance, N ratio being of a gamma distribution
-    channels : tuple of str  outputs whose own ratio is beyond chance, the worst first; none where it
-        is linear
+    channels : tuple of str  outputs whose own ratio is beyond chance, the worst first; none where
+        it is linear
     bands : ((low, high), ...)  runs of such lines [Hz], the worst first; none likewise
     """
 

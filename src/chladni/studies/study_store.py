@@ -23,13 +23,8 @@ from typing import IO, Any
 import numpy as np
 
 from ..errors import FileError
-from ..output import plain, write_json, write_npz, write_text
+from ..output import lock, make_folder, plain, write_json, write_npz, write_text
 from .sample import SampleResult
-
-try:
-    import fcntl
-except ImportError:  # not on Windows, whose open files are their own lock
-    fcntl = None  # type: ignore[assignment]
 
 BEGUN, DESIGN, ROWS, FRFS, LOCK = (
     "study_begun.json", "design.csv", "samples.jsonl", "frf", ".study.lock",
@@ -104,14 +99,14 @@ def opened_store(
     FileError
         If the folder holds anything else, another study, or is in use.
     """
-    if folder.exists() and not folder.is_dir():
-        raise FileError(f"{folder} is a file, --out needs a folder")
+    make_folder(folder)
     begun = folder / BEGUN
-    if not begun.exists() and folder.is_dir() and any(p.name != LOCK for p in folder.iterdir()):
+    if not begun.exists() and any(p.name != LOCK for p in folder.iterdir()):
         raise FileError(f"{folder} holds files that are no study; give an empty or a new folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / LOCK, "a+b") as lock:
-        notes = _locked(folder, lock)
+    with open(folder / LOCK, "a+b") as held:
+        notes = []
+        if not lock(held.fileno(), folder):
+            notes = [f"The file system of {folder} has no locks: start no second process there."]
         if begun.exists():
             _refuse_another(begun, identity)
         else:
@@ -130,21 +125,6 @@ def design_text(names: list[str], X: np.ndarray) -> str:
     writer.writerow(["sample", *names])
     writer.writerows([k, *map(repr, x)] for k, x in enumerate(X.tolist()))
     return text.getvalue()
-
-
-def _locked(folder: Path, lock: IO[bytes]) -> list[str]:
-    """Take the lock, which the kernel frees when this process ends however it ends."""
-    if fcntl is None:
-        return []
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise FileError(
-            f"{folder} is in use by another process; wait for it, or give another --out"
-        ) from None
-    except OSError:
-        return [f"The file system of {folder} has no locks: start no second process there."]
-    return []
 
 
 def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:

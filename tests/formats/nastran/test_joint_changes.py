@@ -11,7 +11,7 @@ from chladni.effects.shell_groups import shell_groups
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
-from chladni.model.assembly import Bushes
+from chladni.model.assembly import Beams, Bushes
 from chladni.model.free_parameter import FreeParameter
 from chladni.units import UNITS
 
@@ -122,6 +122,29 @@ def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
     assert_allclose(got.bushes.stiffness[1], before.bushes.stiffness[1], rtol=1e-9)
 
 
+def test_new_properties_of_every_kind_have_ids_of_their_own(deck):
+    """A solid and a bush that changed alone, and a bush that was added, in one deck."""
+    found, before = deck
+    parts, solids = list(before.parts), before.solids[0]
+    changed = parts[position(before, 3)]
+    stiffer = replace(changed.section.material, E=2 * changed.section.material.E)
+    own = replace(changed, section=replace(changed.section, material=stiffer), name="own")
+    part = np.where(solids.ids == 3, len(parts), solids.part)
+    one = {name: column[:1].copy() for name, column in vars(before.bushes).items()}
+    for name, value in (("ids", 99), ("viscous", 0.0), ("loss", 0.0)):
+        one[name][:] = value
+    one["stiffness"][:, 3:] = 0.0
+    columns = {n: np.concatenate([c, one[n]]) for n, c in vars(before.bushes).items()}
+    columns["stiffness"][0] *= 2.0
+    after = replace(
+        before, parts=(*parts, own), solids=(replace(solids, part=part),), bushes=Bushes(**columns)
+    )
+    got, _ = rewritten(found, before, after)
+    assert_allclose(got.bushes.stiffness, after.bushes.stiffness, rtol=1e-6)
+    due, is_now = (structure(a).system.K.toarray() for a in (after, got))
+    assert_allclose(is_now, due, atol=1e-7 * np.abs(due).max())
+
+
 def test_a_bush_that_was_taken_out_is_a_card_less(deck):
     found, before = deck
     kept = {name: column[1:] for name, column in vars(before.bushes).items()}
@@ -129,3 +152,16 @@ def test_a_bush_that_was_taken_out_is_a_card_less(deck):
     got, gone = rewritten(found, before, after)
     assert got.bushes.ids.tolist() == after.bushes.ids.tolist()
     assert [line.split(",")[0] for line in gone] == ["CBUSH"]
+
+
+@pytest.mark.parametrize("card", ["CONROD,51,1,3,1,10.,5.", "CROD,51,4,1,3", "CTUBE,51,8,1,3"])
+def test_a_bar_that_was_taken_out_is_a_card_less(tmp_path, card):
+    path = tmp_path / "deck.bdf"
+    path.write_text(DECK.replace("ENDDATA", f"{card}\nPTUBE,8,1,5.,1.\nENDDATA"))
+    found = read_deck(path)
+    before = assembly(found, UNITS["mm-t-s"])
+    stays = before.beams.ids != 51
+    kept = {name: column[stays] for name, column in vars(before.beams).items()}
+    got, gone = rewritten(found, before, replace(before, beams=Beams(**kept)))
+    assert got.beams.ids.tolist() == [4]
+    assert gone == [card]

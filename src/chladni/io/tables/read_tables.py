@@ -18,7 +18,8 @@ from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
 from ..time.time_channels import is_time, only_known
 from .csv_table import CsvTable, beside_it, read_table
 
-ENDINGS = (".npz", ".csv", ".wav", ".mat", ".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
+_UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
+ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
 _FRF = ("frequency_hz", "output", "input", "real", "imag")
 _FRF_OPTIONAL = ("coherence", "variance", "level", "article")
 _POLES = ("mode", "frequency_hz")
@@ -41,7 +42,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
     ending = path.suffix.lower()
     if path.is_file():
         refuse_large(path)
-    if ending in ENDINGS[:4] and not path.is_file():
+    elif ending in ENDINGS and ending not in _UNIVERSAL:
         raise FileError(f"no file {path}; beside it there are {named(beside_it(path))}")
     if ending in (".wav", ".mat") or (ending == ".csv" and "time_s" in _first_line(path)):
         return (_timed(path, _TIMED[ending](path), quantity),)
@@ -49,7 +50,7 @@ def read_recordings(path: str | Path, quantity: str | None = None) -> tuple[Reco
         return (read_npz(path, quantity),)
     if ending == ".csv":
         return read_csv(path, quantity)
-    if ending in ENDINGS:
+    if ending in _UNIVERSAL:
         from ..uff.read_uff import read_uff
 
         found = read_uff(path, quantity)

@@ -9,7 +9,7 @@ from ...ema.identification import Identified
 from ...ema.realisation import realised
 from ...ema.shapes import shapes
 from ...errors import LabelError
-from ...output import atomic
+from ...output import atomic, write_npz
 
 
 def write_shape_table(path: str | Path, modes: Identified) -> Path:
@@ -50,7 +50,7 @@ def write_state_space(path: str | Path, modes: Identified) -> Path:
     }  # fmt: skip
     kind = Path(path).suffix
     if kind == ".npz":
-        return atomic(path, lambda part: np.savez_compressed(part, allow_pickle=False, **arrays))
+        return write_npz(path, **arrays)
     if kind == ".mat":
         from scipy.io import savemat
 

@@ -1,7 +1,6 @@
 """Recordings as tables out: what `tables` reads, every digit kept."""
 
 import csv
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from ...dynamics.frf import FRF
 from ...ema.setup import PoleTable
+from ...output import atomic
 
 
 def write_npz(path: str | Path, frf: FRF) -> None:
@@ -59,10 +59,11 @@ def write_poles(path: str | Path, poles: PoleTable) -> None:
 
 
 def _replace(path: str | Path, mode: str, write: Callable[[IO], object]) -> None:
-    """Write beside the file and move into place, so that no half file is ever found."""
-    path = Path(path)
-    partial = path.with_name(path.name + ".partial")
+    """Write through an open file, whole or not at all."""
     text: dict[str, Any] = {} if "b" in mode else {"encoding": "utf-8", "newline": ""}
-    with partial.open(mode, **text) as file:
-        write(file)
-    os.replace(partial, path)
+
+    def opened(part: Path) -> None:
+        with part.open(mode, **text) as file:
+            write(file)
+
+    atomic(path, opened)

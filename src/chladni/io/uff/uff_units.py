@@ -131,30 +131,29 @@ def meaning(record: FunctionSet, units: FileUnits, where: str) -> Meaning:
     Raises
     ------
     FileError
-        If the label and the data type contradict each other.
+        If a unit is not known, or the label and the data type contradict each other.
     """
     typed = _RESPONSE.get(record.ordinate.kind)
     motion_below = record.denominator.kind in _RESPONSE
     if record.function == 5 or (typed and motion_below):
         return Meaning("transmissibility", 1.0)
     said, length, force = ratio(record.ordinate.unit)
-    for axis, known in ((record.ordinate, said), (record.denominator, None)):
-        if _bare(axis.unit) and not known and _bare(axis.unit) not in {*_FORCE, *_LENGTH}:
-            known = numerator(axis.unit)[0]
-            if not known:
-                raise FileError(
-                    f"{where}: the unit {axis.unit!r} is not known; known are m, mm, in, g, N, lbf "
-                    "and their like; if the numbers are SI, state the quantity in the case"
-                )
+    below = record.denominator.unit
+    for unit, motion in ((record.ordinate.unit, said), (below, numerator(below)[0])):
+        if _bare(unit) and not motion and _bare(unit) not in _FORCE:
+            raise FileError(
+                f"{where}: the unit {unit!r} is not known; known are m, mm, in, g, N, lbf and "
+                "their like; if the numbers are in the units of the file's head (dataset 164; SI "
+                "where it has none), state the quantity in the case"
+            )
     if said and typed and said not in (typed, "transmissibility"):
         raise FileError(
             f"{where}: the data type says {typed}, the unit label "
             f"{record.ordinate.unit!r} says {said}; state the quantity in the case"
         )
-    below = _FORCE.get(_bare(record.denominator.unit))
     if said == "transmissibility":
         return Meaning(said, length / force if length and force else 1.0)
-    force = force or below or units.force
+    force = force or _FORCE.get(_bare(below)) or units.force
     return Meaning(said or typed, (length or units.length) / force)
 
 

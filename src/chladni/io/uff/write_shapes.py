@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...output import atomic
-from .write_uff import write_head
+from .write_uff import write_sets
 
 
 def write_shapes(
@@ -30,15 +29,12 @@ def write_shapes(
     ids, places : (n,), (n, 3) [m]
     damping : fraction of critical of every mode
     """
-
-    def write(part: Path) -> None:
-        part.unlink()  # pyuff writes into files of its own
-        write_head(part, dict(zip(ids.tolist(), places, strict=True)), title)
-        with part.open("ab") as file:
-            for k, f in enumerate(frequency):
-                file.write(_shape(k + 1, float(f), damping, ids, motion[:, :, k], title))
-
-    return atomic(path, write)
+    nodes = dict(zip(ids.tolist(), places, strict=True))
+    shapes = (
+        _shape(k + 1, float(f), damping, ids, motion[:, :, k], title)
+        for k, f in enumerate(frequency)
+    )
+    return write_sets(path, nodes, title, shapes)
 
 
 def _shape(

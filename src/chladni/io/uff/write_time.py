@@ -3,7 +3,6 @@
 Single precision has the 24 bits a converter has.
 """
 
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -12,13 +11,7 @@ import numpy as np
 from ...ema.time_record import TimeRecord
 from ...errors import FileError
 from .uff_sets import Axis, FunctionSet
-from .write_uff import head_records, uff_code, write_head
-
-_MOTION = {
-    "receptance": Axis(8, "m"),
-    "mobility": Axis(11, "m/s"),
-    "accelerance": Axis(12, "m/s^2"),
-}
+from .write_uff import MOTION, NEWTON, binary_set, head_records, uff_code, write_sets
 
 
 def write_time_uff(
@@ -34,26 +27,16 @@ def write_time_uff(
     FileError
         If the record is of a moving base, which has no force to tell inputs by.
     """
-    if record.quantity not in _MOTION:
+    if record.quantity == "transmissibility":
         raise FileError(f"time data of {record.quantity} cannot be written as a universal file")
-    path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    partial.unlink(missing_ok=True)
-    try:
-        write_head(partial, nodes or {}, title)
-        with partial.open("ab") as file:
-            for block in _records(record, title):
-                file.write(block)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_sets(path, nodes or {}, title, _records(record, title))
 
 
 def _records(record: TimeRecord, title: str) -> Iterator[bytes]:
-    motion = _MOTION[record.quantity]
+    motion = MOTION[record.quantity]
     for block in range(len(record.force)):
         for label, x in zip(record.inputs, record.force[block], strict=True):
-            yield _record(label, x, record.rate, Axis(13, "N"), title)
+            yield _record(label, x, record.rate, NEWTON, title)
         for label, x in zip(record.outputs, record.response[block], strict=True):
             yield _record(label, x, record.rate, motion, title)
 
@@ -65,7 +48,4 @@ def _record(label: str, x: np.ndarray, rate: float, ordinate: Axis, title: str) 
         x=np.arange(len(x)) / rate, y=x.astype("<f4"), abscissa=Axis(17, "s"), ordinate=ordinate,
         denominator=Axis(),
     )  # fmt: skip
-    bits = made.y.tobytes()
-    mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
-    head = head_records(made, title, even=True, single=True)
-    return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"
+    return binary_set(head_records(made, title, even=True, single=True), made.y.tobytes())

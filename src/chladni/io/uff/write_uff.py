@@ -6,8 +6,7 @@ Format: SDRC universal file dataset 58; columns stay apart by a blank, so that r
 and readers by blanks both find the numbers.
 """
 
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,14 +15,15 @@ import numpy as np
 from ...dofs import parse
 from ...dynamics.frf import FRF
 from ...errors import FileError, LabelError
+from ...output import atomic
 from .uff_sets import Axis, FunctionSet, HeaderSet, NodeSet, UnitsSet, for_pyuff
 
-_RESPONSE = {"receptance": 8, "mobility": 11, "accelerance": 12, "transmissibility": 12}
-_UNIT = {
-    "receptance": ("m", "N"),
-    "mobility": ("m/s", "N"),
-    "accelerance": ("m/s^2", "N"),
-    "transmissibility": ("m/s^2", "m/s^2"),
+NEWTON = Axis(13, "N")
+MOTION = {
+    "receptance": Axis(8, "m"),
+    "mobility": Axis(11, "m/s"),
+    "accelerance": Axis(12, "m/s^2"),
+    "transmissibility": Axis(12, "m/s^2"),
 }
 
 
@@ -44,20 +44,24 @@ def write_uff(
     frf : FRF          labels as 412:+Z; 412:n is written as a scalar, base:+Z as node 0
     nodes : {node: (3,)}  places [m]
     """
-    path = Path(path)
-    partial = path.with_name(path.name + ".partial")
-    partial.unlink(missing_ok=True)
-    try:
-        write_head(partial, nodes or {}, title)
-        with partial.open("ab") as file:
-            for block in _blocks(frf, title, binary):
-                file.write(block)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_sets(path, nodes or {}, title, _blocks(frf, title, binary))
 
 
-def write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
+def write_sets(
+    path: str | Path, nodes: Mapping[int, np.ndarray], title: str, blocks: Iterable[bytes]
+) -> Path:
+    """Header, units and nodes, then these datasets; a file that is there is replaced at the end."""
+
+    def write(part: Path) -> None:
+        part.unlink()  # pyuff writes into files of its own
+        _write_head(part, nodes, title)
+        with part.open("ab") as file:
+            file.writelines(blocks)
+
+    return atomic(path, write)
+
+
+def _write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
     """Header, units and nodes, in pyuff's hand."""
     import pyuff
 
@@ -71,9 +75,8 @@ def write_head(path: Path, nodes: Mapping[int, np.ndarray], title: str) -> None:
 
 def _blocks(frf: FRF, title: str, binary: bool) -> Iterator[bytes]:
     """One dataset 58 a channel, then its coherence."""
-    above, below = _UNIT[frf.quantity]
-    ordinate = Axis(_RESPONSE[frf.quantity], above)
-    denominator = Axis(13 if below == "N" else 12, below)
+    ordinate = MOTION[frf.quantity]
+    denominator = ordinate if frf.quantity == "transmissibility" else NEWTON
     for j, input in enumerate(frf.inputs):
         for i, output in enumerate(frf.outputs):
             H = FunctionSet(
@@ -116,35 +119,32 @@ def _encoded(record: FunctionSet, title: str, binary: bool) -> bytes:
     head = head_records(record, title, even)
     if not binary:
         return (f"    -1\n    58{'':74}\n" + head + _text(x, y, even)).encode()
-    bits = _columns(x, y).astype("<f8").tobytes()  # 1: little-endian, 2: IEEE
-    mark = f"    58b{1:6d}{2:6d}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
+    return binary_set(head, _columns(x, y).astype("<f8").tobytes())
+
+
+def binary_set(head: str, bits: bytes) -> bytes:
+    """A dataset 58b between its marks."""
+    kind = f"    58b{1:6d}{2:6d}"  # little-endian, IEEE
+    mark = f"{kind}{11:12d}{len(bits):12d}{0:6d}{0:6d}{0:12d}{0:12d}\n"
     return (f"    -1\n{mark}" + head).encode() + bits + b"    -1\n"
 
 
 def head_records(record: FunctionSet, title: str, even: bool, single: bool = False) -> str:
-    """Records 1 to 11; ``single`` precision in place of double."""
+    """Records 1 to 11; ``single``: real numbers of single precision, in place of double."""
     (out, out_way), (ref, ref_way) = record.response, record.reference
-    f = record.x
+    f, kind = record.x, 6 if np.iscomplexobj(record.y) else 2 if single else 4
     start, step = (f[0], (f[-1] - f[0]) / (len(f) - 1)) if even else (0.0, 0.0)
     lines = [f"{title[:80]:80}"] + [f"{'NONE':80}"] * 4
     lines += [
         f"{record.function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{out:10d}{out_way:4d} {'NONE':10}"
         f"{ref:10d}{ref_way:4d}",
-        f"{_number_kind(record.y, single):10d}{len(f):10d}{int(even):10d}{start:13.5e}"
-        f"{step:13.5e}{0:13.5e}",
+        f"{kind:10d}{len(f):10d}{int(even):10d}{start:13.5e}{step:13.5e}{0:13.5e}",
     ]
     names = ("Time" if record.abscissa.kind == 17 else "Frequency", "NONE", "NONE", "NONE")
     axes = (record.abscissa, record.ordinate, record.denominator, Axis())
     for name, axis in zip(names, axes, strict=True):
         lines.append(f"{axis.kind:10d}{0:5d}{0:5d}{0:5d} {name:20} {axis.unit:20}")
     return "\n".join(lines) + "\n"
-
-
-def _number_kind(y: np.ndarray, single: bool) -> int:
-    """2 real, 4 real double, 5 complex, 6 complex double."""
-    if np.iscomplexobj(y):
-        return 5 if single else 6
-    return 2 if single else 4
 
 
 def _even(f: np.ndarray) -> bool:

@@ -8,11 +8,10 @@ from ....errors import ModelError
 from ....model.added_points import next_id
 from ....model.assembly import Assembly, Average
 from ....units import Units
-from .. import Deck
-from .split_properties import property_ids
+from .free_ids import FreeIds
 
 
-def added_cards(deck: Deck, before: Assembly, after: Assembly, units: Units) -> list[list]:
+def added_cards(before: Assembly, after: Assembly, units: Units, free: FreeIds) -> list[list]:
     """All of them; elements are numbered from the first id that is free.
 
     Raises
@@ -25,7 +24,7 @@ def added_cards(deck: Deck, before: Assembly, after: Assembly, units: Units) -> 
         *_means(before, after),
         *_masses(before, after, units),
         *_springs(before, after, units),
-        *_bushes(deck, before, after, units),
+        *_bushes(before, after, units, free),
     ]
 
 
@@ -74,30 +73,20 @@ def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
         yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
 
 
-def _bushes(deck: Deck, before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
+def _bushes(before: Assembly, after: Assembly, units: Units, free: FreeIds) -> Iterator[list]:
     """CBUSH that was added, with its PBUSH and, where it lies askew, the CORD2R of its frame."""
     b = after.bushes
     first = next_id(after) + len(after.masses) + len(after.springs)
-    system, pid = free_system(deck), 1 + max(property_ids(deck))
     unit = units.force / units.length
-    for n, k in enumerate(range(len(before.bushes), len(b))):
+    for k in range(len(before.bushes), len(b)):
         if np.any(b.stiffness[k, 3:]) or np.any(b.viscous[k]) or np.any(b.loss[k]):
             raise ModelError("a bush that turns or dissipates was added; CBUSH here is a spring")
         x, _, z = b.frame[k]
-        turned = not np.allclose(b.frame[k], np.eye(3), rtol=0, atol=1e-9)
-        if turned:
-            yield ["CORD2R", system + n, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
-        yield ["PBUSH", pid + n, "K", *(b.stiffness[k, :3] / unit).tolist()]
+        cid, pid = 0, next(free.properties)
+        if not np.allclose(b.frame[k], np.eye(3), rtol=0, atol=1e-9):
+            cid = next(free.systems)
+            yield ["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
+        yield ["PBUSH", pid, "K", *(b.stiffness[k, :3] / unit).tolist()]
         ends = [int(after.ids[row]) if row >= 0 else None for row in b.nodes[k]]
-        place, cid = (b.place[k] / units.length).tolist(), system + n if turned else 0
-        yield ["CBUSH", first + k, pid + n, *ends, None, None, None, cid, None, 0, *place]
-
-
-def free_system(deck: Deck) -> int:
-    """An id above those of all coordinate systems; a CORD1 card holds two."""
-    used = [900]
-    for kind in (kind for kind in deck.cards if kind.startswith("CORD")):
-        second = deck[kind].words(5).tolist() if kind[4] == "1" else []
-        words = [*deck[kind].words(1).tolist(), *second]
-        used += [int(word) for word in words if word.isdigit()]
-    return 1 + max(used)
+        place = (b.place[k] / units.length).tolist()
+        yield ["CBUSH", first + k, pid, *ends, None, None, None, cid, None, 0, *place]

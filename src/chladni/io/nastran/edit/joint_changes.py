@@ -1,27 +1,27 @@
 """Changed joints and masses put into their cards: K of PBUSH, PELAS and CELAS2, M of CONM2."""
 
 from collections.abc import Iterator
-from itertools import count
 
 import numpy as np
 
 from ....errors import ModelError
 from ....model.assembly import Assembly
 from .. import Add, Deck, SetField
-from ..text.format import Value
 from ..text.table import Cards
 from .changes import Change
-from .split_properties import property_ids
+from .split_properties import copied
 
 _SAME = 1e-9
 _ALIKE = 1e-6  # factors that are one
 
 
-def joint_changes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
+def joint_changes(
+    deck: Deck, before: Assembly, after: Assembly, free: Iterator[int]
+) -> list[Change]:
     """Edits of the cards of springs, bushes and masses that are in both and differ by a factor.
 
     A property is changed where all its elements changed alike; bushes that changed otherwise get
-    one of their own.
+    one of their own, whose id comes from ``free``.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def joint_changes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]
     """
     return [
         *_springs(deck, _factors(before, after, "springs", "value")),
-        *_bushes(deck, _factors(before, after, "bushes", "stiffness")),
+        *_bushes(deck, _factors(before, after, "bushes", "stiffness"), free),
         *_masses(deck, _factors(before, after, "masses", "matrix")),
     ]
 
@@ -75,7 +75,7 @@ def _pelas(deck: Deck, pid: int, factor: float) -> Change:
     raise ModelError(f"{deck.path} has no PELAS {pid}")
 
 
-def _bushes(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
+def _bushes(deck: Deck, factor: dict[int, float], free: Iterator[int]) -> Iterator[Change]:
     """K1 to K6 of the PBUSH that its CBUSH share; of those that changed otherwise one of their own.
 
     The factor of the first stays with the card.
@@ -88,26 +88,22 @@ def _bushes(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:
                 kinds = users.setdefault(int(p), {})
                 same = next((f for f in kinds if abs(f / factor[id] - 1) < _ALIKE), factor[id])
                 kinds.setdefault(same, []).append(int(id))
-    free = count(1 + max(property_ids(deck)))
     for property, kinds in users.items():
         common = max(kinds, key=lambda f: len(kinds[f]))
         if abs(common - 1) > _SAME:
             for j, k in _scaled(deck["PBUSH"], property, common).items():
                 yield SetField("PBUSH", property, j, k)
         for f, members in kinds.items():
-            if f is not common:
+            if f != common:
                 new = next(free)
-                yield Add([_copied(deck["PBUSH"], property, new, f)], "of bushes that changed")
+                fields = {1: new, **_scaled(deck["PBUSH"], property, f)}
+                yield Add([copied(deck["PBUSH"], property, fields)], "of bushes that changed")
                 yield from (SetField("CBUSH", id, "PID", new) for id in members)
-
-
-def _row(cards: Cards, pid: int) -> int:
-    return int(np.flatnonzero(cards.integers(1) == pid)[0])
 
 
 def _scaled(cards: Cards, pid: int, factor: float) -> dict[int, float]:
     """{position: K times a factor} of a PBUSH."""
-    one = cards.single(_row(cards, pid))
+    one = cards.single(int(np.flatnonzero(cards.integers(1) == pid)[0]))
     words = one.fields(0)
     return {
         j: float(one.reals(j)[0]) * factor
@@ -115,14 +111,6 @@ def _scaled(cards: Cards, pid: int, factor: float) -> dict[int, float]:
         for j in range(key + 1, min(key + 6, len(words)) + 1)
         if words[j - 1]
     }
-
-
-def _copied(cards: Cards, pid: int, new: int, factor: float) -> list[Value]:
-    """A PBUSH as another one, under a new id and with K times a factor."""
-    card: list[Value] = [word or None for word in cards.fields(_row(cards, pid))]
-    for j, value in {1: new, **_scaled(cards, pid, factor)}.items():
-        card[j - 1] = value
-    return ["PBUSH", *card]
 
 
 def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:

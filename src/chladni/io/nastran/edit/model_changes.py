@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import count
 
 import numpy as np
 
@@ -12,8 +11,9 @@ from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, 
 from ....units import Units
 from ....units import units as unit_system
 from .. import Add, Deck, Replace, SetColumns, SetField
-from .added_elements import added_cards, free_system
+from .added_elements import added_cards
 from .changes import Change
+from .free_ids import FreeIds, free_ids
 from .joint_changes import joint_changes
 from .laminate_changes import laminate_changes, laminated
 from .split_properties import (
@@ -41,14 +41,14 @@ def changes(
     """
     units = unit_system(units or "SI")
     before, out = taken_out(deck, before, after)
-    before, after, split = with_new_properties(deck, before, after)
-    free = count(1 + max(i for kind in deck.cards if kind[:3] == "MAT" for i in _ids(deck, kind)))
+    free = free_ids(deck, after)
+    before, after, split = with_new_properties(before, after, free.properties)
     out += _materials(deck, before, after, units, free, split)
-    out += laminate_changes(deck, before, after, units, free)
+    out += laminate_changes(deck, before, after, units, free.materials)
     out += _thickness(deck, before, after, units)
-    out += joint_changes(deck, before, after)
+    out += joint_changes(deck, before, after, free.properties)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
-    if cards := added_cards(deck, before, after, units):
+    if cards := added_cards(before, after, units, free):
         out.append(Add(cards, "put in by the diagnosis"))
     return out
 
@@ -65,7 +65,7 @@ def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]
 
 
 def _materials(
-    deck: Deck, before: Assembly, after: Assembly, units: Units, free: Iterator[int], split: Split
+    deck: Deck, before: Assembly, after: Assembly, units: Units, free: FreeIds, split: Split
 ) -> list[Change]:
     """Cards of materials changed; where only some users of one changed, a card of their own."""
     known = {(k, name): m for k, name, m in _uses(deck, before)}
@@ -85,11 +85,11 @@ def _materials(
             if len(kinds) == 1:
                 out += _edited(deck, id, old, now, units)
                 continue
-            new = next(free)
+            new = next(free.materials)
             out.append(Add([_card(replace(now, id=new), units)], "of the parts that changed"))
             out += [_of_material(deck, after.parts[k], name, new, split) for k, name in at]
     oriented = any(isinstance(m, Orthotropic) for _, _, m in _uses(deck, after))
-    return out + (_axes(deck, before, after) if oriented else [])
+    return out + (_axes(before, after, free) if oriented else [])
 
 
 def _of_material(deck: Deck, part: Part, name: str, material: int, split: Split) -> Change:
@@ -162,7 +162,7 @@ def _card(m: Material, units: Units) -> list[float | int | str | None]:
     return ["MAT8", m.id, *moduli, rho, *[None] * 8, m.damping or None]
 
 
-def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
+def _axes(before: Assembly, after: Assembly, free: FreeIds) -> list[Change]:
     """A coordinate system whose x is the material axis, named by the shells it turned."""
     moved = np.flatnonzero(np.any(before.shells.axis != after.shells.axis, axis=1))
     if not len(moved):
@@ -172,7 +172,7 @@ def _axes(deck: Deck, before: Assembly, after: Assembly) -> list[Change]:
     z = np.eye(3)[int(np.argmin(np.abs(x)))]
     z = z - x * (x @ z)
     z = z / np.linalg.norm(z)
-    cid = free_system(deck)
+    cid = next(free.systems)
     out: list[Change] = [
         Add([["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z, *x]], "material axis 1 of the sheet")
     ]

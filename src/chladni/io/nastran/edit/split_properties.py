@@ -1,6 +1,6 @@
 """Elements that take a property of their own, a copy of the old one with what changed in it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ....units import Units
 from .. import Add, Deck, Delete, SetField
 from ..text.cards import position
 from ..text.format import Value
+from ..text.table import Cards
 from .changes import Change
 
 Split = dict[int, int]  # id of a new property: id of the one it is a copy of
@@ -23,9 +24,9 @@ PROPERTIES = ("PSHELL", "PSOLID", "PBAR", "PBARL", "PBEAM", "PBEAML", "PROD", "P
 
 
 def with_new_properties(
-    deck: Deck, before: Assembly, after: Assembly
+    before: Assembly, after: Assembly, free: Iterator[int]
 ) -> tuple[Assembly, Assembly, Split]:
-    """Both assemblies with the same parts, new ones under ids the deck has free.
+    """Both assemblies with the same parts, new ones under ids from ``free``.
 
     A part that only ``after`` has must have all its elements from one part of ``before``.
 
@@ -39,15 +40,14 @@ def with_new_properties(
     if any((now[was != now] < known).any() for was, now in pairs):
         raise ModelError("an element went from one property of the deck to another one")
     old, new, split = list(before.parts), list(after.parts), Split()
-    free = 1 + max(max(p.id for p in new), *property_ids(deck))
     for k in range(known, len(new)):
         sources = set(np.concatenate([was[now == k] for was, now in pairs]).tolist())
         if len(sources) != 1:
             raise ModelError(f"the elements of {new[k].name} come from {len(sources)} properties")
         source = before.parts[sources.pop()]
-        new[k] = replace(new[k], id=free)
+        new[k] = replace(new[k], id=next(free))
         old.append(replace(new[k], section=source.section))
-        split[free], free = source.id, free + 1
+        split[new[k].id] = source.id
     moved = replace(
         before, parts=tuple(old), shells=replace(before.shells, part=after.shells.part),
         beams=replace(before.beams, part=after.beams.part),
@@ -113,7 +113,7 @@ def taken_out(deck: Deck, before: Assembly, after: Assembly) -> tuple[Assembly, 
     solids = tuple(
         kept(was, now, SOLIDS) for was, now in zip(before.solids, after.solids, strict=True)
     )
-    beams = kept(before.beams, after.beams, BEAMS)
+    beams = kept(before.beams, after.beams, (*BEAMS, "CONROD"))
     bushes = kept(before.bushes, after.bushes, ("CBUSH",))
     return replace(before, solids=solids, beams=beams, bushes=bushes), changes
 
@@ -133,13 +133,6 @@ def section_changes(before: Assembly, after: Assembly, units: Units) -> list[Cha
     return out
 
 
-def property_ids(deck: Deck) -> list[int]:
-    """Ids of all cards that may be properties; 0 where there is none."""
-    kinds = [kind for kind in deck.cards if kind.startswith("P")]
-    words = [word for kind in kinds for word in deck[kind].words(1).tolist()]
-    return [0, *(int(word) for word in words if word.isdigit())]
-
-
 def property_kind(deck: Deck, id: int) -> str:
     """Name of the card of a property of elements, "" where none here has the id."""
     for kind in (kind for kind in PROPERTIES if kind in deck.cards):
@@ -154,10 +147,14 @@ def _card(deck: Deck, source: int, fields: dict[int, Value]) -> list[Value]:
     if not kind:
         raise ModelError(f"{deck.path}: property {source} is none of {', '.join(PROPERTIES)}, so "
                          "elements of it cannot have a copy of their own")  # fmt: skip
-    cards = deck[kind]
-    row = next(i for i in range(len(cards)) if cards.fields(i)[0] == str(source))
+    return copied(deck[kind], source, fields)
+
+
+def copied(cards: Cards, source: int, fields: Mapping[int, Value]) -> list[Value]:
+    """The card of this id, but for some fields {position: value}."""
+    row = int(np.flatnonzero(cards.integers(1) == source)[0])
     card: list[Value] = [word or None for word in cards.fields(row)]
     card += [None] * (max(fields) - len(card))
     for k, value in fields.items():
         card[k - 1] = value
-    return [kind, *card]
+    return [cards.name, *card]

@@ -7,7 +7,17 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ....errors import ModelError
-from ....model.assembly import Assembly, Average, Beams, Equation, RigidBody, Shells, Solids
+from ....model.assembly import (
+    Assembly,
+    Average,
+    Beams,
+    Bushes,
+    Equation,
+    RigidBody,
+    Scalars,
+    Shells,
+    Solids,
+)
 
 
 def components(model: Assembly) -> np.ndarray:
@@ -60,7 +70,7 @@ def refuse_loose(model: Assembly, source: str) -> None:
     stiff = _with_elements(model, label)
     if len(stiff) < 2:
         return
-    held = set(label[model.supports[:, 0]].tolist()) | _grounded(model, label)
+    held = set(label[model.supports[:, 0]].tolist()) | _grounded(label, model.springs, model.bushes)
     for number in stiff[1:]:
         if number not in held:
             points = np.flatnonzero(label == number)
@@ -73,19 +83,17 @@ def refuse_loose(model: Assembly, source: str) -> None:
 
 def _refuse_loose_masses(model: Assembly, label: np.ndarray, source: str) -> None:
     """Refuse a mass on a grid that nothing joins to anything: it would weigh and not vibrate."""
-    count = np.bincount(label, minlength=label.max(initial=0) + 1)
-    grounded = {row for row, c in model.supports.tolist() if c <= 3} | {
-        int(row)
-        for joints in (model.springs, model.bushes, model.scalar_masses)
-        for row in joints.nodes[(joints.nodes < 0).any(axis=1)].max(axis=1, initial=-1)
-    }
-    if len(count) < 2:
+    rows = model.masses.node
+    lone = np.flatnonzero(np.bincount(label)[label[rows]] == 1)
+    if not len(lone) or not label.any():  # one grid is all there is
         return
-    for id, row in zip(model.masses.ids.tolist(), model.masses.node.tolist(), strict=True):
-        if count[label[row]] == 1 and row not in grounded:
+    held = set(label[model.supports[model.supports[:, 1] <= 3, 0]].tolist())
+    held |= _grounded(label, model.springs, model.bushes, model.scalar_masses)
+    for k in lone:
+        if label[rows[k]] not in held:
             raise ModelError(
-                f"{source}: mass {id} is on grid {model.ids[row]}, which nothing joins to the "
-                "rest; take it out or tie it"
+                f"{source}: mass {model.masses.ids[k]} is on grid {model.ids[rows[k]]}, which "
+                "nothing joins to the rest; take it out or tie it"
             )
 
 
@@ -95,11 +103,11 @@ def _with_elements(model: Assembly, label: np.ndarray) -> list[int]:
     return sorted({int(k) for nodes in groups for k in np.unique(label[nodes[:, 0]])})
 
 
-def _grounded(model: Assembly, label: np.ndarray) -> set[int]:
-    """Components with a spring or bush whose other end is the ground."""
-    nodes = np.concatenate([model.springs.nodes, model.bushes.nodes])
+def _grounded(label: np.ndarray, *joints: Scalars | Bushes) -> set[int]:
+    """Components with a joint whose other end is the ground."""
+    nodes = np.concatenate([j.nodes for j in joints])
     ends = nodes[(nodes < 0).any(axis=1)].max(axis=1, initial=-1)
-    return set(label[ends].tolist())
+    return set(label[ends[ends >= 0]].tolist())
 
 
 def _names(model: Assembly, points: np.ndarray) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import FileError
+from ...file_size import refuse_large
 from .punch import PunchModes
 
 
@@ -58,6 +59,7 @@ def _read(path: Path | str, kind: str) -> dict[str, Any]:
     module = _module(kind)
     if not Path(path).is_file():
         raise FileError(f"{path} does not exist")
+    refuse_large(Path(path))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's own making
         try:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from ....errors import FileError
+from ...file_size import refuse_large
 from ..text.numbers import parse_real
 
 _KINDS: Final = {
@@ -113,6 +114,7 @@ def _table(
 def _blocks(path: Path) -> Iterator[_PunchBlock]:
     """Blocks of records with the header that stands above each."""
     try:
+        refuse_large(path)
         text = path.read_text("latin-1")
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror}") from None

@@ -5,18 +5,18 @@ Nastran Quick Reference Guide, section 8. What is read, and what is left out wit
 harmless, too.
 """
 
-import difflib
 from typing import Final
 
+from ....errors import nearest
 from .cards import FIELDS, LEGACY
 
-_HARMLESS: Final = frozenset(
+HARMLESS: Final = frozenset(
     # loads, initial states and requests of other analyses; those that matter are noted
     """PLOAD1 PLOADX1 RFORCE TEMP TEMPD TEMPP1 TEMPP2 TEMPP3 TEMPRB TEMPF TEMPBC TEMPN1 TEMPAX
     TLOAD1 TLOAD2 ACCEL ACCEL1 FORCE2 MOMENT2 DEFORM CLOAD LOADT TIC TSTEP TSTEPNL NOLIN1 NOLIN2
     NOLIN3 NOLIN4 NLRGAP NLPARM NLPCI NLSTEP RANDPS RANDT1 TABRND1 TABRNDG GUST DELAY DPHASE
     EIGB EIGC EIGP TABLED2 TABLED3 TABLED4 TABLEM1 TABLEM2 TABLEM3 TABLEM4 TABLES1 TABLEST
-    SUPORT SUPORT1 SPCOFF SPCOFF1 SEQGP RVDOF RVDOF1 MODTRAK CMETHOD CMSMETH FREQ1
+    SUPORT SUPORT1 SPCOFF SPCOFF1 SEQGP RVDOF RVDOF1 MODTRAK CMETHOD CMSMETH
     """
     # sets of degrees of freedom: reduction is noted, the others change no full model
     """OMIT OMIT1 ASET ASET1 BSET BSET1 CSET CSET1 QSET QSET1 USET USET1 BNDFIX BNDFIX1 BNDFREE
@@ -52,7 +52,7 @@ _HARMLESS: Final = frozenset(
     ECHOOFF MDLPRM ITER PARAMARC
     """.split()
 )
-_CARRIERS: Final = frozenset(  # that stiffen, weigh or tie and do not begin with C
+CARRIERS: Final = frozenset(  # that stiffen, weigh or tie and do not begin with C
     """GENEL RSPLINE RTRPLT1 RJOINT RSSCON RBE2GS RBE2F RBAR1 BLSEG BCTABLE BGSET BCTSET BGADD TF
     NSM NSM1 NSML NSML1 NSMADD MFLUID""".split()
 )
@@ -66,11 +66,11 @@ def refusal(name: str, count: int) -> str:
     >>> refusal("SPCC1", 2)
     'SPCC1 (of which there are 2) is not understood and may change the structure; is SPC1 meant?'
     """
-    if name in FIELDS or name in _HARMLESS or name in LEGACY:
+    if name in FIELDS or name in HARMLESS or name in LEGACY:
         return ""
     what = f"{name} (of which there are {count})"
-    near = difflib.get_close_matches(name, FIELDS, 1, 0.75)
-    meant = f"; is {near[0]} meant?" if near and name not in _CARRIERS else ""
-    if name in _CARRIERS or (name[:1] == "C" and name.isalnum() and len(name) > 2):
+    near = nearest(name, FIELDS, 0.75)
+    meant = f"; is {near} meant?" if near and name not in CARRIERS else ""
+    if name in CARRIERS or (name[:1] == "C" and name.isalnum() and len(name) > 2):
         return f"{what} carries stiffness, mass or a tie and is not understood{meant}"
     return f"{what} is not understood and may change the structure{meant}"

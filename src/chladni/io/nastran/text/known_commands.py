@@ -3,13 +3,14 @@
 MSC Nastran Quick Reference Guide, section 5. A command is known by its first four letters.
 """
 
-import difflib
 import re
 from collections.abc import Collection, Iterable, Iterator
 from typing import Final
 
+from ....errors import nearest
+
 _ACTED_UPON: Final = "SET PARAM SUBCASE SUBCOM SUBSEQ SYM SYMCOM REPCASE AUTOSPC RESVEC".split()
-_EXECUTIVE: Final = """ID SOL TIME APP DIAG CEND ENDALTER ALTER COMPILE LINK MALTER ECHO INCLUDE
+_EXECUTIVE: Final = """ID SOL TIME APP DIAG CEND ENDALTER ALTER COMPILE LINK MALTER INCLUDE
     INIT ASSIGN NASTRAN UNIT CHKPNT RESTART BEGIN GEOMCHECK MODEL_CHECK ENDJOB FMSINSERT ACQUIRE
     DBLOCATE DBKEYS EXPAND MEMLIST PROJ RFINCLUDE CONNECT DEFINE DBLOAD DBUNLOAD
     ATTACH DATABASE""".split()
@@ -52,5 +53,4 @@ def unknown(lines: Iterable[str], selects: Collection[str]) -> Iterator[tuple[in
         goes_on = texts[k].rstrip().endswith(",")
         if inside or not word or word in selects or word[:4] in _FIRST_FOUR:
             continue
-        near = difflib.get_close_matches(word, sorted(selects), 1, 0.6)
-        yield k, word, near[0] if near else ""
+        yield k, word, nearest(word, sorted(selects), 0.6)

@@ -13,8 +13,6 @@ _INCLUDE = re.compile(rb"^[ \t]*include(?=[ \t'\"]|$)", re.IGNORECASE | re.MULTI
 _BEGIN = re.compile(rb"^[ \t]*BEGIN\b[ \t,]*(BULK|SUPER|AUXMODEL)?[^\r\n$]*", re.I | re.M)
 _CEND = re.compile(rb"^[ \t]*CEND\b", re.I | re.M)
 _ENDDATA = re.compile(rb"^[ \t]*ENDDATA", re.I | re.M)
-
-
 _DEEPEST = 100  # files that include one another
 
 
