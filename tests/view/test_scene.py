@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from chladni.errors import ShapeError
-from chladni.view import paper, probe, scene
+from chladni.view import annotations, paper, probe, scene
 from chladni.view.camera import best_view
 from chladni.view.canvas import Paint, draw
 from chladni.view.surface import Surface, surface
@@ -38,7 +38,7 @@ def image_of(paint):
 
 def test_every_picture_is_written(tmp_path, back_end):
     t = np.linspace(0.6e-3, 0.9e-3, len(SEEN.faces))
-    out = scene.Marker((0.3, 0.15, 0.01), (0, 0, 1), "1:+Z")
+    out = annotations.Marker((0.3, 0.15, 0.01), (0, 0, 1), "1:+Z")
     written = [
         scene.mode_shape(tmp_path / "mode.png", SEEN, SHAPE, 27.18),
         scene.montage(tmp_path / "m.png", SEEN, np.stack([SHAPE] * 5, -1), np.arange(1, 6.0)),
@@ -69,7 +69,7 @@ def test_a_place_is_marked_where_it_projects(tmp_path, back_end):
     ax = figure.add_axes((0, 0, 1, 1))
     camera, point = best_view(SEEN), np.array([0.2, 0.1, 0.0])
     draw(ax, SEEN, camera, Paint())
-    scene._circle(ax, camera, point, 0.0)
+    annotations.circle(ax, camera, point, 0.0)
     image = paper.pixels(figure).astype(float)
     red = np.argwhere(image[:, :, 0] - image[:, :, 1:].max(axis=2) > 120)
     u, v = ax.transData.transform(camera.project(point[None])[0])

@@ -69,7 +69,7 @@ def run(
 def _page(job: Run, specimen: FormedSpecimen, mapped: Mapped | None) -> None:
     from ..geometry.mesh_quality import check_mesh
     from ..planning import find_sensor_candidates
-    from ..view import scene
+    from ..view import annotations, scene
     from ..view.surface import surface
 
     made = specimen.assembly
@@ -90,7 +90,7 @@ def _page(job: Run, specimen: FormedSpecimen, mapped: Mapped | None) -> None:
     job.json("specimen.json", facts)
     seen = surface(made)
     markers = [
-        scene.Marker(tuple(x), tuple(n), "")
+        annotations.Marker(tuple(x), tuple(n), "")
         for x, n in zip(places.points.tolist(), places.outward.tolist(), strict=True)
     ]
     t = on_faces(seen, after.thickness())

@@ -10,7 +10,7 @@ from ..dynamics.frf import FRF, UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
 from ..updating.result import Alternative, NamedEffect, Scores
-from ..view import plots, scene
+from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.diagnosis_result import DiagnosisResult
 from .level_blocks import draw_levels
@@ -46,9 +46,9 @@ class Shown:
     compared: bool = True
     fitted: Bands = ()
     excluded: Bands = ()
-    outputs: Sequence[scene.Marker] = ()
-    inputs: Sequence[scene.Marker] = ()
-    cords: Sequence[scene.Marker] = ()
+    outputs: Sequence[annotations.Marker] = ()
+    inputs: Sequence[annotations.Marker] = ()
+    cords: Sequence[annotations.Marker] = ()
     mac: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
     pairs: Sequence[tuple[int, int]] = ()
 

@@ -17,7 +17,7 @@ from ..planning.plan_summary import (
     summary,
 )
 from ..planning.whole_plan import Plan, motion
-from ..view import plots, scene
+from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
@@ -154,14 +154,14 @@ def _where(at: PlannedPlace) -> tuple[str, str]:
     return "" if at.grid is None else str(at.grid), _vector(at.point_m)
 
 
-def _marker(at: PlannedPlace, text: str) -> scene.Marker:
+def _marker(at: PlannedPlace, text: str) -> annotations.Marker:
     return _arrow(at.point_m, at.direction, text)
 
 
-def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> scene.Marker:
+def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> annotations.Marker:
     x, y, z = (float(v) for v in point)
     a, b, c = (float(v) for v in direction)
-    return scene.Marker((x, y, z), (a, b, c), text)
+    return annotations.Marker((x, y, z), (a, b, c), text)
 
 
 def _modes(
@@ -250,7 +250,7 @@ def _rattling(actuator: PlannedActuator) -> str:
     return f"{about}{number(actuator.rattles_from_n, 2)} N: {a} / {b}"
 
 
-def _hanger(found: Plan, grid: int) -> scene.Marker:
+def _hanger(found: Plan, grid: int) -> annotations.Marker:
     k = int(np.flatnonzero(found.places.ids == grid)[0])
     return _arrow(found.places.points[k], found.places.normals[k], "")
 

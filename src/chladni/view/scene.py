@@ -5,7 +5,6 @@ and returns its path. Lengths are in metres, the scale bar says so in the unit t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -16,6 +15,7 @@ from matplotlib.figure import Figure
 
 from ..errors import ShapeError
 from . import paper
+from .annotations import Marker, arrows, circle, scale_bar, triad
 from .camera import Camera, best_view, both_views, needed_views, visible
 from .canvas import Paint, draw
 from .surface import Surface
@@ -28,15 +28,6 @@ _LABEL = 1.5  # lengths of an arrow to the far end of its label
 _LONG = 0.35  # part of the structure's size that a line of that outline must reach
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
 _MANY = 6000  # above so many faces element edges would only blacken the picture
-
-
-@dataclass(frozen=True)
-class Marker:
-    """A sensor or a shaker: place [m], unit direction, text."""
-
-    point: tuple[float, float, float]
-    direction: tuple[float, float, float]
-    label: str = ""
 
 
 def mode_shape(
@@ -55,7 +46,7 @@ def mode_shape(
     swung(ax, seen, phi, camera)
     ax.set_title(f"{name}: {hertz(frequency)}", **paper.TITLE)
     triad(ax, camera)
-    _scale_bar(ax, camera, seen.unit)
+    scale_bar(ax, camera, seen.unit)
     paper.motion_bar(figure, 0.45, 0.15 / figure.get_size_inches()[1], 0.22, _MOTION)
     return paper.save(figure, path)
 
@@ -134,9 +125,9 @@ def scalar_map(
         draw(ax, seen, camera, Paint(values, (low, high), cmap, len(seen.faces) < _MANY))
         ax.set_anchor("S")
         triad(ax, camera)
-        _scale_bar(ax, camera, seen.unit)
+        scale_bar(ax, camera, seen.unit)
     if where is not None:
-        _circle(axes[0], cameras[0], *where)
+        circle(axes[0], cameras[0], *where)
     text = f"{name} [{unit}]" if unit else name
     paper.colour_bar(figure, axes[-1], cmap, (low, high), text, _beyond(values, low, high))
     return paper.save(figure, path)
@@ -210,10 +201,10 @@ def sensors(
         (inputs, paper.BEFORE, shaker),
         (cords, _CORD, "cord"),
     ):
-        _arrows(ax, camera, markers, colour, reach, name)
+        arrows(ax, camera, markers, colour, reach, name)
     if outputs or inputs or cords:
         ax.legend(loc="upper center", bbox_to_anchor=(0.6, -0.01), ncols=3, **paper.LEGEND)
-    _scale_bar(ax, camera, seen.unit)
+    scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
@@ -235,13 +226,13 @@ def location(
     values = None if faces is None else np.where(faces, 0.55, np.nan)
     draw(ax, seen, camera, Paint(values, (0.0, 1.0), "Reds", len(seen.faces) < _MANY))
     if point is not None:
-        _circle(ax, camera, np.asarray(point), radius)
+        circle(ax, camera, np.asarray(point), radius)
     if text:
         top = 0.0 if point is None else camera.project(np.asarray(point)[None])[0][1] + radius
         low, high = camera.window[2], camera.window[3]
         above = max(1.0, (top - low) / (high - low))  # clear of the circle
         ax.set_title(fill(text, 72), y=above, **paper.TITLE)
-    _scale_bar(ax, camera, seen.unit)
+    scale_bar(ax, camera, seen.unit)
     return paper.save(figure, path)
 
 
@@ -329,70 +320,6 @@ def _fitting(seen: Surface, values: np.ndarray) -> np.ndarray:
             f"{values.shape} values for {len(seen.faces)} faces and {len(seen.points)} points"
         )
     return values
-
-
-def _circle(ax: Axes, camera: Camera, point: np.ndarray, radius: float) -> None:
-    """The outline of a sphere is a circle in parallel projection."""
-    from matplotlib.patches import Circle
-
-    u, v = camera.project(np.asarray(point)[None])[0]
-    if radius > 0:
-        style = {"fc": (*paper.RED, 0.16), "ec": paper.RED, "lw": 1.8, "zorder": 5}
-        ax.add_patch(Circle((u, v), radius, clip_on=False, **style))
-    ax.plot(u, v, "+", ms=13, mew=2.4, color=paper.RED, zorder=6, clip_on=False)
-
-
-def _arrows(
-    ax: Axes, camera: Camera, markers: Sequence[Marker], colour: str, reach: float, name: str
-) -> None:
-    if not markers:
-        return
-    uv = camera.project(np.array([m.point for m in markers]))
-    tip = camera.project(np.array([m.direction for m in markers])) * reach
-    ax.plot(*uv.T, "o", ms=5, mfc=colour, mec="white", mew=0.7, zorder=6, label=name, clip_on=False)
-    for place, arrow, marker in zip(uv, tip, markers, strict=True):
-        style = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
-        ends = (tuple(place + arrow), tuple(place))  # a place on the rim has its arrow, too
-        if any(marker.direction):
-            ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)
-        paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
-
-
-def _scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
-    """A round length of about a fifth of the window, below the picture."""
-    u0, u1, v0, v1 = camera.window
-    length = round_length((u1 - u0) / 5)
-    v = v0 - 0.05 * (v1 - v0)
-    ax.plot(
-        [u0, u0 + length], [v, v], color="#222222", lw=2.2, solid_capstyle="butt", clip_on=False
-    )
-    text = f"{length:g} {unit}" if unit != "m" or length >= 1 else f"{1e3 * length:g} mm"
-    beside: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 8}
-    ax.annotate(text.strip(), (u0 + length, v), (5, 0), **beside, annotation_clip=False)
-    ax.set(xlim=(u0, u1), ylim=(v0, v1))
-
-
-def triad(ax: Axes, camera: Camera, small: bool = False) -> None:
-    """The basic axes as three short lines below the lower right corner."""
-    u0, u1, v0, v1 = camera.window
-    reach = (0.05 if small else 0.06) * min(u1 - u0, v1 - v0)
-    origin = np.array([u1 - 1.8 * reach, v0 - 0.2 * reach])
-    tips = camera.project(np.eye(3)) * reach
-    for tip, name in zip(tips, "xyz", strict=True):
-        style = {"arrowstyle": "-", "color": "#555555", "lw": 0.9, "shrinkA": 0, "shrinkB": 0}
-        ax.annotate("", tuple(origin + tip), tuple(origin), arrowprops=style, annotation_clip=False)
-        if np.linalg.norm(tip) > 0.3 * reach:
-            paper.halo_text(ax, origin + 1.45 * tip, name, "#555555", 6.0 if small else 7.5)
-
-
-def round_length(most: float) -> float:
-    """The largest 1, 2 or 5 times a power of ten that is not above ``most``.
-
-    >>> round_length(0.37)
-    0.2
-    """
-    base = 10.0 ** np.floor(np.log10(most))
-    return float(max(k * base for k in (1, 2, 5) if k * base <= most * (1 + 1e-12)))
 
 
 def hertz(f: float) -> str:

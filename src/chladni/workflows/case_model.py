@@ -12,7 +12,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, node_points
 
 if TYPE_CHECKING:
-    from ..view.scene import Marker
+    from ..view.annotations import Marker
 
 DAMPING = 0.01  # where neither case nor test says
 REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
@@ -40,7 +40,7 @@ def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
 
 def cords(case: Case) -> list["Marker"]:
     """Hangers for a picture: places without a direction."""
-    from ..view.scene import Marker
+    from ..view.annotations import Marker
 
     places = case.assembly.points[case.assembly.rows(list(case.setup.hangers))].tolist()
     return [Marker((x[0], x[1], x[2]), (0.0, 0.0, 0.0)) for x in places]
@@ -48,7 +48,7 @@ def cords(case: Case) -> list["Marker"]:
 
 def markers(dofs: MeasuredDofs) -> list["Marker"]:
     """Sensors and shakers for a picture; the base has no place."""
-    from ..view.scene import Marker
+    from ..view.annotations import Marker
 
     return [
         Marker((x[0], x[1], x[2]), (n[0], n[1], n[2]), text)
