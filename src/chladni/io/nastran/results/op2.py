@@ -56,10 +56,10 @@ def _module(name: str) -> ModuleType:
 
 
 def _read(path: Path | str, kind: str) -> dict[str, Any]:
-    module = _module(kind)
     if not Path(path).is_file():
         raise FileError(f"{path} does not exist")
     refuse_large(Path(path))
+    module = _module(kind)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's own making
         try:
