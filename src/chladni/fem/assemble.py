@@ -60,9 +60,13 @@ class Structure:
             axes = self.assembly.axes[at, component % 3]
         return self._directions(6 * at + 3 * (component // 3), axes)
 
-    def along(self, ids: np.ndarray, directions: np.ndarray) -> sp.csr_array:
-        """Translation of the points with these ids along directions (k, 3) of the basic frame."""
-        return self._directions(6 * self.assembly.rows(ids), np.asarray(directions, float))
+    def along(self, ids: np.ndarray, directions: np.ndarray, turning: bool = False) -> sp.csr_array:
+        """Translation of the points with these ids along directions (k, 3) of the basic frame.
+
+        Their rotation about the directions where ``turning``.
+        """
+        first = 6 * self.assembly.rows(ids) + (3 if turning else 0)
+        return self._directions(first, np.asarray(directions, float))
 
     def hysteretic(self) -> System:
         """The system with the complex stiffness K (1 + i g) + i K_loss."""

@@ -1,6 +1,6 @@
 """Where sensors and shakers are on a structure: one type from the case to the picture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,16 +46,24 @@ class MeasuredDofs:
         )
         return {int(node): x for node, x in named if node.isdecimal()}
 
-    def rows(self, built: Structure) -> sp.csr_array:
+    def rows(self, built: Structure, turning: bool = False) -> sp.csr_array:
         """Motion of each dof over the free dofs of the structure (k, n); the base has none (zero).
 
-        A place that is no grid moves with the nearest point of the shells.
+        A place that is no grid moves with the nearest point of the shells. Where ``turning``, the
+        rotation about the direction instead.
         """
         found = sp.lil_array((len(self.labels), built.T.shape[1]))
         real = np.flatnonzero(~self.base)
         if len(real):
-            found[real] = rows_of(built, self.grids[real], self.points[real], self.directions[real])
+            found[real] = rows_of(
+                built, self.grids[real], self.points[real], self.directions[real], turning
+            )
         return sp.csr_array(found)
+
+    def across(self) -> tuple["MeasuredDofs", "MeasuredDofs"]:
+        """The same places along two directions u, v square to their own, u x v = n."""
+        u, v = tangents(self.directions)
+        return replace(self, directions=u), replace(self, directions=v)
 
     def loads(self, built: Structure) -> sp.csr_array:
         """What each input does to the free dofs, all forces or all motions of the base (k, n).

@@ -28,6 +28,7 @@ from .preparation import (
 from .question import Question
 from .reduced_model import evaluate
 from .scan import baseline, field_slopes, point_scores
+from .sensor_errors import sensor_errors
 
 NOISE = 0.01  # of |H|, at every line that is compared
 MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
@@ -79,6 +80,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     unit = Responses(
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
         noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
+        sensors=sensor_errors(asked.outputs, asked.inputs, built),
     ).over(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, f_max, measured_on(asked))
     problem = updating_problem(asked, reduced, unit, nuisance, f_max)

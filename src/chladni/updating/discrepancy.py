@@ -57,8 +57,14 @@ class Lines(Protocol):
     def std(self) -> np.ndarray:
         """Standard deviation of log10 H."""
 
+    def wrong(self, state: State) -> np.ndarray | float:
+        """E|d ln H|² of what sensors show wrongly by themselves."""
+
     def only(self, use: np.ndarray) -> Self:
         """Others in use."""
+
+    def stacked(self, z: np.ndarray) -> np.ndarray:
+        """Columns of residuals (n, k) of complex deviations over their spread (k, n_f, ...)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +175,7 @@ def curvature(data: Lines, state: State) -> np.ndarray:
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
     sd = every.std() * np.log(10) * USUAL
-    sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0)
+    sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0) + data.wrong(state)
     return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
 
 
@@ -195,8 +201,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
         out[0, ..., p] = root[:, None, None] * both
         out[1, ..., p] = data.s[:, None] ** 2 * both
     out /= H * sd * np.log(10)
-    z = out[:, :, data.use].reshape(2 * len(i), int(data.use.sum()) * len(phi_i)).T
-    return np.concatenate([z.real, z.imag])
+    return data.stacked(out.reshape(2 * len(i), *H.shape))
 
 
 @dataclass(frozen=True, eq=False)

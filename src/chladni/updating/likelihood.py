@@ -17,6 +17,7 @@ from ..ema.identification import DERIVATIVES
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
 from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
+from .sensor_errors import SensorErrors, Whitening, variance, whitening
 
 LN10 = np.log(10.0)
 
@@ -62,6 +63,8 @@ class Responses:
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
     direct: np.ndarray | float = 0.0
+    sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
+    known: Whitening | None = None  # of what those errors do to the lines and channels in use
 
     @property
     def power(self) -> int:
@@ -70,7 +73,9 @@ class Responses:
 
     def over(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
-        return replace(self, a=model.rows(self.outputs), b=model.rows(self.inputs))  # type: ignore[arg-type]
+        sensors = None if self.sensors is None else self.sensors.over(model)
+        a, b = model.rows(self.outputs), model.rows(self.inputs)  # type: ignore[arg-type]
+        return replace(self, a=a, b=b, sensors=sensors)
 
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in)."""
@@ -111,22 +116,35 @@ class Responses:
         return np.sqrt(out)
 
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
-        """The same responses of a model whose form is off by about δ, as seen from a state."""
+        """The same responses of a model whose form is off by about δ, as seen from a state.
+
+        What sensors show wrongly by themselves is allowed for as well.
+        """
         plain = self.exactly()
         data = replace(plain, bent=curvature(plain, state), about=state)
-        return replace(data, error=discrepancy(data, state).with_delta(delta))
+        return data._spread(state, delta)
+
+    def _spread(self, about: State, delta: float) -> Self:
+        """Covariance of the lines and channels in use."""
+        data = replace(self, known=None, error=None)
+        if data.sensors is not None:
+            data = replace(data, known=whitening(data.sensors, data, about))
+        return replace(data, error=discrepancy(data, about).with_delta(delta))
+
+    def wrong(self, state: State) -> np.ndarray | float:
+        """E|d ln H|² of what sensors show wrongly by themselves (n_f, n_out, n_in)."""
+        return 0.0 if self.sensors is None else variance(self.sensors, self, state)
 
     def exactly(self) -> Self:
-        """The same responses of a model that is right but for its parameters."""
-        return replace(self, bent=None, error=None, about=None)
+        """The same responses of a model and a test that are right but for its parameters."""
+        return replace(self, bent=None, error=None, about=None, known=None)
 
     def using(self, use: np.ndarray) -> Self:
         """Other lines and channels, with the same errors of the model's form."""
         data = replace(self, use=use)
         if self.error is None or self.about is None:
             return data
-        error = discrepancy(data, self.about).with_delta(self.error.delta)
-        return replace(data, error=error)
+        return data._spread(self.about, self.error.delta)
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread, with the errors of the model's form whitened out."""
@@ -136,14 +154,21 @@ class Responses:
         return self.error.whitened(r), self.error.whitened(J) if gradient else J
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Real and imaginary part of δ over its spread, on the lines and channels in use."""
+        """Real and imaginary part of δ over its spread, on the lines and channels in use.
+
+        Errors of the sensors are whitened out of them.
+        """
         sd = self.std()
-        delta = (self.deviation(state) / sd)[self.use].ravel()
-        r = np.concatenate([delta.real, delta.imag])
+        r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
         if not gradient:
             return r, np.zeros((len(r), 0))
-        J = (self._slopes(state) / sd[None])[:, self.use].reshape(len(state.dK), len(r) // 2).T
-        return r, np.concatenate([J.real, J.imag])
+        return r, self.stacked(self._slopes(state) / sd[None])
+
+    def stacked(self, z: np.ndarray) -> np.ndarray:
+        """Columns of residuals (n, k) of k complex deviations over their spread (k, n_f, ...)."""
+        picked = z[:, self.use].reshape(len(z), -1).T
+        columns = np.concatenate([picked.real, picked.imag])
+        return columns if self.known is None else self.known.whitened(columns)
 
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.

@@ -39,6 +39,7 @@ from .other_recordings import levels, measured_spread, others_identified, spread
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
+from .sensor_errors import GAIN, PLACE, TILT, sensor_errors
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
@@ -83,6 +84,7 @@ def _by_responses(question: Question) -> Prepared:
     nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
+    wrong = sensor_errors(question.outputs, question.inputs, built)
     reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -97,7 +99,7 @@ def _by_responses(question: Question) -> Prepared:
         read = Responses(
             H, s, rows_o, rows_i, use, found.quantity,
             noise=noise if spread is None else np.maximum(noise, spread),
-            direct=question.outputs.carried_by(question.inputs),
+            direct=question.outputs.carried_by(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.over(reduced.model))
     nuisance = nuisances(reduced, nominal, f_max, measured_on(question))
@@ -130,11 +132,13 @@ def _by_responses(question: Question) -> Prepared:
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
-    if (sd := _place_sd(question)) > 0:
-        notes.append(
-            f"places are known to {1e3 * sd:.3g} mm at worst and count as exact; above "
-            f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
-        )
+    sd = _place_sd(question)
+    notes.append(
+        f"sensors and force gauges may be off by {GAIN:.0%} in gain, {np.degrees(TILT):.0f}° in "
+        f"direction, {1e3 * (sd or PLACE):.2g} mm in place"
+        + (f" at worst; above {1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
+           if sd else "")
+    )  # fmt: skip
     notes += _mass_note(question)
     problem = replace(problem, damping=modal_damping(found, low, fit_max))
     own = AtLevel(question.level, frf, found, question.control)

@@ -169,8 +169,7 @@ def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
     delta = np.log(H / data.values) / LN10
     if state.offset is not None:
         delta = delta + state.offset[:, None]
-    z = (wrapped(delta) / data.std())[:, data.use].reshape(len(H), -1)
-    return np.concatenate([z.real, z.imag], axis=1).T
+    return data.stacked(wrapped(delta) / data.std())
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,212 @@
+"""What sensors and force gauges show wrongly by themselves: gain, tilt and place of each.
+
+No model need explain it, and no parameter should bend for it: the errors are small, independent
+and of known size, and what they do to log10 H is linear in them. With e the relative error of the
+gain, θ the tilt and x the error of the place, and u, v square to the direction n = u x v,
+
+d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H,
+
+H_u the response along u, ∂H/∂u = -φ_v, ∂H/∂v = φ_u the slopes of the sheet from its rotations
+(w(x + dx) = w + θ × dx · n). Their covariance V Vᵀ is whitened out of the residuals before anything
+is fitted (C = I + V Vᵀ): channel by channel, for each has its own five, and then what the inputs
+do to all channels.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.assemble import Structure
+from ..fem.measured_dofs import MeasuredDofs
+from .reduced_model import Reduced, State
+
+GAIN = 0.01  # relative; calibrators let pass 3 %
+TILT = 0.0175  # [rad], one degree: glued by eye
+PLACE = 1.5e-3  # [m] each way, where no other uncertainty is stated: placed by a tape measure
+WAYS = 4  # tilts about u and v, places along u and v
+LN10 = np.log(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """Errors of the outputs, or of the inputs.
+
+    Attributes
+    ----------
+    gain : relative standard deviation
+    rows : four (k, n)     motions that tilts and wrong places mix in, times their deviations
+    carried : (4, k, n_in) what a moving base carries along of them
+    modal : (4, k, r)      the rows in a basis
+    """
+
+    gain: float
+    rows: tuple[sp.csr_array, ...]
+    carried: np.ndarray
+    modal: np.ndarray
+
+    def over(self, model: Reduced) -> Self:
+        """The rows in the basis of this model."""
+        return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
+
+
+def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure) -> Side:
+    """Of accelerometers and force gauges as they are usually mounted and calibrated."""
+    u, v = dofs.across()
+    place = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, PLACE))
+    rows = (
+        TILT * u.rows(built), TILT * v.rows(built),
+        place @ v.rows(built, turning=True), place @ u.rows(built, turning=True),
+    )  # fmt: skip
+    still = np.zeros((len(dofs.labels), len(inputs.labels)))
+    carried = np.stack([TILT * u.carried_by(inputs), TILT * v.carried_by(inputs), still, still])
+    return Side(GAIN, tuple(map(sp.csr_array, rows)), carried, np.zeros((WAYS, 0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class SensorErrors:
+    """Errors of all sensors and of all force gauges."""
+
+    outputs: Side
+    inputs: Side
+
+    def over(self, model: Reduced) -> Self:
+        """The same in the basis of this model."""
+        return replace(self, outputs=self.outputs.over(model), inputs=self.inputs.over(model))
+
+
+def sensor_errors(outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure) -> SensorErrors:
+    """As they are expected where nobody says more."""
+    return SensorErrors(side(outputs, inputs, built), side(inputs, inputs, built))
+
+
+class Lines(Protocol):
+    """Responses on lines s, as :class:`.likelihood.Responses`."""
+
+    @property
+    def s(self) -> np.ndarray:
+        """(n_f,) [rad/s]."""
+
+    @property
+    def use(self) -> np.ndarray:
+        """Lines and channels in use (n_f, n_out)."""
+
+    @property
+    def power(self) -> int:
+        """Power of s by which the receptance is multiplied."""
+
+    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """φ_o, φ_i and D."""
+
+    def model(self, state: State) -> np.ndarray:
+        """H of the model."""
+
+    def std(self) -> np.ndarray:
+        """Standard deviation of log10 H."""
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """C^-½ of C = I + V Vᵀ: what belongs to one output first, what the inputs do after it.
+
+    Attributes
+    ----------
+    own : (n, k) sparse, orthonormal    columns that live on one output each
+    own_less : (k,)                     1 - 1/√(1 + s)
+    common : (n, m) orthonormal
+    common_less : (m,)
+    """
+
+    own: sp.csc_array
+    own_less: np.ndarray
+    common: np.ndarray
+    common_less: np.ndarray
+
+    def whitened(self, r: np.ndarray) -> np.ndarray:
+        """Residuals or columns of slopes (n, ...)."""
+        return _less(self.common, self.common_less, _less(self.own, self.own_less, r))
+
+
+def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """R less what lies along each column, by its share."""
+    along = U.T @ r
+    return np.asarray(r - U @ (less[:, None] * along if along.ndim > 1 else less * along))
+
+
+def whitening(errors: SensorErrors, data: Lines, state: State) -> Whitening:
+    """As the errors spread over the residuals of a state (over their spread, in use)."""
+    H, scale = data.model(state), data.std() * LN10
+    by_output = [_in_use(data, z) for z in _of_outputs(errors.outputs, data, state, H, scale)]
+    n_out = H.shape[1]
+    channel = np.tile(np.broadcast_to(np.arange(n_out)[:, None], H.shape)[data.use].ravel(), 2)
+    V = np.stack(by_output, axis=1)
+    columns, less = [], []
+    for k in np.unique(channel):
+        at = np.flatnonzero(channel == k)
+        U, share = _orthonormal(V[at])
+        columns.append(sp.coo_array((U.ravel(), _grid(at, U.shape[1])), shape=(len(V), U.shape[1])))
+        less.append(share)
+    own = sp.csc_array(sp.hstack(columns)) if columns else sp.csc_array((len(V), 0))
+    own_less = np.concatenate([*less, np.zeros(0)])
+    by_input = [_in_use(data, z) for z in _of_inputs(errors.inputs, data, state, H, scale)]
+    common = np.stack(by_input, axis=1) if by_input else np.zeros((len(V), 0))
+    return Whitening(own, own_less, *_orthonormal(_less(own, own_less, common)))
+
+
+def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
+    """|d ln H|² that is to be expected of them (n_f, n_out, n_in)."""
+    H = data.model(state)
+    one = np.ones_like(H.real)
+    out = np.zeros(H.shape)
+    for z in _of_outputs(errors.outputs, data, state, H, one):
+        out += np.abs(z) ** 2
+    for z in _of_inputs(errors.inputs, data, state, H, one):
+        out += np.abs(z) ** 2
+    return out
+
+
+def _of_outputs(
+    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
+) -> list[np.ndarray]:
+    """What one standard deviation of each error of an output does to its residuals (five of H)."""
+    _, phi_i, d = data.modal(state)
+    out = [errors.gain / scale]
+    for modal, carried in zip(errors.modal, errors.carried, strict=True):
+        G = np.einsum("or,fr,ir->foi", modal @ state.phi, d, phi_i, optimize=True)
+        out.append((data.s[:, None, None] ** data.power * G + carried) / (H * scale))
+    return out
+
+
+def _of_inputs(
+    errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
+) -> list[np.ndarray]:
+    """The same of each input, zero where another drives; of a moving base its gain alone."""
+    phi_o, phi_i, d = data.modal(state)
+    out = []
+    for i in range(len(phi_i)):
+        one = np.arange(len(phi_i)) == i
+        out.append(errors.gain / scale * one)
+        for modal in errors.modal[:, i] if state.drive is None else ():
+            G = np.einsum("or,fr,r->fo", phi_o, d, modal @ state.phi, optimize=True)
+            z = (data.s[:, None] ** data.power * G)[..., None] / (H * scale)
+            out.append(z * one)
+    return out
+
+
+def _in_use(data: Lines, z: np.ndarray) -> np.ndarray:
+    """Real and imaginary part in the order of the residuals (n,)."""
+    picked = z[data.use].ravel()
+    return np.concatenate([picked.real, picked.imag if np.iscomplexobj(z) else 0 * picked.real])
+
+
+def _grid(rows: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of a dense block (n, k) on some rows."""
+    return np.repeat(rows, columns), np.tile(np.arange(columns), len(rows))
+
+
+def _orthonormal(V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """U (n, k) of V Vᵀ = U diag(s) Uᵀ, and 1 - 1/√(1 + s)."""
+    s, Q = np.linalg.eigh(V.T @ V)
+    kept = s > 1e-9 * max(float(s.max(initial=0.0)), 1e-9)
+    return V @ (Q[:, kept] / np.sqrt(s[kept])), 1 - 1 / np.sqrt(1 + s[kept])
