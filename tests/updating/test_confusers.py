@@ -64,12 +64,15 @@ def test_what_has_become_the_named_effect_is_told_as_that():
 
 def test_a_leader_that_has_become_a_simpler_effect_lets_it_lead():
     lump, mass = tried("local-resonator", 0.0, "point-mass"), tried("point-mass", TIED - 1)
-    assert simplest_first([lump, mass]) == [mass, lump]
+    assert simplest_first([lump, mass], 500.0) == [mass, lump]
     far = tried("point-mass", TIED + 1)
-    assert simplest_first([lump, far]) == [lump, far]
+    assert simplest_first([lump, far], 500.0) == [lump, far]
+    foot = 100 * (TIED + 1)  # a resonance beyond all lines has added a hundredth of the gain
+    assert simplest_first([lump, far], foot + 1) == [far, lump]
+    assert simplest_first([lump, far], foot - 1) == [lump, far]
     own = tried("local-resonator", 0.0)
-    assert simplest_first([own, mass]) == [own, mass]
-    assert simplest_first([]) == []
+    assert simplest_first([own, mass], 500.0) == [own, mass]
+    assert simplest_first([], 500.0) == []
 
 
 def test_a_lump_tuned_above_the_highest_line_is_a_point_mass():
@@ -83,10 +86,10 @@ def test_a_value_a_thing_cannot_have_yields_to_one_it_can():
     """A uniform hem and a stiff string are one to frequencies: told as one of the two."""
     string = tried("adhesive-stiffness", 0.0, implausible="E of 210000 MPa is that of no sealant")
     hem, far = tried("hem-contact", TIED - 1), tried("hem-contact", TIED + 1)
-    assert simplest_first([string, hem]) == [hem, string]
-    assert simplest_first([string, far]) == [string, far]
+    assert simplest_first([string, hem], 500.0) == [hem, string]
+    assert simplest_first([string, far], 500.0) == [string, far]
     plain = tried("adhesive-stiffness", 0.0)
-    assert simplest_first([plain, hem]) == [plain, hem]
+    assert simplest_first([plain, hem], 500.0) == [plain, hem]
     answer = with_confusers(Diagnosis(None, None, None, (hem, string), "missing physics"))
     assert answer.one_of[:2] == ("hem-contact", "adhesive-stiffness")
     assert "cut through the hem" in answer.one_of[2]

@@ -100,7 +100,7 @@ def diagnose(
     progress("closing in on the place", 0.7)
     hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
     closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
-    hypotheses = simplest_first(_by_family([*hypotheses, *closer]))
+    hypotheses = simplest_first(_by_family([*hypotheses, *closer]), null.neg2_log_evidence)
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)

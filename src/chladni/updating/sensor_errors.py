@@ -13,13 +13,14 @@ do to all channels.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
+from .discrepancy import Lines
 from .reduced_model import Reduced, State
 
 GAIN = 0.01  # relative; calibrators let pass 3 %
@@ -79,31 +80,6 @@ class SensorErrors:
 def sensor_errors(outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure) -> SensorErrors:
     """As they are expected where nobody says more."""
     return SensorErrors(side(outputs, inputs, built), side(inputs, inputs, built))
-
-
-class Lines(Protocol):
-    """Responses on lines s, as :class:`.likelihood.Responses`."""
-
-    @property
-    def s(self) -> np.ndarray:
-        """(n_f,) [rad/s]."""
-
-    @property
-    def use(self) -> np.ndarray:
-        """Lines and channels in use (n_f, n_out)."""
-
-    @property
-    def power(self) -> int:
-        """Power of s by which the receptance is multiplied."""
-
-    def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """φ_o, φ_i and D."""
-
-    def model(self, state: State) -> np.ndarray:
-        """H of the model."""
-
-    def std(self) -> np.ndarray:
-        """Standard deviation of log10 H."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,22 +3,30 @@
 from .hypothesis_fit import HypothesisFit
 
 TIED = 10.0  # in -2 ln evidence, e^5: odds up to which two explanations are one answer
+FOOT = 0.01  # of the gain, a tenth of an effect in amplitude: what a simpler one may leave of it
 
 
-def simplest_first(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
+def simplest_first(hypotheses: list[HypothesisFit], null: float) -> list[HypothesisFit]:
     """Best first, but for a leader that another close behind is to be preferred to.
 
-    A lump on a spring that is tuned above all lines is a point mass: the simpler effect leads. A
+    A lump on a spring that is tuned above all lines is a point mass: the simpler effect leads,
+    unless the foot of a resonance that no line shows is more than a hundredth of what was gained. A
     sealant as stiff as steel is no sealant: what has a value it can have leads.
+
+    Parameters
+    ----------
+    null : -2 ln evidence without any of them
     """
     if not hypotheses:
         return hypotheses
     lead = hypotheses[0]
     at = lead.fit.of(lead.effect)
     simpler, odd = lead.effect.becomes(at), bool(lead.effect.implausible(at))
+    foot = FOOT * (null - lead.neg2_log_evidence)
     for t in hypotheses[1:]:
         sound = not t.effect.implausible(t.fit.of(t.effect))
-        preferred = t.effect.name == simpler or (odd and sound)
-        if preferred and t.neg2_log_evidence < lead.neg2_log_evidence + TIED:
+        behind = t.neg2_log_evidence - lead.neg2_log_evidence
+        near = odd and sound and behind < TIED
+        if near or (t.effect.name == simpler and behind < max(TIED, foot)):
             return [t, *(other for other in hypotheses if other is not t)]
     return hypotheses
