@@ -48,6 +48,9 @@ delay = 0.0
 sensors = "sensors.csv"
 mass = 1.413
 mass_sd = 0.002
+gain_sd = 0.01
+direction_sd = 1.0
+position_sd = 0.0015
 hangers = [1, 35]
 [[recording]]
 file = "b.npz"
@@ -96,6 +99,9 @@ OTHER = {  # another accepted value of every word
     ("test", "sensors"): '"others.csv"',
     ("test", "mass"): "1.42",
     ("test", "mass_sd"): "0.003",
+    ("test", "gain_sd"): "0.02",
+    ("test", "direction_sd"): "2.0",
+    ("test", "position_sd"): "0.001",
     ("test", "hangers"): "[1]",
     ("recording", "file"): '"a.npz"',
     ("recording", "article"): '"C"',

@@ -7,14 +7,17 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.ordinary import ordinary
+from chladni.ema.setup import SensorAccuracy
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
-from chladni.updating.sensor_errors import GAIN, PLACE, TILT, sensor_errors, variance
+from chladni.updating.sensor_errors import sensor_errors, variance
 from chladni_specimens.plates import plate
 
 S = 2 * np.pi * np.linspace(25, 180, 30) * (0.08 + 1j)
+USUAL = SensorAccuracy()
+GAIN, TILT, PLACE = USUAL.gain, USUAL.direction, USUAL.position
 SMALL = 1e-3  # of an error's standard deviation: what is left of a secant is of second order
 
 
@@ -53,7 +56,7 @@ def recorded(made, state, use=None):
     shape = (len(S), 3, 2)
     empty = Responses(
         np.ones(shape, complex), S, OUTPUTS.rows(built), INPUTS.rows(built), use,
-        noise=np.full(shape, 0.002), sensors=sensor_errors(OUTPUTS, INPUTS, built),
+        noise=np.full(shape, 0.002), sensors=sensor_errors(OUTPUTS, INPUTS, built, USUAL),
     ).over(made.model)  # fmt: skip
     return replace(empty, values=empty.model(state))
 
@@ -75,7 +78,7 @@ def test_what_is_mixed_in_is_what_turned_and_moved_sensors_show(made, state, way
     modes = (state.lam > omega2[0]) & (state.lam < omega2[1])
     shapes = made.model.basis @ state.phi[:, modes]
     seen = (moved(side, way).rows(built) - side.rows(built)) @ shapes / SMALL
-    told = sensor_errors(side, INPUTS, built).outputs.rows[way] @ shapes
+    told = sensor_errors(side, INPUTS, built, USUAL).outputs.rows[way] @ shapes
     sign = np.sign((seen * told).sum())
     assert np.linalg.norm(seen - sign * told) < near * np.linalg.norm(seen)
 
@@ -125,8 +128,8 @@ def test_a_wrong_sensor_costs_as_much_as_its_error_is_likely(made, state):
 
 def test_errors_of_an_uncertain_place_are_as_large_as_is_stated(made):
     built = made.groups.structure
-    stated = sensor_errors(replace(OUTPUTS, sd=np.full(3, 2 * PLACE)), INPUTS, built).outputs
-    usual = sensor_errors(OUTPUTS, INPUTS, built).outputs
+    stated = sensor_errors(replace(OUTPUTS, sd=np.full(3, 2 * PLACE)), INPUTS, built, USUAL).outputs
+    usual = sensor_errors(OUTPUTS, INPUTS, built, USUAL).outputs
     for way, factor in ((0, 1), (1, 1), (2, 2), (3, 2)):
         assert_allclose(stated.rows[way].toarray(), factor * usual.rows[way].toarray())
 

@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
-from ..ema.setup import Recording, Sensor, TestSetup
+from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
 from ..errors import ChladniError, FileError, LabelError, did_you_mean, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
@@ -281,6 +281,20 @@ def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
         hangers=tuple(hangers),
         mass=mass,
         mass_sd=_MASS_SD * (mass or 0.0) if mass_sd is None else mass_sd,
+        accuracy=_accuracy(test),
+    )
+
+
+def _accuracy(test: TomlSection) -> SensorAccuracy:
+    """How well sensors are known, the usual where nothing is said."""
+    usual = SensorAccuracy()
+    gain, turn, place = (
+        test.number(key, low=0.0) for key in ("gain_sd", "direction_sd", "position_sd")
+    )
+    return SensorAccuracy(
+        usual.gain if gain is None else gain,
+        usual.direction if turn is None else float(np.radians(turn)),
+        usual.position if place is None else place,
     )
 
 

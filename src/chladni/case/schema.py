@@ -106,6 +106,13 @@ SCHEMA = (
         "Weighed mass of the article, its sensors taken off.", "10.508", _TEST),
     Key("test", "mass_sd", "number above 0", "kg", "0.2 % of the mass",
         "Standard deviation of the weighing.", "0.005", _FIT),
+    Key("test", "gain_sd", "number", "", "0.01",
+        "Standard deviation of the gain of each sensor and force gauge, relative.", "0.005", _FIT),
+    Key("test", "direction_sd", "number", "deg", "1",
+        "Standard deviation of the direction of each, either way.", "0.5", _FIT),
+    Key("test", "position_sd", "number", "m", "0.0015",
+        "Standard deviation of the place of each, either way along the sheet, where the table of "
+        "sensors gives none.", "0.003", _FIT),
     Key("test", "hangers", "list of grids", "", "none",
         "Where cords hold the article: the springs of `suspension` sit there.", "[101, 102]",
         ("diagnose", "bench")),

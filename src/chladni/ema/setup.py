@@ -158,6 +158,22 @@ class Sensor:
     use: bool = True  # an output that is left out is as if it had not been recorded
 
 
+@dataclass(frozen=True)
+class SensorAccuracy:
+    """How far sensors and force gauges are what and where they should be: standard deviations.
+
+    Attributes
+    ----------
+    gain : relative; calibrators let pass 3 %
+    direction : [rad] either way; glued by eye
+    position : [m] either way, where a sensor's own is not stated; placed by a tape measure
+    """
+
+    gain: float = 0.01
+    direction: float = float(np.radians(1.0))
+    position: float = 1.5e-3
+
+
 @dataclass(frozen=True, eq=False)
 class TestSetup:
     """The test as it was set up: sensors, exciters, hangers, the weighing."""
@@ -169,6 +185,7 @@ class TestSetup:
     hangers: tuple[int, ...] = ()  # grids
     mass: float | None = None  # weighed [kg]
     mass_sd: float = 0.0  # [kg]
+    accuracy: SensorAccuracy = SensorAccuracy()
 
     def sensor(self, label: str, role: Role = "output") -> Sensor:
         """The sensor (or exciter) of this label.

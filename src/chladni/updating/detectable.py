@@ -80,7 +80,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     unit = Responses(
         np.ones(shape, complex), s, *rows, np.ones(shape[:2], bool),
         noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
-        sensors=sensor_errors(asked.outputs, asked.inputs, built),
+        sensors=sensor_errors(asked.outputs, asked.inputs, built, asked.accuracy),
     ).over(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, f_max, measured_on(asked))
     problem = updating_problem(asked, reduced, unit, nuisance, f_max)

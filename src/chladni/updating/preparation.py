@@ -39,7 +39,7 @@ from .other_recordings import levels, measured_spread, others_identified, spread
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
-from .sensor_errors import GAIN, PLACE, TILT, sensor_errors
+from .sensor_errors import sensor_errors
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
@@ -84,7 +84,7 @@ def _by_responses(question: Question) -> Prepared:
     nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
-    wrong = sensor_errors(question.outputs, question.inputs, built)
+    wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
     reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -132,13 +132,7 @@ def _by_responses(question: Question) -> Prepared:
         )
     if not question.gain_known:
         notes.append("the gain is unknown: one real factor common to all channels is free")
-    sd = _place_sd(question)
-    notes.append(
-        f"sensors and force gauges may be off by {GAIN:.0%} in gain, {np.degrees(TILT):.0f}° in "
-        f"direction, {1e3 * (sd or PLACE):.2g} mm in place"
-        + (f" at worst; above {1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
-           if sd else "")
-    )  # fmt: skip
+    notes.append(_sensor_note(question))
     notes += _mass_note(question)
     problem = replace(problem, damping=modal_damping(found, low, fit_max))
     own = AtLevel(question.level, frf, found, question.control)
@@ -379,6 +373,18 @@ def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProbl
         model = reduced.model_for(effect, x)
         reduced = reduced if model is reduced.model else replace(reduced, model=model)
     return reduced
+
+
+def _sensor_note(question: Question) -> str:
+    """How far sensors and gauges may be off without the model being blamed for it."""
+    known, sd = question.accuracy, _place_sd(question)
+    stated = f", {1e3 * sd:.2g} mm at worst where the table of sensors says it" if sd else ""
+    place = f"{1e3 * known.position:.2g} mm in place{stated}"
+    return (
+        f"sensors and force gauges may be off by {known.gain:.2g} of their gain, "
+        f"{np.degrees(known.direction):.2g}° in direction, {place} (standard deviations); above "
+        f"{1e3 * POSITION_UNCERTAIN:g} mm natural frequencies would be compared"
+    )
 
 
 NOT_WEIGHED = "no weighed mass was given: E and rho cannot be told apart, both stay near the deck"

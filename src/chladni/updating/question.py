@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified
 from ..ema.level_study import LevelStudy
-from ..ema.setup import Control
+from ..ema.setup import Control, SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
@@ -65,6 +65,7 @@ class Question:
     others: tuple[OtherRecording, ...] = ()
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
     control: Control = "force"  # what was held at it
+    accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
 
     def tested(self, assembly: Assembly) -> Assembly:
         """An article with the sensors of known mass on it, as it was measured."""

@@ -18,14 +18,12 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
 from .discrepancy import Lines
 from .reduced_model import Reduced, State
 
-GAIN = 0.01  # relative; calibrators let pass 3 %
-TILT = 0.0175  # [rad], one degree: glued by eye
-PLACE = 1.5e-3  # [m] each way, where no other uncertainty is stated: placed by a tape measure
 WAYS = 4  # tilts about u and v, places along u and v
 LN10 = np.log(10.0)
 
@@ -52,17 +50,17 @@ class Side:
         return replace(self, modal=np.stack([model.rows(rows) for rows in self.rows]))
 
 
-def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure) -> Side:
-    """Of accelerometers and force gauges as they are usually mounted and calibrated."""
+def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
+    """Of all places of one side; what a place's own deviation is goes before the usual one."""
     u, v = dofs.across()
-    place = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, PLACE))
+    place, turn = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, known.position)), known.direction
     rows = (
-        TILT * u.rows(built), TILT * v.rows(built),
+        turn * u.rows(built), turn * v.rows(built),
         place @ v.rows(built, turning=True), place @ u.rows(built, turning=True),
     )  # fmt: skip
     still = np.zeros((len(dofs.labels), len(inputs.labels)))
-    carried = np.stack([TILT * u.carried_by(inputs), TILT * v.carried_by(inputs), still, still])
-    return Side(GAIN, tuple(map(sp.csr_array, rows)), carried, np.zeros((WAYS, 0, 0)))
+    carried = np.stack([turn * u.carried_by(inputs), turn * v.carried_by(inputs), still, still])
+    return Side(known.gain, tuple(map(sp.csr_array, rows)), carried, np.zeros((WAYS, 0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +75,11 @@ class SensorErrors:
         return replace(self, outputs=self.outputs.over(model), inputs=self.inputs.over(model))
 
 
-def sensor_errors(outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure) -> SensorErrors:
-    """As they are expected where nobody says more."""
-    return SensorErrors(side(outputs, inputs, built), side(inputs, inputs, built))
+def sensor_errors(
+    outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
+) -> SensorErrors:
+    """As they are to be expected of sensors and force gauges known so well."""
+    return SensorErrors(side(outputs, inputs, built, known), side(inputs, inputs, built, known))
 
 
 @dataclass(frozen=True, eq=False)

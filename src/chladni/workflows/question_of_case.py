@@ -39,6 +39,7 @@ def question(case: Case) -> Question:
         gain_known=case.gain_known,
         parameters=case.parameters,
         carried=case.carried,
+        accuracy=case.setup.accuracy,
     )
     if frfs:
         first = case.recordings[0]
