@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from chladni.case import load_case
-from chladni.case.schema import COLUMNS, COMMANDS, SCHEMA, known, sections, unread
+from chladni.case.schema import COLUMNS, COMMANDS, PLANNED, SCHEMA, known, sections, unread
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
 from chladni.effects.effect import Effect
+from chladni.effects.registry import families
 from chladni.errors import ChladniError
 from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
@@ -305,3 +306,7 @@ def test_the_examples_of_the_page_are_accepted(folder: Path) -> None:
         if k.choices:
             assert value in k.choices
     assert read_table(folder / "sensors.csv", ("label",), _OPTIONAL)
+
+
+def test_what_is_only_planned_has_no_model_behind_it():
+    assert not {f.name for f in families()} & set(PLANNED)

@@ -53,9 +53,8 @@ ALIASES = {  # effects that are an ordinary number by another name
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
 PLANNED = (  # names of the public contract that no model stands behind yet
-    *("membrane-prestress", "viscoelastic-joint", "hem-contact"),
-    *("weld-missing", "weld-compliance", "over-constraint", "contact-stiffness", "rattle"),
-    *("joint-friction", "shaker-restraint", "compliant-support"),
+    *("membrane-prestress", "viscoelastic-joint", "over-constraint", "rattle", "joint-friction"),
+    *("shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 
