@@ -304,5 +304,6 @@ def _state_space(test: ThesisTest, found: ThesisFindings) -> list[Block]:
               "of the transient of one line in the next, which no linear model of the article "
               "answers to. Where every line is waited for by 200 cycles they are gone (tried: nine "
               f"poles of A, then none). Cords ring along themselves, too, at {along} "
-              "Hz in A: who taps them across does not hear it."]),
+              "Hz in A: who taps them across does not hear it. Below 15 Hz weak channels are off: "
+              "there the article swings on its cords, and the residual term L/s² is not enough."]),
     ]  # fmt: skip
