@@ -75,6 +75,19 @@ def test_shapes_scatter_as_foretold(found):
         assert (along < 1e-6 * np.trace(c, axis1=1, axis2=2)).all()
 
 
+def test_noise_leaves_the_mac_that_is_foretold(found):
+    """Shapes of runs against the mean of all: 1 - MAC is the trace of the covariance."""
+    C = [shape_covariance(one) for one in found]
+    lost, due = [], []
+    for k in range(MODES):
+        psi = np.array([real_shapes(one)[:, k] for one in found])
+        psi *= np.sign(psi @ psi[0])[:, None]
+        lost.append(1 - mac(psi.mean(axis=0)[:, None], psi.T).mean())
+        one = likeness(psi[:1].T, psi[0], np.mean(C, axis=0)[k], 0, np.array([0]))
+        due.append(1 - one.noise_leaves)
+    close_to_one(np.divide(lost, due), MODES * len(found) * (CHANNELS - 1))
+
+
 def test_scaled_shapes_have_the_spread_that_is_written(found):
     values = np.array([shapes(one).values for one in found])
     values *= np.sign((values * values[0].conj()).real.sum(axis=1, keepdims=True))

@@ -25,7 +25,7 @@ class Likeness:
     Attributes
     ----------
     mac : on all channels
-    noise_leaves : expected MAC of the test's shape with itself, recorded once more
+    noise_leaves : expected MAC of the true shape with the one that was identified
     seen, seen_mac : channels that see the mode, and the MAC on them
     chance : that the best of as many random shapes as there are model modes reaches ``seen_mac``
     space : share of the test's shape in the span of all model modes nearby
@@ -66,7 +66,7 @@ def likeness(
     channels = effective_channels(phi[seen])
     return Likeness(
         mac=whole,
-        noise_leaves=float(1 - 2 * min(np.trace(covariance), 0.5)),
+        noise_leaves=float(max(0.0, 1 - np.trace(covariance))),
         seen=int(seen.sum()),
         seen_mac=there,
         chance=chance_of(there, channels, phi.shape[1]),
