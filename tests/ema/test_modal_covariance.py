@@ -7,10 +7,11 @@ import pytest
 from scipy.stats import kstest
 
 from chladni.ema.correlation import mac
-from chladni.ema.identification import identify, kept_lines, pole_data
+from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mac_significance import best_half, chance_of, effective_channels, likeness
 from chladni.ema.modal_covariance import modal_covariance, propagated, thinned
 from chladni.ema.pole_fitting import solve
+from chladni.ema.response_variance import frf_variance
 from chladni.ema.shapes import real_shapes, shape_covariance, shape_sd, shapes
 from chladni_evidence.identification_evidence import recording, structure
 
@@ -26,6 +27,55 @@ def found():
     runs = [r for r in runs if r.order == MODES]
     assert len(runs) > 0.8 * SEEDS
     return runs
+
+
+def whole_covariance(root, local):
+    """C (2 + 2 n_c, 2 + 2 n_c) of one mode's pole and residues."""
+    C = root @ root.T
+    for c, block in enumerate(local):
+        C[2 + 2 * c : 4 + 2 * c, 2 + 2 * c : 4 + 2 * c] += block
+    return C
+
+
+def test_it_is_the_inverse_of_the_whole_information_matrix():
+    """(JᵀJ)⁻¹ over poles, residues and residual terms of all channels, J by differences."""
+    frf = recording(structure(566, 2, 3), "share", 1, lines=200)[0]
+    found = identify(frf)
+    r, n_c = found.order, 3
+    w = np.sqrt(2 / frf_variance(frf)).reshape(len(frf.frequency), n_c)
+    s = 2j * np.pi * frf.frequency
+
+    def model(x):
+        p, R = x[: 2 * r].view(complex), x[2 * r : 2 * r * (1 + n_c)].view(complex)
+        lower, upper = x[-2 * n_c : -n_c, None], x[-n_c:, None]
+        one = replace(found, lower=lower, upper=upper)
+        H = w * evaluate(one, s, p, R.reshape(r, n_c, 1))[:, :, 0]
+        return np.concatenate([H.real.ravel(), H.imag.ravel()])
+
+    x = np.concatenate([
+        found.poles.view(float), found.residues.ravel().view(float), found.lower.ravel(),
+        found.upper.ravel(),
+    ])  # fmt: skip
+    J = []
+    for k in range(len(x)):
+        h = np.zeros(len(x))
+        h[k] = 1e-6 * max(abs(x[k]), 1e-12)
+        J.append((model(x + h) - model(x - h)) / (2 * h[k]))
+    scale = np.linalg.norm(J, axis=1)
+    J = np.array(J).T / scale
+    C = np.linalg.inv(J.T @ J) / np.outer(scale, scale) * max(1.0, found.chi) ** 2
+    for k in range(r):
+        if not found.inside[k]:
+            continue
+        at = np.r_[2 * k, 2 * k + 1, 2 * r + 2 * n_c * k + np.arange(2 * n_c)]
+        due = C[np.ix_(at, at)]
+        sd = np.sqrt(np.diag(due))
+        got = whole_covariance(*found.covariance.of_mode(k))
+        np.testing.assert_allclose(got / np.outer(sd, sd), due / np.outer(sd, sd), atol=2e-3)
+    both = C[: 2 * r, : 2 * r]
+    L = found.covariance.pole.reshape(2 * r, -1)
+    sd = np.sqrt(np.diag(both))
+    np.testing.assert_allclose(L @ L.T / np.outer(sd, sd), both / np.outer(sd, sd), atol=2e-3)
 
 
 def ratio(values, covariances):
@@ -53,11 +103,7 @@ def test_poles_and_residues_scatter_as_foretold(found):
             R = one.residues[k].ravel()
             p = one.poles[k]
             values.append(np.stack([np.r_[p, R].real, np.r_[p, R].imag], axis=1).ravel())
-            root, local = one.covariance.of_mode(k)
-            C = root @ root.T
-            for c, block in enumerate(local):
-                C[2 + 2 * c : 4 + 2 * c, 2 + 2 * c : 4 + 2 * c] += block
-            covariances.append(C)
+            covariances.append(whole_covariance(*one.covariance.of_mode(k)))
         ratios.append(ratio(values, covariances))
     close_to_one(ratios, MODES * len(found) * (2 + 2 * CHANNELS))
 
