@@ -9,8 +9,9 @@ from scipy.stats import kstest
 from chladni.ema.correlation import mac
 from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mac_significance import best_half, chance_of, effective_channels, likeness
-from chladni.ema.modal_covariance import modal_covariance, propagated, thinned
+from chladni.ema.modal_covariance import modal_covariance, thinned
 from chladni.ema.pole_fitting import solve
+from chladni.ema.propagation import propagated
 from chladni.ema.response_variance import frf_variance
 from chladni.ema.shapes import real_shapes, shape_covariance, shape_sd, shapes
 from chladni_evidence.identification_evidence import recording, structure

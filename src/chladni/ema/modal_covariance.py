@@ -7,9 +7,8 @@ x_c of each channel: δp has the inverse of the Gauss-Newton matrix with the res
 as there are unknowns of poles, and no matrix of all residues is ever formed.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -24,12 +23,8 @@ from .pole_fitting import (
     turned,
 )
 
-if TYPE_CHECKING:
-    from .identification import Identified
-
 _RIDGE = 1e-12  # of the orthonormal basis, as the fit has it
 _SINGULAR = 1e-12  # of the largest: directions of the poles that the data do not know
-_STEP = 1e-5  # of a mode's residues and pole, for slopes of what is made of them
 WORK = 2e10  # multiplications: some ten seconds; larger recordings are thinned
 
 
@@ -119,52 +114,3 @@ def _inverse_root(H: np.ndarray) -> np.ndarray:
     value, vector = np.linalg.eigh(d[:, None] * H * d)
     keep = np.where(value > _SINGULAR * value[-1], 1 / np.sqrt(np.maximum(value, 1e-300)), 0.0)
     return np.asarray(d[:, None] * vector * keep)
-
-
-def propagated(identified: "Identified", made: "Callable[[Identified], np.ndarray]") -> np.ndarray:
-    """Covariance (r, k, k) of k real numbers that are made of each mode's own pole and residues.
-
-    J C Jᵀ with J by central differences.
-
-    Parameters
-    ----------
-    made : Identified -> (r, k), each mode by itself
-
-    Raises
-    ------
-    ValueError
-        If the identification holds no covariance.
-    """
-    C = identified.covariance
-    if C is None:
-        raise ValueError("this identification holds no covariance of its modes")
-    J = _slopes(identified, made)
-    n_c = C.local.shape[1]
-    root = np.concatenate([C.pole[:, None], C.shared], axis=1)
-    root = root.reshape(len(root), 2 + 2 * n_c, -1)
-    through = J @ root
-    own = J[:, :, 2:].reshape(*J.shape[:2], n_c, 2)
-    return np.asarray(
-        through @ through.transpose(0, 2, 1)
-        + np.einsum("rkci,rcij,rlcj->rkl", own, C.local, own, optimize=True)
-    )
-
-
-def _slopes(identified: "Identified", made: "Callable[[Identified], np.ndarray]") -> np.ndarray:
-    """d made / d(Re p, Im p, Re R, Im R channel by channel) of every mode (r, k, 2 + 2 n_c)."""
-    p, R = identified.poles, identified.residues
-    n_c = R[0].size if len(R) else 0
-    columns = []
-    for at in range(2 + 2 * n_c):
-        turn = 1j if at % 2 else 1.0
-        if at < 2:
-            h = _STEP * np.abs(p)
-            moved = [replace(identified, poles=p + sign * turn * h) for sign in (1, -1)]
-        else:
-            h = _STEP * np.maximum(np.abs(R).max(axis=(1, 2)), 1e-300)
-            unit = np.zeros(n_c)
-            unit[at // 2 - 1] = 1.0
-            by = turn * h[:, None, None] * unit.reshape(R.shape[1:])
-            moved = [replace(identified, residues=R + sign * by) for sign in (1, -1)]
-        columns.append((made(moved[0]) - made(moved[1])) / (2 * h[:, None]))
-    return np.stack(columns, axis=2)

@@ -12,7 +12,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError
 from .identification import Identified
-from .modal_covariance import propagated
+from .propagation import propagated
 
 
 @dataclass(frozen=True, eq=False)
