@@ -104,7 +104,7 @@ _FILES = """\
 - A table `NAME.channels.csv` beside time data names its channels: `channel`, `label`, `unit`,
   optional `role`, `scale`. A `.wav` needs it.
 - Universal file: 58 and 58b FRFs and coherence, 15 and 2411 nodes, 2412 and 82 lines, 2420 the axes
-  in which nodes measure, 55 shapes, 151 and 164 header and units.
+  in which nodes measure, 55 shapes, 151 and 164 header and units; others are named and not used.
 
 Several recordings are told apart by article, level and state, as the files or `[[recording]]` say.
 Of one article, level and state, other shaker places are stacked as inputs of one test; the same

@@ -16,6 +16,7 @@ from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
 from .screening_faults import FAULTS, tally
+from .thesis import regenerate
 
 
 def main(words: list[str] | None = None) -> int:
@@ -64,7 +65,15 @@ def _identified(asked: argparse.Namespace) -> int:
     return 0
 
 
-COMMANDS = {"run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified}
+def _thesis(asked: argparse.Namespace) -> int:
+    """Tables and figures of the thesis' test."""
+    regenerate(asked.out, asked.seed, _say)
+    return 0
+
+
+COMMANDS = {
+    "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
+}  # fmt: skip
 
 
 def _seeds(asked: argparse.Namespace) -> range:
@@ -91,6 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     found.add_argument(
         "--noise", default="", help=f"only these, with semicolons: {'; '.join(NOISES)}"
     )
+    tested = commands.add_parser("thesis", help="tables 3 to 6, figures 19, 23 to 27 of the thesis")
+    tested.add_argument("--seed", type=int, default=1)
+    tested.add_argument("--out", type=Path, required=True)
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

@@ -41,6 +41,6 @@ def test_no_other_format(identified, tmp_path: Path) -> None:
 def test_shapes_as_a_table(identified, tmp_path: Path) -> None:
     path = write_shape_table(tmp_path / "shapes.csv", identified)
     rows = [line.split(",") for line in path.read_text().splitlines()]
-    assert rows[0] == ["label", "mode", "frequency_hz", "real", "imag"]
+    assert rows[0] == ["label", "mode", "frequency_hz", "real", "imag", "real_sd", "imag_sd"]
     psi = np.array([float(r[3]) + 1j * float(r[4]) for r in rows[1:]]).reshape(identified.order, 4)
     np.testing.assert_array_equal(psi.T, shapes(identified).values)

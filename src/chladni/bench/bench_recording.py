@@ -17,6 +17,7 @@ from .first_order_hold import HeldRun
 from .front_end import anti_alias, digitised, sampling_rate
 from .local_integration import LocalRun
 from .pole_model import filtered
+from .room import room_samples
 
 FINER, FINER_LOCAL, FINER_BLOW = 2, 8, 8  # steps of a sample: linear, with local forces, of a blow
 ROOM = 0.25  # of the range that the largest amplitude of a sine or a blow may take
@@ -151,14 +152,14 @@ def record(
         raise ModelError("a hammer hits an article without a shaker, anything else needs one")
     rate = sampling_rate(test.band[1])
     channels = channels or channels_of(rig, rng)
-    run = PhysicalRun(rig, rate, test.excitation)
+    run = PhysicalRun(rig, rate, test)
     blocks, over = [], np.zeros(1 + len(rig.article.outputs), int)
     signals = list(_signals(rig, test, rate, run.finer, rng))
     for k, (u, kept) in enumerate(signals):
         progress(
             f"{rig.article.name}: {test.excitation} {k + 1} of {len(signals)}", k / len(signals)
         )
-        volts = channels.true[:, None] * run.on(test.level * u)
+        volts = channels.true[:, None] * run.on(test.level * u, rng)
         values, high = digitised(volts, channels.noise, rate, rig.setup.front_end, rng)
         if kept:
             blocks.append(values / channels.stated[:, None])
@@ -211,16 +212,19 @@ def _decay(rig: BenchRig) -> float:
 class PhysicalRun:
     """Forces and accelerations behind the anti-alias filter, sampled, block after block."""
 
-    def __init__(self, rig: BenchRig, rate: float, excitation: Kind) -> None:
+    def __init__(self, rig: BenchRig, rate: float, test: BenchTest) -> None:
         rest = FINER_LOCAL if rig.article.laws else FINER
-        self.finer = FINER_BLOW if excitation == "hammer" else rest
+        self.finer = FINER_BLOW if test.excitation == "hammer" else rest
+        self.rate, self.density = rate * self.finer, rig.room_density(test.band)
         h = 1 / (rate * self.finer)
         self.outputs = HeldRun(filtered(rig.measured, anti_alias(rate)), h)
         self.local = LocalRun(rig.openings, rig.article.laws, h) if rig.article.laws else None
 
-    def on(self, u: np.ndarray) -> np.ndarray:
-        """(channels, n) [N, m/s²] of a block of the drive (n · finer,) [N]."""
+    def on(self, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """(channels, n) [N, m/s²] of a block of the drive (n · finer,) [N]; rng: of the room."""
         x = u[None]
+        if self.density:
+            x = np.vstack([x, room_samples(self.density, self.rate, len(u), rng)])
         if self.local is not None:
             x = np.vstack([x, self.local.on(x)])
         return self.outputs.on(x, self.finer)

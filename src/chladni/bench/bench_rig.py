@@ -9,6 +9,7 @@ from .bench_article import BenchArticle
 from .cords import INNER, Cord, cord_matrices, cords_for
 from .front_end import FrontEnd
 from .pole_model import PoleModel, by_poles
+from .room import SOURCES, room_density, room_loads
 from .shaker import ForceGauge, Shaker
 
 SWINGING = 0.7  # rigid motions as gravity holds them [Hz], about √(g / 0.5 m) / 2π
@@ -21,13 +22,15 @@ class BenchSetup:
     """What the article is tested with.
 
     ``cords`` None: as many as there are hangers, tuned as the thesis' were, with rubber at their
-    ends or not; ``shaker`` None: it is hit by a hammer.
+    ends or not; ``shaker`` None: it is hit by a hammer. ``room`` is what sound and floor move the
+    median accelerometer by while nothing else does, rms over the band of the test [m/s²].
     """
 
     accelerometer: AccelerometerType = field(default_factory=AccelerometerType)
     shaker: Shaker | None = field(default_factory=Shaker)
     cords: tuple[Cord, ...] | None = None
     rubber: bool = False
+    room: float = 0.0
     front_end: FrontEnd = field(default_factory=FrontEnd)
 
     @property
@@ -40,7 +43,8 @@ class BenchSetup:
 class BenchRig:
     """Outputs: the force as the gauge feels it [N], every accelerometer [m/s²], every opening [m].
 
-    Its inputs: what drives (force of the coil, or of the hammer) [N], then a force at every site.
+    Its inputs: what drives (force of the coil, or of the hammer) [N], the sources of the room where
+    it is loud, then a force at every site.
     """
 
     article: BenchArticle
@@ -51,6 +55,15 @@ class BenchRig:
     def measured(self) -> PoleModel:
         """Force and accelerations."""
         return self.model.outputs(slice(0, 1 + len(self.article.outputs)))
+
+    @property
+    def of_room(self) -> PoleModel:
+        """Force and accelerations of the sources of the room."""
+        return self.measured.inputs(slice(1, 1 + SOURCES))
+
+    def room_density(self, band: tuple[float, float]) -> float:
+        """Of every source [N/√Hz]; 0 where the room is silent."""
+        return room_density(self.of_room, self.setup.room, band) if self.setup.room else 0.0
 
     @property
     def openings(self) -> PoleModel:
@@ -108,9 +121,10 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
         np.vstack([P[1], 0 * felt, 0 * sites]),
         np.vstack([P[2], felt, 0 * sites]),
     )
-    whole = np.zeros((len(at), 1 + len(sites)))
+    room = over(room_loads(article).T).T if setup.room else np.zeros((n, 0))
+    push = np.hstack([load, room, sites.T])
+    whole = np.zeros((len(at), push.shape[1]))
     whole[0, 0] = through[0, 0]
-    push = np.hstack([load, sites.T])
     model = by_poles((m.M, m.C, m.K), push, (at, speed, force), whole)
     return BenchRig(article, setup, _through_sensors(model, setup, len(article.outputs)))
 

@@ -129,6 +129,7 @@ class _ExactSweep:
         self.model: PoleModel = rig.measured.inputs(slice(0, 1))
         self.q = np.zeros(len(self.model.poles), complex)
         self.channels, self.front = channels, rig.setup.front_end
+        self.room, self.density = rig.of_room, rig.room_density(test.band)
         self.left: list[float] = []
 
     def line(
@@ -139,8 +140,8 @@ class _ExactSweep:
         The front end correlates over T seconds: white noise of density S leaves E|e|² = 2 S / T.
         """
         steady, moving = self.response(line, drive)
-        y = steady + moving
         self.left.append(float((np.abs(moving) / np.maximum(np.abs(steady), 1e-300)).max()))
+        y = steady + moving + self.loud(line, rng)
         volts = self.channels.true * y
         over = np.abs(volts) > self.front.volts
         volts = volts * _clipping(np.abs(volts), self.front.volts)
@@ -148,6 +149,14 @@ class _ExactSweep:
         sd = np.sqrt(density * line.frequency / line.measure)  # of real and imaginary part
         e = rng.normal(size=(2, len(volts)))
         return (volts + sd * (e[0] + 1j * e[1])) / self.channels.stated, over
+
+    def loud(self, line: SineLine, rng: np.random.Generator) -> np.ndarray | float:
+        """What the room adds to every channel (channels,), correlated over T as noise is."""
+        if not self.density:
+            return 0.0
+        H = self.room.response(np.array([2j * np.pi * line.frequency]))[0]
+        e = rng.normal(size=(2, H.shape[1])) * self.density * np.sqrt(line.frequency / line.measure)
+        return np.asarray(H @ (e[0] + 1j * e[1]))
 
     def response(self, line: SineLine, drive: float) -> tuple[np.ndarray, np.ndarray]:
         """What is measured of the steady answer and of the transient (channels,), phase of sin."""
@@ -173,7 +182,7 @@ class _TimeSweep:
 
     def __init__(self, rig: BenchRig, test: BenchTest, channels: Channels, keep: bool) -> None:
         self.rate = sampling_rate(test.band[1])
-        self.run = PhysicalRun(rig, self.rate, test.excitation)
+        self.run = PhysicalRun(rig, self.rate, test)
         self.rig, self.channels, self.keep = rig, channels, keep
         self.blocks: list[np.ndarray] = []
         self.phase = 0.0
@@ -186,7 +195,7 @@ class _TimeSweep:
         n = int(np.ceil(line.seconds * self.rate))
         t = np.arange(1, n * self.run.finer + 1) / (self.rate * self.run.finer)
         angle = 2 * np.pi * line.frequency * t + self.phase
-        volts = self.channels.true[:, None] * self.run.on(drive * np.sin(angle))
+        volts = self.channels.true[:, None] * self.run.on(drive * np.sin(angle), rng)
         self.phase = float(angle[-1] % (2 * np.pi))
         x, over = digitised(volts, self.channels.noise, self.rate, self.rig.setup.front_end, rng)
         x = x / self.channels.stated[:, None]

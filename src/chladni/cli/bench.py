@@ -57,6 +57,12 @@ def run(
     rubber: Annotated[
         bool, typer.Option("--rubber", help="Rubber at the cords' ends: they hardly ring.")
     ] = False,
+    room: Annotated[
+        float,
+        typer.Option(
+            help="By how much sound and floor move the median sensor [m/s² rms in the band].", min=0
+        ),
+    ] = 0.0,
     time: Annotated[bool, typer.Option("--time", help="Write the time data as well.")] = False,
     seed: Annotated[int, typer.Option(help="Of all that is drawn.", min=0)] = 0,
     sensors: Annotated[
@@ -85,6 +91,7 @@ def run(
         sweeps=sweeps,
         delay=delay,
         rubber=rubber,
+        room=room,
         keep_time=time,
     )
     from ..report.bench_folder import write_bench

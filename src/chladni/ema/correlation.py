@@ -20,6 +20,9 @@ _LN10 = np.log(10.0)
 def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     """Modal assurance criterion |φᴴψ|² / (φᴴφ ψᴴψ), every mode of Φ against every mode of Ψ.
 
+    Echaniz Granado (2015), eq. 7, prints the numerator without square and conjugate; that form
+    depends on the shapes' scale and sign, so its numbers must be those of this one.
+
     Parameters
     ----------
     phi, psi : (n, r), (n, q)   shapes by column, real or complex, any scale

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
+from .modal_covariance import ModalCovariance, modal_covariance
 from .pole_choice import by_subspace, edited
-from .pole_fitting import PoleData
-from .pole_search import Solution, searched, weights
+from .pole_fitting import PoleData, solve
+from .pole_search import ROUNDING, STEADY, Solution, chi_of, searched, weights, with_noise_left
 from .pole_search_by_parts import is_large, searched_by_parts
 from .pole_selection import ORDERS, Rule
 from .response_variance import frf_variance
@@ -35,6 +36,7 @@ class Identified:
     chi : float                      rms of the whitened residual (1: the noise is all that is left)
     outputs, inputs, quantity        as in the recording
     band : (low, high)               [Hz] that was fitted
+    covariance : ModalCovariance     of poles and residues (None of modes made otherwise)
     """
 
     poles: np.ndarray
@@ -49,6 +51,7 @@ class Identified:
     inputs: tuple[str, ...]
     quantity: str
     band: tuple[float, float]
+    covariance: ModalCovariance | None = None
 
     @property
     def frequency(self) -> np.ndarray:
@@ -78,7 +81,8 @@ class Identified:
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes; the residual terms stay."""
         names = ("poles", "residues", "frequency_sd", "damping_sd", "relative_delta_chi2")
-        return replace(self, **{name: getattr(self, name)[modes] for name in names})
+        held = self.covariance and self.covariance.sel(modes)
+        return replace(self, covariance=held, **{n: getattr(self, n)[modes] for n in names})
 
 
 def identify(
@@ -126,7 +130,24 @@ def identify(
         solution = searched(data, rule, stated, orders, tries)
     if len(drop) or len(pick):
         solution = edited(data, solution, rule, stated, omega_max / (2 * np.pi), drop, pick)
-    return _result(frf, keep, omega_max, solution, rule)
+    found = _result(frf, keep, omega_max, solution, rule)
+    return replace(found, covariance=_covariance(data, solution, stated, omega_max))
+
+
+def _covariance(
+    data: PoleData, solution: Solution, stated: bool, omega_max: float
+) -> ModalCovariance:
+    """Of the solution's poles and residues, in order and in rad/s, by the noise of their spread."""
+    fit, chi = solution.fit, solution.chi
+    own, noise = data, max(1.0, chi) if stated else STEADY
+    if not stated and chi > ROUNDING and len(fit.p):
+        own = with_noise_left(data, data, solve(data, fit.p)[0])
+        noise = chi_of(own, fit := solve(own, fit.p)[0]) * max(1.0, STEADY / chi)
+    found = modal_covariance(own, fit.p, fit.x, noise**2).sel(np.argsort(np.abs(fit.p)))
+    return replace(
+        found, pole=omega_max * found.pole, shared=omega_max * found.shared,
+        local=omega_max**2 * found.local,
+    )  # fmt: skip
 
 
 def kept_lines(

@@ -109,7 +109,7 @@ class PoleSystem:
     g: np.ndarray
 
 
-def _orthonormal(data: PoleData, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def orthonormal(data: PoleData, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Q R of the columns under the common weight, columns scaled to one beforehand."""
     B = stacked(data.common[:, None] * A)
     scale = np.maximum(np.linalg.norm(B, axis=0), _TINY)
@@ -126,7 +126,7 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     A = linear(data.s, p, data.q)
     n = A.shape[1]
     both = np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1) if slope else A
-    Q, R = _orthonormal(data, both)
+    Q, R = orthonormal(data, both)
     R1, R2 = R[:n, :n], R[n:, n:]
     v = np.concatenate([data.w / data.common[:, None]] * 2)
     t = stacked(data.common[:, None] * data.y)
@@ -134,8 +134,8 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     x, delta_chi2 = np.empty((n, n_c)), np.zeros(r)
     H, g = np.zeros((2 * r, 2 * r)), np.zeros(2 * r)
     inverse = solve_triangular(R1, np.eye(n))
-    for at in _blocks(n_c, Q.shape[1]):
-        G, b = _normal(Q, v[:, at], t[:, at])
+    for at in channel_blocks(n_c, Q.shape[1]):
+        G, b = normal_matrices(Q, v[:, at], t[:, at])
         G[:, range(n), range(n)] += _RIDGE
         root = np.linalg.solve(np.linalg.cholesky(G[:, :n, :n]), inverse[: 2 * r].T)
         known = np.concatenate([b[:, :n, None], G[:, :n, n:]], axis=2)
@@ -146,7 +146,7 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
         if slope:
             rest = (b[:, n:] - np.einsum("cij,cj->ci", G[:, n:, :n], a)) @ R2
             S = R2.T @ (G[:, n:, n:] - G[:, n:, :n] @ tied) @ R2
-            T = _turn(x[: 2 * r, at].T)
+            T = turned(x[: 2 * r, at].T)
             M = np.einsum("ckma,ckmln->ckaln", T, S.reshape(len(T), r, 2, r, 2))
             H += np.einsum("ckaln,clnb->kalb", M, T).reshape(2 * r, 2 * r)
             g += np.einsum("ckma,ckm->ka", T, rest.reshape(len(T), r, 2)).ravel()
@@ -166,13 +166,13 @@ def noise_left(data: PoleData, fit: PoleFit) -> float:
     return fit.chi2 / max(data.samples - fit.x.size - 2 * len(fit.p), 1)
 
 
-def _blocks(n_c: int, m: int) -> list[slice]:
+def channel_blocks(n_c: int, m: int) -> list[slice]:
     """Channels whose normal matrices (m, m) fit into memory together."""
     step = max(1, _TOGETHER // m**2)
     return [slice(k, min(k + step, n_c)) for k in range(0, n_c, step)]
 
 
-def _normal(Q: np.ndarray, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def normal_matrices(Q: np.ndarray, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Qᵀ v² Q (n_c, m, m) and Qᵀ v² t (n_c, m) of every channel."""
     n_c, m = v.shape[1], Q.shape[1]
     G, b = np.empty((n_c, m, m)), np.empty((n_c, m))
@@ -182,7 +182,7 @@ def _normal(Q: np.ndarray, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np
     return G, b
 
 
-def _turn(x: np.ndarray) -> np.ndarray:
+def turned(x: np.ndarray) -> np.ndarray:
     """(n_c, r, 2, 2): coefficients of the derivative columns for dp = 1 and dp = i, R = a + ib."""
     a, b = x[:, 0::2], x[:, 1::2]
     return np.stack([np.stack([a, -b], -1), np.stack([b, a], -1)], axis=2)
@@ -242,7 +242,7 @@ def relocated(data: PoleData, p: np.ndarray) -> np.ndarray:
     """
     g = data.common[:, None]
     ramp = data.s[:, None] ** (data.q - 1.0)  # σ(s) L / s² has a term in 1 / s too
-    Q, _ = _orthonormal(data, np.concatenate([linear(data.s, p, data.q), ramp], axis=1))
+    Q, _ = orthonormal(data, np.concatenate([linear(data.s, p, data.q), ramp], axis=1))
     sigma = np.concatenate([basis(data.s, p, 0), np.ones((len(data.s), 1))], axis=1)
     scale = np.linalg.norm(stacked(sigma), axis=0)
     sigma = sigma / scale

@@ -12,6 +12,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError
 from .identification import Identified
+from .propagation import propagated
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,44 @@ def real_shapes(identified: Identified) -> np.ndarray:
     """The same (n_out, r), turned so that they are as real as they can be, of unit norm."""
     psi = _turned(driven_shapes(identified).T).T.real
     return np.asarray(psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300))
+
+
+def shape_covariance(identified: Identified) -> np.ndarray:
+    """Covariance (r, n_out, n_out) of ``real_shapes``, the norm and the sign held.
+
+    Raises
+    ------
+    ValueError
+        If the identification holds no covariance.
+    """
+    due = real_shapes(identified).T
+
+    def made(moved: Identified) -> np.ndarray:
+        found = real_shapes(moved).T
+        return found * np.where((found * due).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+
+    return propagated(identified, made)
+
+
+def shape_sd(identified: Identified) -> np.ndarray:
+    """Standard deviations of real and (as imaginary part) imaginary part of ``shapes`` (n_out, r).
+
+    Raises
+    ------
+    ValueError
+        If the identification holds no covariance.
+    """
+    due = shapes(identified).values.T
+
+    def made(moved: Identified) -> np.ndarray:
+        found = shapes(moved).values.T
+        overlap = (found * due.conj()).real.sum(axis=1, keepdims=True)
+        found = found * np.where(overlap < 0, -1.0, 1.0)
+        return np.concatenate([found.real, found.imag], axis=1)
+
+    variance = np.maximum(np.diagonal(propagated(identified, made), axis1=1, axis2=2), 0.0)
+    real, imag = np.split(np.sqrt(variance), 2, axis=1)
+    return np.asarray((real + 1j * imag).T)
 
 
 def shapes(identified: Identified) -> MeasuredShapes:

@@ -98,6 +98,7 @@ def _facts(found: BenchResult) -> list[tuple[str, str]]:
         ("Weighed", f"{number(found.mass, 5)} kg"),
         ("Lines", str(len(first.frf.frequency))),
         ("Articles", f"{s.articles}, " + ("the deck's own" if s.exact else "scattered")),
+        *([("The room moves them by", f"{number(s.room, 3)} m/s² rms")] if s.room else []),
     ]
 
 

@@ -28,6 +28,18 @@ _COMAC = (
     "CoMAC, over all paired modes: 1 where the sensor moves as the model does there. One that is "
     "much below the others may sit elsewhere, point elsewhere, or see what the model lacks."
 )
+_WORTH = (
+    "MAC, and what the noise of the recording leaves of it at best. Seen on: sensors whose motion "
+    "is beyond three standard deviations of its noise, and the MAC on them alone. By chance: how "
+    "likely it is that the best of random shapes, as many as the model has modes here, reaches "
+    "that; sensors that move together count once. With neighbours: share of the test's shape that "
+    "the model's modes within 5 % in frequency make up together; close modes may mix."
+)
+_HALVES = (
+    "The half of the sensors on which the pair is most alike. It says where a MAC is lost, not "
+    "that the pair is right, where random mixtures of the model's modes do as well on their best "
+    "half."
+)
 _CAPTIONS = {
     "mac": "Modal assurance criterion in per cent; framed: the pairs of the table.",
     "shapes": "Each pair twice: what the test's sensors saw, and the model's shape with what it "
@@ -49,7 +61,7 @@ def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
         [
             screening_section(found.screening),
             Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies", "mac"))]),
-            Section("Shapes", _pictures(drawn, ("shapes",))),
+            Section("Shapes", [*_worth(found), *_pictures(drawn, ("shapes",))]),
             Section("Sensors", [*_sensors(found), *_pictures(drawn, ("setup",))]),
             Section("Responses", [*_scores(found), *_pictures(drawn, ("frf", "frf_grid"))]),
         ],
@@ -127,6 +139,31 @@ def _modes(found: Correlation) -> Table:
         for i, j, value in zip(p.model, p.test, p.mac, strict=True)
     ]
     return Table(("test [Hz]", "model [Hz]", "its mode", "off", "MAC"), rows, caption=_alone(found))
+
+
+def _worth(found: Correlation) -> list[Block]:
+    """What every MAC is worth, and the best half of the sensors of poor ones."""
+    if not found.likeness:
+        return []
+    f = [hertz(found.f_test[j]) for j in found.pairs.test]
+    n, worth = len(found.sensors), found.likeness
+    rows = [
+        (at, criterion(w.mac), criterion(w.noise_leaves), f"{w.seen} of {n}",
+         criterion(w.seen_mac), number(w.chance, 2), criterion(w.space))
+        for at, w in zip(f, worth, strict=True)
+    ]  # fmt: skip
+    heads = ("test [Hz]", "MAC", "noise leaves", "seen on", "MAC there", "by chance",
+             "with neighbours")  # fmt: skip
+    poor = [
+        (at, criterion(w.mac), criterion(w.half), number(w.half_chance, 2))
+        for at, w in zip(f, worth, strict=True)
+        if np.isfinite(w.half)
+    ]
+    blocks: list[Block] = [Table(heads, rows, caption=_WORTH)]
+    if poor:
+        names = ("test [Hz]", "MAC", "best half", "random shapes reach it")
+        blocks.append(Table(names, poor, caption=_HALVES))
+    return blocks
 
 
 def _alone(found: Correlation) -> str:

@@ -142,6 +142,8 @@ def _(result: Correlation) -> dict[str, Any]:
         "alone_test_hz": test[p.alone_test],
         "alone_model_hz": f[p.alone_model],
     }
+    for mode, worth in zip(held["modes"], result.likeness, strict=False):
+        mode["shape"] = vars(worth)
     if result.screening is not None:
         held["screening"] = screening_json(result.screening)
     if result.comac is not None:

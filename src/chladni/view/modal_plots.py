@@ -76,16 +76,20 @@ def mode_indicators(
 
 
 def nyquist_grid(
-    path: Path | str, modes: Mapping[str, tuple[np.ndarray, np.ndarray]], columns: int = 5
+    path: Path | str,
+    modes: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    columns: int = 5,
+    wide: float = 1.75,
 ) -> Path:
     """A small Nyquist picture of every mode: measured lines as dots, the identified model drawn.
 
     Parameters
     ----------
     modes : {name: (H measured (n,), H identified (m,))}
+    wide : of one of them [inches]
     """
     rows = -(-len(modes) // columns)
-    figure = Figure(figsize=(1.75 * columns, 1.85 * rows + 0.3), layout="constrained")
+    figure = Figure(figsize=(wide * columns, (wide + 0.1) * rows + 0.3), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, (name, (measured, identified)) in zip(axes, modes.items(), strict=False):
         ax.plot(identified.real, identified.imag, lw=1.1, color=AFTER, label="identified")

@@ -79,6 +79,8 @@ def frf_grid(
         ax.grid(lw=0.3, alpha=0.5)
     for ax in axes[len(channels) :]:
         ax.set_visible(False)
+    for ax in axes[len(channels) - columns : len(channels)]:
+        ax.tick_params(labelbottom=True)
     names = axes[0].get_legend_handles_labels()
     figure.legend(*names, loc="outside upper right", ncols=3, **LEGEND)
     figure.supxlabel("frequency [Hz]", fontsize=9)
@@ -235,7 +237,8 @@ def _curves(upper: Axes, lower: Axes | None, curves: Curves) -> None:
 
 
 def _style(name: str, k: int) -> dict[str, Any]:
-    return _STYLES.get(name) or {"color": _MORE[k % len(_MORE)], "lw": 1.2}
+    """Of a name, else the k-th colour; later curves are thinner, so that none hides another."""
+    return _STYLES.get(name) or {"color": _MORE[k % len(_MORE)], "lw": max(0.8, 2.2 - 0.6 * k)}
 
 
 def _broken(phase: np.ndarray) -> np.ndarray:

@@ -12,8 +12,9 @@ from ..ema.correlation import Quality, comac, deviation, mac, quality
 from ..ema.finding import Screening
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
+from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import ModePairs, pair
-from ..ema.shapes import driven_shapes
+from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError, FileError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
@@ -46,6 +47,7 @@ class Correlation:
     screening : what the recording says of its own faults, alone and against the model
     numbers : of the model's modes, the rigid ones counted, as in ``f_model``
     shapes : of the pairs at the sensors, with the model's whole motion; None without FRFs
+    likeness : what the MAC of each pair is worth; none without one
     """
 
     channels: tuple[str, ...]
@@ -62,6 +64,7 @@ class Correlation:
     screening: Screening | None = None
     numbers: tuple[int, ...] = ()
     shapes: PairedShapes | None = None
+    likeness: tuple[Likeness, ...] = ()
 
 
 def correlate(case: Case, progress: Progress = silent) -> Correlation:
@@ -106,6 +109,23 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
         case.outputs.labels, found, found.frequency, near.frequency, M, pairs, by_dof, q,
         responses, (*screening.notes, *case.said("correlate"), *notes), screening, numbers,
         _paired_shapes(case, model, near, (phi, psi), pairs, found.frequency, numbers),
+        () if M is None else _likeness(found, phi, near.frequency, pairs),
+    )  # fmt: skip
+
+
+def _likeness(
+    found: Identified, phi: np.ndarray, f_model: np.ndarray, pairs: ModePairs
+) -> tuple[Likeness, ...]:
+    """Of every pair, its shape in the test turned as real as it can be."""
+    if not len(pairs):
+        return ()
+    psi, covariance = real_shapes(found), shape_covariance(found)
+    return tuple(
+        likeness(
+            phi, psi[:, j], covariance[j], int(i),
+            np.flatnonzero(np.abs(f_model / f_model[i] - 1) < CLOSE),
+        )
+        for i, j in zip(pairs.model, pairs.test, strict=True)
     )  # fmt: skip
 
 

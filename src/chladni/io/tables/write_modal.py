@@ -7,25 +7,27 @@ import numpy as np
 
 from ...ema.identification import Identified
 from ...ema.realisation import realised
-from ...ema.shapes import shapes
+from ...ema.shapes import shape_sd, shapes
 from ...errors import LabelError
 from ...output import atomic, write_npz
 
 
 def write_shape_table(path: str | Path, modes: Identified) -> Path:
-    """``label, mode, frequency_hz, real, imag`` for every channel and mode.
+    """``label, mode, frequency_hz, real, imag, real_sd, imag_sd`` for every channel and mode.
 
-    Mass-normalised [1/√kg] where a point is both driven and measured, else of largest entry 1.
+    Mass-normalised [1/√kg] where a point is both driven and measured, else of largest entry 1,
+    which is held: it has no spread of its own.
     """
-    found = shapes(modes)
+    found, sd = shapes(modes), shape_sd(modes)
 
     def write(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(["label", "mode", "frequency_hz", "real", "imag"])
+            writer.writerow(["label", "mode", "frequency_hz", "real", "imag", "real_sd", "imag_sd"])
             for k, f in enumerate(modes.frequency):
-                for label, value in zip(found.outputs, found.values[:, k], strict=True):
-                    row = (float(f), float(value.real), float(value.imag))
+                rows = zip(found.outputs, found.values[:, k], sd[:, k], strict=True)
+                for label, value, s in rows:
+                    row = tuple(map(float, (f, value.real, value.imag, s.real, s.imag)))
                     writer.writerow([label, k + 1, *map(repr, row)])
 
     return atomic(path, write)

@@ -13,11 +13,13 @@ import numpy as np
 
 from ...dofs import label
 from ...ema.setup import Function, Recording, Shapes
-from ...errors import ChladniError, FileError
+from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
 from .uff_frf import frf_matrix
 from .uff_pile import Channel, Pair, Pile, Shape, TimeSignal, dataset_name
 from .uff_sets import (
+    SILENT,
+    USED,
     ElementSet,
     FunctionSet,
     NodeSet,
@@ -55,7 +57,7 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
     """
     path = Path(path)
     pile = Pile(path)
-    sets = list(_sets(path))
+    sets = list(_sets(pile))
     for one in sets:  # units first: 164 need not be at the top
         if isinstance(one, UnitsSet):
             pile.units = file_units(one)
@@ -95,30 +97,36 @@ def _damaged(path: Path, number: int, code: int, error: Exception) -> FileError:
     )
 
 
-def _sets(path: Path) -> Iterator[UffSet]:
+def _sets(pile: Pile) -> Iterator[UffSet]:
     """Every dataset that is of use."""
-    for number, dataset in _datasets(path):
+    for number, dataset in _datasets(pile):
         try:
-            one = typed(number, dataset)
+            yield typed(number, dataset)
         except _BROKEN as error:
-            raise _damaged(path, number, int(dataset["type"]), error) from error
-        if one is not None:
-            yield one
+            raise _damaged(pile.path, number, int(dataset["type"]), error) from error
 
 
-def _datasets(path: Path) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    """(number from 1, dataset) of every dataset pyuff knows."""
+def _datasets(pile: Pile) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """(number from 1, dataset) of every dataset that is of use; others are noted, not read."""
     import pyuff
 
+    path, idle = pile.path, set()
     with readable(path) as source:
         file = pyuff.UFF(str(source))
         for k, kind in enumerate(file.get_set_types()):
+            if int(kind) not in USED:
+                idle |= {int(kind)} - SILENT
+                continue
             try:
                 dataset: dict[str, Any] = file.read_sets(k)
             except Exception as error:  # pyuff raises nothing narrower
                 where = dataset_name(path, k + 1, int(kind))
                 raise FileError(f"{where}: cannot be read ({_why(error)})") from error
             yield k + 1, dataset
+    if idle:
+        pile.notes.append(
+            f"{path.name}: datasets {named([str(k) for k in sorted(idle)])} are not used"
+        )
 
 
 def _why(error: BaseException) -> str:

@@ -119,11 +119,10 @@ class FunctionSet(UffSet):
     title: str = ""
 
 
-def typed(number: int, d: Mapping[str, Any]) -> UffSet | None:
-    """One of pyuff's dictionaries as a type; None: a set that is not used."""
+def typed(number: int, d: Mapping[str, Any]) -> UffSet:
+    """One of pyuff's dictionaries as a type."""
     code = int(d["type"])
-    make = _MAKE.get(code)
-    return make(d, {"number": number, "code": code}) if make else None
+    return _MAKE[code](d, {"number": number, "code": code})
 
 
 def _units(d: Mapping[str, Any], at: dict[str, int]) -> UnitsSet:
@@ -197,6 +196,8 @@ _MAKE = {
     2412: _elements,
     2420: _systems,
 }
+USED = frozenset(_MAKE)
+SILENT = frozenset({151, 1858})  # header; channel settings that come with every function
 
 
 def for_pyuff(one: HeaderSet | UnitsSet | NodeSet) -> dict[str, Any]:

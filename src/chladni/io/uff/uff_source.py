@@ -12,6 +12,7 @@ from ..file_size import refuse_large
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _LOOSE = re.compile(rb"(?m)^[ \t]*-1[ \t]*(?=\r?$)")
 _FORTRAN = re.compile(rb"(?<=[\d.])[dD](?=[+-]\d)")
+_THREE = re.compile(rb"(\d\.\d+)\d([+-]\d{3})(?![\d.])")  # 1.00000-105: no room for the E
 _BINARY = re.compile(rb"(?m)^ *58[bB]")
 
 
@@ -19,8 +20,9 @@ _BINARY = re.compile(rb"(?m)^ *58[bB]")
 def readable(path: Path) -> Iterator[Path]:
     """The file itself, or a tidied copy of it that lives as long as it is needed.
 
-    Text files with end marks that are not in columns 1 to 6, or followed by some blanks, and with
-    Fortran's D exponents are tidied; binary records are never touched.
+    Text files with end marks that are not in columns 1 to 6, or followed by some blanks, with lines
+    that end in a carriage return alone, and with Fortran's D exponents or those of three digits are
+    tidied; binary records are never touched.
 
     Raises
     ------
@@ -60,9 +62,13 @@ def _refuse_untyped(path: Path, data: bytes) -> None:
 
 def _tidied(data: bytes) -> bytes:
     """The same object where nothing is to be done."""
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
     strict, loose = len(_MARK.findall(data)), len(_LOOSE.findall(data))
     if (strict == 0 or strict % 2) and loose % 2 == 0:
         data = _LOOSE.sub(b"    -1", data)
     if _FORTRAN.search(data):
         data = _FORTRAN.sub(b"E", data)
+    if _THREE.search(data):
+        data = _THREE.sub(rb"\1E\2", data)  # as wide as before, for columns are fixed
     return data

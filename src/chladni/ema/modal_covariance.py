@@ -1,0 +1,116 @@
+"""Covariance of identified poles, residues and shapes: what the noise leaves them.
+
+Of the weighted least-squares problem w(H - Φ(p) x_c) over all channels c, poles p common, residues
+x_c of each channel: δp has the inverse of the Gauss-Newton matrix with the residues eliminated,
+δx_c = D_c δp + (ΦᵀW²Φ)⁻¹ΦᵀW e_c, D_c = dx_c/dp (Golub and Pereyra 1973; Pintelon and Schoukens
+2012, System Identification, section 9.12). So C = local + root rootᵀ with a root of as many columns
+as there are unknowns of poles, and no matrix of all residues is ever formed.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from .pole_fitting import (
+    PoleData,
+    basis,
+    channel_blocks,
+    linear,
+    normal_matrices,
+    orthonormal,
+    turned,
+)
+
+_RIDGE = 1e-12  # of the orthonormal basis, as the fit has it
+_SINGULAR = 1e-12  # of the largest: directions of the poles that the data do not know
+WORK = 2e10  # multiplications: some ten seconds; larger recordings are thinned
+
+
+@dataclass(frozen=True, eq=False)
+class ModalCovariance:
+    """δp_r = L_r z and δR_rc = S_rc z + e_rc, z of unit covariance, over real and imaginary part.
+
+    Attributes
+    ----------
+    pole : (r, 2, m)           L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]
+    shared : (r, n_c, 2, m)    S: what poles that are uncertain do to all residues at once
+    local : (r, n_c, 2, 2)     Cov e: what a channel's own noise does to its residue
+    """
+
+    pole: np.ndarray
+    shared: np.ndarray
+    local: np.ndarray
+
+    def sel(self, modes: np.ndarray | slice) -> Self:
+        """Some of the modes."""
+        return replace(
+            self, pole=self.pole[modes], shared=self.shared[modes], local=self.local[modes]
+        )
+
+    def of_mode(self, r: int) -> tuple[np.ndarray, np.ndarray]:
+        """(root (2 + 2 n_c, m), local (2 n_c, 2 n_c) by its blocks) of pole and residues."""
+        root = np.concatenate([self.pole[r][None], self.shared[r]])
+        return root.reshape(-1, root.shape[-1]), self.local[r]
+
+
+def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float) -> ModalCovariance:
+    """All modes at once.
+
+    Parameters
+    ----------
+    p, x : (r,), (2 r + 2, n_c)   the fit; lines of large recordings are ``thinned``
+    noise : χ² by degree of freedom
+    """
+    data = thinned(data, p)
+    A = linear(data.s, p, data.q)
+    n, r, n_c = A.shape[1], len(p), x.shape[1]
+    Q, R = orthonormal(data, np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1))
+    R1, R12, R2 = R[:n, :n], R[:n, n:], R[n:, n:]
+    inverse = solve_triangular(R1, np.eye(n))[: 2 * r]
+    v = np.concatenate([data.w / data.common[:, None]] * 2)
+    H = np.zeros((2 * r, 2 * r))
+    local, slope = np.empty((r, n_c, 2, 2)), np.empty((n_c, 2 * r, 2 * r))
+    for at in channel_blocks(n_c, Q.shape[1]):
+        G, _ = normal_matrices(Q, v[:, at], np.zeros_like(v[:, at]))
+        G[:, range(n), range(n)] += _RIDGE
+        tied = np.linalg.solve(G[:, :n, :n], G[:, :n, n:])
+        S = R2.T @ (G[:, n:, n:] - G[:, n:, :n] @ tied) @ R2
+        K = inverse @ (R12 + tied @ R2)
+        T = turned(x[: 2 * r, at].T)
+        slope[at] = -np.einsum("cikm,ckma->cika", K.reshape(*K.shape[:2], r, 2), T).reshape(K.shape)
+        H += np.einsum("ckma,ckmln,clnb->kalb", T, S.reshape(len(T), r, 2, r, 2), T,
+                       optimize=True).reshape(2 * r, 2 * r)  # fmt: skip
+        C = inverse @ np.linalg.solve(G[:, :n, :n], inverse.T)
+        local[:, at] = np.einsum("ckikj->kcij", C.reshape(len(C), r, 2, r, 2))
+    root = _inverse_root(H)
+    shared = (slope @ root).reshape(n_c, r, 2, 2 * r).transpose(1, 0, 2, 3)
+    scale = np.sqrt(noise)
+    return ModalCovariance(scale * root.reshape(r, 2, 2 * r), scale * shared, noise * local)
+
+
+def thinned(data: PoleData, p: np.ndarray, work: float = WORK) -> PoleData:
+    """Every k-th line with k times its weight, so that ``work`` multiplications are enough.
+
+    No fewer than two lines stay in any half-bandwidth, so that the information is nearly all there.
+    """
+    if not len(p):
+        return data
+    cost = 2 * data.y.size * (4 * len(p) + 2) ** 2
+    f = np.abs(data.s)
+    at = np.clip(np.searchsorted(f, np.abs(p)), 1, len(f) - 1)
+    inside = (f[0] <= np.abs(p)) & (np.abs(p) <= f[-1])
+    lines = (np.abs(p.real) / np.maximum(f[at] - f[at - 1], 1e-300))[inside]
+    k = max(1, int(min(cost / work, lines.min(initial=np.inf) / 2)))
+    return replace(data, s=data.s[::k], y=data.y[::k], w=np.sqrt(k) * data.w[::k])
+
+
+def _inverse_root(H: np.ndarray) -> np.ndarray:
+    """L with L Lᵀ = H⁻¹; directions that are not known at all have none."""
+    if not len(H):
+        return H
+    d = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    value, vector = np.linalg.eigh(d[:, None] * H * d)
+    keep = np.where(value > _SINGULAR * value[-1], 1 / np.sqrt(np.maximum(value, 1e-300)), 0.0)
+    return np.asarray(d[:, None] * vector * keep)

@@ -1,0 +1,261 @@
+"""The test of Echaniz Granado (2015) on the virtual bench: three tailgates, two excitations.
+
+Sections 4.2 and 4.3: stepped sine with table 3's schedule and burst random on tailgates A, B and C,
+A at half and at twice the level, and the cords free, held by hand and with rubber.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import eig
+from threadpoolctl import threadpool_limits
+
+from chladni.bench.accelerometers import AccelerometerType
+from chladni.bench.article_scatter import DAMPING, Scatter, fitted, scattered_article
+from chladni.bench.bench_article import BenchArticle
+from chladni.bench.bench_recording import (
+    BenchRecording,
+    BenchTest,
+    Channels,
+    channels_of,
+    level_for,
+    record,
+)
+from chladni.bench.bench_rig import BenchRig, BenchSetup, bench_rig
+from chladni.bench.cords import RUBBER, THESIS, Cord, cord
+from chladni.bench.pole_model import PoleModel
+from chladni.bench.sine_schedule import TABLE_3, Stage, dwells_of
+from chladni.bench.sine_sweep import swept
+from chladni.fem.measured_dofs import MeasuredDofs
+from chladni.geometry.sampling import nearest_points
+from chladni.model.assembly import Assembly
+from chladni.progress import Progress, silent
+from chladni.workflows.benched_article import benched, true_places
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.skin import Skin
+from chladni_specimens.tailgate.tailgate import tailgate
+
+from .bench_of_structure import tailgate_bench
+from .footing import Spots, rows_of_part
+
+ARTICLE = TailgateDesign(size=0.020, hem="real")  # first mode at 28.4 Hz; that of the test: 28.2
+HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis hung it (figure 17)
+CORD_SD = 0.01  # of a cord's frequency from article to article: figure 19 shows a few tenths of Hz
+HELD = 0.1  # of a cord's length that hands at its lowest part leave free
+CORD_BAND = (18.0, 34.0)  # [Hz], about the cords' resonances and the first mode
+DIFFER = 1.5  # articles differ in modes up to so many times the highest line, as in `chladni bench`
+FACTORS = (0.5, 2.0)  # of the level, beside the level itself (figure 24)
+Held = Literal["free", "held", "rubber"]
+WAYS: tuple[Held, ...] = ("free", "held", "rubber")
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """What is tested, before three articles of it differ.
+
+    Attributes
+    ----------
+    article : BenchArticle
+    drive : row of the output beside the shaker
+    at_cord : row of the output nearest to a cord
+    nodes : {node: (3,)}  places by the number of a label [m]
+    """
+
+    article: BenchArticle
+    drive: int
+    at_cord: int
+    nodes: dict[int, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class ThesisTest:
+    """All recordings of the chapter.
+
+    Attributes
+    ----------
+    subject : Subject
+    stages, articles : the schedule, A, B and C
+    stepped, bursts : of A, B and C
+    levels : of A by stepped sine, one for each of ``FACTORS``
+    cords : {free, held, rubber: recordings of A, B and C about the cords' resonances}
+    tapped, along : (3, k)   what each article's cords ring at, across and along them [Hz]
+    poles : of A's FRFs, sensors, gauge and cords with it (m,) [rad/s]
+    """
+
+    subject: Subject
+    stages: tuple[Stage, ...]
+    articles: tuple[BenchArticle, ...]
+    stepped: tuple[BenchRecording, ...]
+    bursts: tuple[BenchRecording, ...]
+    levels: tuple[BenchRecording, ...]
+    cords: dict[Held, tuple[BenchRecording, ...]]
+    tapped: np.ndarray
+    along: np.ndarray
+    poles: np.ndarray
+
+
+def tailgate_subject(rng: np.random.Generator, f_max: float = 400.0) -> Subject:
+    """The open tailgate with a hem that holds, hung from its upper holes, sensors as planned.
+
+    Its first fourteen modes have the damping of the thesis' table 6 (mean of three articles, by
+    rank), the others draw theirs from the scatter of that table.
+    """
+    plan = tailgate_bench()
+    assembly = tailgate(ARTICLE)
+    drive = _dofs(plan.drive)
+    outputs = _joined(_dofs(plan.outputs), drive)
+    places = true_places(assembly, outputs, drive, AccelerometerType(), rng)
+    hangers = _hangers(assembly)
+    article = benched(assembly, outputs, drive, hangers, places, f_max, fitted(), rng)
+    hung = assembly.points[assembly.rows(hangers)]
+    near = np.linalg.norm(outputs.points[:, None] - hung, axis=2).min(axis=1)
+    return Subject(as_damped(article), len(near) - 1, int(near.argmin()), outputs.nodes)
+
+
+def as_damped(article: BenchArticle) -> BenchArticle:
+    """The article with the mean damping of table 6 in its first elastic modes, by rank."""
+    zeta, mean = article.damping.copy(), np.exp(np.log(DAMPING).mean(axis=0))
+    first = np.flatnonzero(article.elastic)[: len(mean)]
+    zeta[first] = mean[: len(first)]
+    return replace(article, damping=zeta)
+
+
+def thesis_test(
+    subject: Subject, rng: np.random.Generator, stages: Sequence[Stage] = TABLE_3,
+    resolution: float = 0.05, progress: Progress = silent,
+) -> ThesisTest:  # fmt: skip
+    """Run every recording of the chapter.
+
+    Parameters
+    ----------
+    resolution : of burst random [Hz]
+    """
+    with threadpool_limits(1):
+        return _tested(subject, rng, tuple(stages), resolution, progress)
+
+
+def _tested(
+    subject: Subject, rng: np.random.Generator, stages: tuple[Stage, ...], resolution: float,
+    progress: Progress,
+) -> ThesisTest:  # fmt: skip
+    band = (stages[0].low, stages[-1].high)
+    articles = _articles(subject.article, fitted(), DIFFER * band[1], rng)
+    rings = np.array([np.array(THESIS) * np.exp(CORD_SD * rng.normal()) for _ in articles])
+    rigs = [rig_on_cords(a, f) for a, f in zip(articles, rings, strict=True)]
+    channels = channels_of(rigs[0], rng)
+    sine, noise = (level_for(rigs[0], kind, band) for kind in ("stepped-sine", "burst-random"))  # type: ignore[arg-type]
+
+    def sweep(rig: BenchRig, factor: float = 1.0) -> BenchRecording:
+        test = BenchTest("stepped-sine", band, factor * sine)
+        return swept(rig, test, dwells_of(stages), rng, progress=progress, channels=channels)
+
+    def burst(rig: BenchRig) -> BenchRecording:
+        test = BenchTest("burst-random", band, noise, resolution)
+        return record(rig, test, rng, progress=progress, channels=channels)
+
+    return ThesisTest(
+        subject, stages, articles, tuple(sweep(r) for r in rigs), tuple(burst(r) for r in rigs),
+        tuple(sweep(rigs[0], k) for k in FACTORS),
+        {way: _about_cords(articles, rings, way, stages, sine, rng, channels) for way in WAYS},
+        rings, np.array([_along(a, f) for a, f in zip(articles, rings, strict=True)]),
+        frf_poles(rigs[0].measured),
+    )  # fmt: skip
+
+
+def _about_cords(
+    articles: Sequence[BenchArticle], rings: np.ndarray, way: Held, stages: Sequence[Stage],
+    level: float, rng: np.random.Generator, channels: Channels,
+) -> tuple[BenchRecording, ...]:  # fmt: skip
+    """A short sweep of every article about the cords' resonances."""
+    lines = dwells_of(stages, CORD_BAND)
+    test = BenchTest("stepped-sine", CORD_BAND, level)
+    return tuple(
+        swept(rig_on_cords(a, f, way), test, lines, rng, channels=channels)
+        for a, f in zip(articles, rings, strict=True)
+    )
+
+
+def _articles(
+    nominal: BenchArticle, scatter: Scatter, within: float, rng: np.random.Generator
+) -> tuple[BenchArticle, ...]:
+    """A, B and C: modes, damping and weight of their own."""
+    return tuple(
+        replace(
+            scattered_article(nominal, scatter, name, within, rng),
+            weight=nominal.weight * float(np.exp(scatter.weight * rng.normal())),
+        )
+        for name in "ABC"
+    )
+
+
+def rig_on_cords(article: BenchArticle, rings: np.ndarray, way: Held = "free") -> BenchRig:
+    """The article on its cords, which ring at ``rings`` [Hz] when tapped."""
+    cords = tuple(_touched(c, way) for c in _cords(article, rings))
+    return bench_rig(article, BenchSetup(cords=cords))
+
+
+def _cords(article: BenchArticle, rings: np.ndarray) -> list[Cord]:
+    n = len(article.hangers)
+    return [cord(article.weight, n, float(rings[k % len(rings)])) for k in range(n)]
+
+
+def _along(article: BenchArticle, rings: np.ndarray) -> list[float]:
+    """First resonance of each cord along itself, √(k/m) / 2 of a bar held at both ends [Hz]."""
+    return [float(np.sqrt(c.stiffness / c.mass) / 2) for c in _cords(article, rings)]
+
+
+def frf_poles(measured: PoleModel) -> np.ndarray:
+    """Poles of accelerations over the force, the first output: zeros of that force (m,) [rad/s].
+
+    The shaker is not among them, what hangs on the article is.
+    """
+    p = np.r_[measured.poles, measured.poles.conj()]
+    n = len(p)
+    A, E = np.zeros((n + 1, n + 1), complex), np.diag(np.r_[np.ones(n), 0.0])
+    A[range(n), range(n)] = p
+    A[:n, n] = np.r_[measured.b[:, 0], measured.b[:, 0].conj()]
+    A[n, :n] = np.r_[measured.c[0], measured.c[0].conj()] / 2
+    A[n, n] = measured.d[0, 0]
+    z = eig(A, E, right=False)
+    z = z[np.isfinite(z)]
+    z = z[z.imag > 1e-6 * np.abs(z)]
+    return np.asarray(z[np.argsort(np.abs(z))])
+
+
+def _touched(one: Cord, way: Held) -> Cord:
+    """A cord as it hangs, with rubber taped to its end, or held by hand close to the article."""
+    if way == "rubber":
+        return replace(one, damping=RUBBER)
+    if way == "held":
+        return replace(one, length=HELD * one.length, mass=HELD * one.mass, damping=RUBBER)
+    return one
+
+
+def _hangers(assembly: Assembly) -> list[int]:
+    """Grids of the inner panel at the upper holes, left and right."""
+    skin = Skin.of(ARTICLE)
+    y, s = HUNG
+    plan = np.array([[y, s], [-y, s]])
+    holes = skin.at(np.column_stack([plan, skin.inner(plan)]))
+    rows = rows_of_part(assembly, assembly.part("inner"))
+    near = rows[nearest_points(assembly.points[rows], holes)]
+    return [int(k) for k in assembly.ids[near]]
+
+
+def _dofs(spots: Spots) -> MeasuredDofs:
+    """Places of the plan as points on the nearest shell, whatever the mesh."""
+    n = len(spots)
+    none = np.zeros(n, dtype=np.int64)
+    return MeasuredDofs(
+        spots.labels, none, spots.points, spots.directions, np.zeros(n), np.zeros(n)
+    )
+
+
+def _joined(a: MeasuredDofs, b: MeasuredDofs) -> MeasuredDofs:
+    """Both, one after the other."""
+    return MeasuredDofs(
+        a.labels + b.labels, np.r_[a.grids, b.grids], np.r_[a.points, b.points],
+        np.r_[a.directions, b.directions], np.r_[a.sd, b.sd], np.r_[a.mass, b.mass],
+    )  # fmt: skip

@@ -1,0 +1,131 @@
+"""Modes of the three articles as chapter 5.1 of the thesis identified them, and who is who."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.bench.bench_recording import BenchRecording
+from chladni.dynamics.frf import FRF
+from chladni.ema.correlation import mac
+from chladni.ema.identification import Identified, identify
+from chladni.ema.mode_pairing import pair
+from chladni.ema.shapes import driven_shapes
+from chladni.ema.stabilisation import ghosts, stabilisation
+from chladni.workflows.identify import firm
+
+BAND = (10.0, 195.0)  # [Hz], section 5.1
+CORDS = (23.0, 27.5)  # [Hz] taken out, section 5.1.1
+NEAR, CORD_DAMPING = 0.01, 0.014  # a pole of the cords: so near to their ring, damped by more
+SAME = 0.9  # MAC of a pole with a stronger one in whose bandwidth it lies: the same mode twice
+
+
+@dataclass(frozen=True, eq=False)
+class ArticleIdentified:
+    """Modes of one article.
+
+    Attributes
+    ----------
+    frf : FRF             of the recording
+    use : (n_f,) bool     its lines that were identified from
+    whole : Identified    with the poles that no peak confirms and those beside the band
+    modes : Identified    those within the band that are the article's own
+    doubles : (k,)        poles beside one of them with the same shape, or with no peak [Hz]
+    cords : (l,)          poles of the cords [Hz]
+    """
+
+    frf: FRF
+    use: np.ndarray
+    whole: Identified
+    modes: Identified
+    doubles: np.ndarray
+    cords: np.ndarray
+
+    @property
+    def raw(self) -> FRF:
+        """The lines it was identified from."""
+        f = self.frf
+        return FRF(f.values[self.use], f.frequency[self.use], f.outputs, f.inputs, f.quantity)
+
+
+def used_lines(frequency: np.ndarray) -> np.ndarray:
+    """Lines of the band without the cords' (n_f,) bool."""
+    inside = (BAND[0] <= frequency) & (frequency <= BAND[1])
+    return np.asarray(inside & ((frequency < CORDS[0]) | (frequency > CORDS[1])))
+
+
+def article_identified(recording: BenchRecording, rings: np.ndarray) -> ArticleIdentified:
+    """Poles of 10 to 195 Hz without the cords' band.
+
+    Parameters
+    ----------
+    rings : what the cords are known to ring at [Hz]
+    """
+    frf = recording.frf
+    use = used_lines(frf.frequency)
+    found = identify(frf, BAND, use=use)
+    struck = ghosts(found, stabilisation(frf, found, use)) | ~firm(found) | doubled(found)
+    near = np.abs(found.frequency[:, None] / rings - 1).min(axis=1) < NEAR
+    of_cord = near & (found.damping > CORD_DAMPING)
+    inside, f = found.inside, found.frequency
+    return ArticleIdentified(
+        frf, use, found, found.sel(inside & ~struck & ~of_cord), f[inside & struck & ~of_cord],
+        f[inside & of_cord],
+    )  # fmt: skip
+
+
+def doubled(found: Identified) -> np.ndarray:
+    """True for poles within the bandwidth of a stronger one of the same shape (r,)."""
+    half = found.damping * found.frequency
+    psi = driven_shapes(found)
+    peak = np.linalg.norm(psi, axis=0) / half
+    together = np.abs(found.frequency[:, None] - found.frequency) < half[:, None] + half
+    weaker = peak[:, None] < peak
+    return np.asarray((together & weaker & (mac(psi, psi) > SAME)).any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class ModesOfArticles:
+    """Modes of A with their partners in B and C; a mode has one at least.
+
+    Attributes
+    ----------
+    rows : (r,)                   of A's modes
+    alone : (k,)                  frequencies of A's poles that neither B nor C shows [Hz]
+    frequency, damping : (r, 3)   [Hz], [-]; nan where an article has no partner
+    mac : (r, 2)                  of A with B and with C
+    """
+
+    rows: np.ndarray
+    alone: np.ndarray
+    frequency: np.ndarray
+    damping: np.ndarray
+    mac: np.ndarray
+
+
+def paired(found: tuple[ArticleIdentified, ...]) -> ModesOfArticles:
+    """Modes of A beside those of the other articles that look alike."""
+    first = found[0].modes
+    f, zeta = (np.full((first.order, len(found)), np.nan) for _ in range(2))
+    alike = np.full((first.order, len(found) - 1), np.nan)
+    f[:, 0], zeta[:, 0] = first.frequency, first.damping
+    for k, other in enumerate(found[1:], start=1):
+        M = mac(driven_shapes(first), driven_shapes(other.modes))
+        p = pair(first.frequency, other.modes.frequency, M, farthest=0.1)
+        f[p.model, k] = other.modes.frequency[p.test]
+        zeta[p.model, k] = other.modes.damping[p.test]
+        alike[p.model, k - 1] = p.mac
+    both = np.isfinite(alike).any(axis=1)
+    rows = np.flatnonzero(both)
+    return ModesOfArticles(rows, f[~both, 0], f[rows], zeta[rows], alike[rows])
+
+
+def spread(x: np.ndarray) -> np.ndarray:
+    """(largest - smallest) / mean of every row (r,): "highest difference" of tables 5 and 6."""
+    return np.asarray(np.ptp(x, axis=1) / x.mean(axis=1))
+
+
+def errors(found: Identified, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of frequency and of damping ratio against the nearest of the true poles, relative (r,)."""
+    near = poles[np.abs(found.poles[:, None] - poles).argmin(axis=1)]
+    zeta = -near.real / np.abs(near)
+    return np.abs(found.poles / near).real - 1, found.damping / zeta - 1
