@@ -43,7 +43,7 @@ class Key:
     choices: tuple[str, ...] = ()
 
 
-FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
+FIELDS = ("E", "rho", "nu", "t", "wall", "E1", "E2", "G12", "nu12", "K", "M")
 ALIASES = {  # effects that are an ordinary number by another name
     "global-stiffness": "E",
     "part-stiffness": "E",
