@@ -66,11 +66,13 @@ class ShellGroups:
 
     @cached_property
     def connected(self) -> np.ndarray:
-        """Which connected sheet each group belongs to (g,): parts that share grids are one."""
+        """Which connected sheet, or beams, each group belongs to (g,): what shares grids is one."""
         assembly, parts = self.structure.assembly, self.part[self.group]
+        nodes = self.nodes.copy()
+        nodes[len(assembly.shells) :] += len(assembly.points)  # beams hold no sheets together
         touch = sp.coo_array(
-            (np.ones(4 * len(parts)), (np.repeat(parts, 4), self.nodes.ravel())),
-            shape=(len(assembly.parts), len(assembly.points)),
+            (np.ones(4 * len(parts)), (np.repeat(parts, 4), nodes.ravel())),
+            shape=(len(assembly.parts), 2 * len(assembly.points)),
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
