@@ -1,9 +1,9 @@
 """The numbers a user frees: a field of parts, joints or masses, one factor e^y for all of them.
 
 y(x) is x within bounds and bends towards them, y = b tanh(x / b), so a bound is never passed and
-the slope at the deck's own value is one. Parts of several kinds share the factor: shells by their
-and beams by their fields, solids, fasteners, springs, bushes and masses by their operators. Operators of two numbers of
-one part add up; their product, of second order, is left out.
+the slope at the deck's own value is one. Parts of several kinds share the factor: shells and
+beams by their fields, solids, fasteners, springs, bushes and masses by their operators. Operators
+of two numbers of one part add up; their product, of second order, is left out.
 """
 
 from collections.abc import Sequence

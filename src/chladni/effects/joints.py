@@ -1,8 +1,9 @@
 """The joints of a structure: welds and fasteners one by one, beads of adhesive.
 
 A joint is what a deck has beside its sheets and beams to hold them together: a solid of a metal or
-a short bar or a bush is a weld or a fastener, solids softer than ``SOFT`` that hang together are a bead.
-What a joint has in K is kept as rows b with K_j = bᵀ b, so that its loss is a change of low rank.
+a short bar or a bush is a weld or a fastener, solids softer than ``SOFT`` that hang together are a
+bead. What a joint has in K is kept as rows b with K_j = bᵀ b, so that its loss is a change of low
+rank.
 """
 
 from collections.abc import Iterator
@@ -13,10 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..fem.assemble import Structure, over_all_motions
-from ..fem.energy import bare, picked
+from ..fem.energy import bare
 from ..fem.sparse_assembly import congruence
 from ..geometry.beam_lines import connected_rows, fastener_bars, member_beams
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, picked
 from ..model.properties import BeamSection, Isotropic, Part, SolidSection
 from .model_families import SOFT
 

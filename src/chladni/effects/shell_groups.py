@@ -18,10 +18,9 @@ from scipy.sparse.csgraph import connected_components
 
 from ..fem import beam, shell
 from ..fem.assemble import Structure
-from ..fem.energy import picked
 from ..fem.shell_section import section_arrays
 from ..geometry.beam_lines import member_beams
-from ..model.assembly import Assembly
+from ..model.assembly import Assembly, picked
 from ..model.properties import BeamSection
 from .shell_components import component_matrices, thickness_split
 

@@ -96,8 +96,7 @@ def shell_grids(groups: ShellGroups) -> ShellGrids:
     on_beams, *of_beams = _across_beams(groups)
     at = np.concatenate([on_shells, on_beams])
     ways, line, along = (
-        np.concatenate(pair)
-        for pair in zip((normal[on_shells], *none), of_beams, strict=True)
+        np.concatenate(pair) for pair in zip((normal[on_shells], *none), of_beams, strict=True)
     )
     rows = groups.structure.along(assembly.ids[at], ways)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)

@@ -13,12 +13,21 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import ModelError
-from ..model.assembly import Assembly, Average, Bushes, Equation, Masses, RigidBody, Scalars
+from ..model.assembly import (
+    Assembly,
+    Average,
+    Bushes,
+    Equation,
+    Masses,
+    RigidBody,
+    Scalars,
+    picked,
+)
 from ..model.properties import BeamSection, Isotropic, Material, ShellSection, SolidSection
 from . import shell, solid, spring
 from .assemble import Structure, over_all_motions
 from .average import average_derivative, average_weights, lever
-from .energy import bare, only, picked
+from .energy import bare, only
 from .shell_section import modulus_derivative, section_arrays
 from .sparse_assembly import blocks, congruence, with_rotations
 

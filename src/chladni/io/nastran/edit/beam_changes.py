@@ -9,6 +9,7 @@ from ....model.properties import BeamSection
 from ....units import Units
 from .. import Deck, Replace, SetField
 from ..export.part_cards import beam_card
+from ..text.format import Value
 from .changes import Change
 from .split_properties import Split, property_kind
 
@@ -40,10 +41,12 @@ def with_sections(
         if set(differ) <= set(_OWN.get(kind, ())):
             out += _fields(kind, now.id, new, differ, units)
             continue
-        mid = int(deck[kind].integers(2)[deck[kind].integers(1) == split.get(now.id, now.id)][0])
-        material = [c for c in out if _is_material(c, kind, now.id)]
-        out = [c for c in out if c not in material]
-        mid = next((c.value for c in material if isinstance(c, SetField)), mid)
+        row = deck[kind].integers(1) == split.get(now.id, now.id)
+        mid: Value = int(deck[kind].integers(2)[row][0])
+        for change in [c for c in out if isinstance(c, SetField)]:
+            if (change.kind, change.id, change.field) == (kind, now.id, "MID"):
+                mid = change.value
+                out.remove(change)
         name, values = beam_card(new, now.id, mid, units)
         out.append(Replace(kind, now.id, [name, *values]))
     return out
@@ -59,11 +62,3 @@ def _fields(
     for name in names:
         size = units.length ** (2 if name == "area" else 4)
         yield SetField(kind, id, _FIELDS[name], getattr(section, name) / size)
-
-
-def _is_material(change: Change, kind: str, id: int) -> bool:
-    return isinstance(change, SetField) and (change.kind, change.id, change.field) == (
-        kind,
-        id,
-        "MID",
-    )

@@ -96,9 +96,7 @@ def _property(part: Part, pid: int, mid: list[int | None], units: Units) -> tupl
     return "PSHELL", values + ([None, None, mid[3]] if mid[3] else [])
 
 
-def beam_card(
-    s: BeamSection, pid: int, mid: Value, units: Units
-) -> tuple[str, list[Value]]:
+def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, list[Value]]:
     """(card name, fields): PBAR, PBEAM or PROD."""
     L = units.length
     nsm = s.nonstructural / (units.mass / L)
