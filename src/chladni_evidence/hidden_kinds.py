@@ -59,7 +59,10 @@ def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def suspension(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A spring to ground across the sheet (of a frame: along z) at every hanger, each 2 to 8 % of m ω_1²."""
+    """A spring to ground across the sheet at every hanger, each 2 to 8 % of m ω_1².
+
+    Of a frame of tubes, which lies flat, they are along z.
+    """
     a = site.article
     every = np.arange(len(a.parts))
     rows = np.array([_nearest(a, every, x) for x in site.hangers])

@@ -141,7 +141,7 @@ def made_case(
 
 
 def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
-    """E, rho, t and wall of sheets and tubes [SI, of the deck's], what each part of the deck weighs.
+    """E, rho, t [SI] and wall [of the deck's] of sheets and tubes, what each part weighs.
 
     The wall is what the area became.
     """

@@ -114,7 +114,8 @@ class SheetPatch(Effect):
         )
         return cls(
             unknown, f"on {name}", (name,), trials_factor=trials_factor,
-            shells=inside[groups.group[: len(assembly.shells)]], inside=inside.astype(float), centre=groups.centre,
+            shells=inside[groups.group[: len(assembly.shells)]],
+            inside=inside.astype(float), centre=groups.centre,
             surface=surface(groups, group, size), size=size, variance=groups.area / 12,
             points=assembly.points[grids], ids=assembly.ids[grids],
             spacing=float(np.sqrt(groups.area[inside].sum() / len(grids))), **cls.more(groups),

@@ -4,8 +4,8 @@ A shell's stiffness is E (t A + t³ B); its mass is ρ t m.  With the element ma
 projected group by group, any smooth field of thickness, modulus or density is a weight per group,
 and the reduced model never goes back to elements.
 
-Of a beam t is the wall of a thin tube: A, I1, I2, I12 and J, and the shear areas with A, go with it,
-so that its stiffness is E t A and its mass ρ t m exactly.
+Of a beam t is the wall of a thin tube: A (shear areas with it), I1, I2, I12 and J go with it, so
+that its stiffness is E t A and its mass ρ t m exactly.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from .shell_components import component_matrices, thickness_split
 
 @dataclass(frozen=True, eq=False)
 class ShellGroups:
-    """Element matrices of all shells, then of all member beams, and the groups they are gathered in.
+    """Element matrices of all shells, then of all member beams, and the groups they are in.
 
     No fastener is among the beams: what is wrong with these is asked of joints. A beam has the rows
     of its two ends; the other twelve are zero.
@@ -140,7 +140,7 @@ def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
 
 
 def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
-    """The shells, and likewise the beams, of a structure, gathered in at most about ``most`` groups.
+    """The shells of a structure, and likewise its beams, gathered in about ``most`` groups.
 
     Transverse shear with residual bending flexibility grows with a power of t between one and
     three; its matrix is split so that value and first derivative are exact.

@@ -38,7 +38,8 @@ def suspension(where: Surroundings) -> list[Suspension]:
     up = np.array([0.0, 0.0, 1.0])
     ways = [("", np.array([known.get(g, up) for g in hangers]))]
     if not known.keys() >= set(hangers):
-        ways = [(f", along {a}", np.tile(e, (len(hangers), 1))) for a, e in zip("xyz", np.eye(3))]
+        axes = zip("xyz", np.eye(3), strict=True)
+        ways = [(f", along {a}", np.tile(e, (len(hangers), 1))) for a, e in axes]
     everywhere = Suspension(
         (k,), text + ", every direction", grids=tuple(np.repeat(hangers, 3)),
         trials_factor=len(ways) + 1, rows=where.translations(hangers),

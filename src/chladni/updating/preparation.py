@@ -331,8 +331,9 @@ def setup_of(question: Question, f_max: float) -> Setup:
 
 
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
-    """What the user frees, or E and t (wall) of every part of shells or beams and rho of every
-    material; where there are neither, E and rho of every material of solids.
+    """What the user frees; else E and t (wall) of every part, rho of every material.
+
+    Of shells and beams, that is; where there are neither, E and rho of every material of solids.
     """
     if question.parameters:
         return [_freed(question, reduced, f_max, p) for p in question.parameters]

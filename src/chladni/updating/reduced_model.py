@@ -1,8 +1,8 @@
 """The reduced model in which every hypothesis is tried.
 
-K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M likewise;
-E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small dense
-eigenproblem; derivatives are exact, because K and M are known functions of the fields.
+K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
+likewise; E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small
+dense eigenproblem; derivatives are exact, because K and M are known functions of the fields.
 """
 
 from collections.abc import Callable, Mapping, Sequence
