@@ -153,6 +153,8 @@ def _scale(
     _, unit = _nominal(assembly, free, True)
     if not plain or (units is None and unit != "of the deck's"):
         return 1.0
+    if free.field == "wall":
+        return 1.0
     if unit == "of the deck's":
         values = np.unique(values_of(assembly, free))
         raise FileError(
