@@ -13,8 +13,8 @@ from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.ordinary import defaults, ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.registry import families
-from chladni.effects.suspension import suspension
 from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.suspension import suspension
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.assembly import Beams
