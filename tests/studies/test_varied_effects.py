@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import chladni
 from chladni.arrays import fingerprint
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.points import with_masses
@@ -113,3 +114,18 @@ def test_numbers_of_the_deck_are_no_effects():
     assert [effect_of(t) for t in ("t of inner=0.6:0.8", "E=90%:110%", "K of PBUSH 7=1:2")] == [
         "", "", "",
     ]  # fmt: skip
+
+
+def test_cords_of_a_case_are_used_where_they_are_varied(deck, tmp_path):
+    text = f'[model]\ndeck = "plate.bdf"\nunits = "SI"\n[test]\nhangers = [{GRID}, {GRID + 3}]\n'
+    (tmp_path / "plate.bdf").write_text(deck.read_text())
+    (tmp_path / "case.toml").write_text(text)
+    case, few = chladni.load_case(tmp_path), StudySettings(samples=4, modes=3)
+    held = chladni.study(case, ("suspension=10:1e3:log",), few)
+    assert held.nominal["suspension"] == 0
+    stiffer = held.column("f1_hz") / held.nominal["f1_hz"]  # Rayleigh: no spring lowers a mode
+    assert stiffer.min() > 1 - 1e-9
+    assert stiffer[np.argmax(held.column("suspension"))] > 1 + 1e-5
+    assert not [n for n in held.notes if "hangers" in n]
+    idle = chladni.study(case, ("t=90%:110%",), few)
+    assert [n for n in idle.notes if "hangers" in n]
