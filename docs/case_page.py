@@ -72,12 +72,15 @@ high = 1.1
 """
 
 _TAIL = """\
-Without any `[[parameter]]`, E and t of every part of shells and rho of every material are free; in
-a deck without shells E and rho of every material of solids and beams.
+Without any `[[parameter]]`, E of every part of shells and beams, t of shells, the wall of tubes and
+rho of every material are free; in a deck with neither, E and rho of every material of solids. Bars
+between two spiders hold sheets together: they are joints, and are not freed by themselves.
 
 What can be freed, and of what: E, rho, nu and t of isotropic shells; E, rho, t, E1, E2, G12 and
 nu12 of orthotropic ones; E, rho and t of laminates (E is one factor on all moduli); E, rho and nu
-of solids; E and rho of beams; K of springs (`PELAS`, `CELAS2`) and bushes (`PBUSH`); M of `CONM2`.
+of solids; E and rho of beams, and the wall of those that are closed tubes (one factor on A, I1, I2,
+I12 and J, whatever card they stand in); K of springs (`PELAS`, `CELAS2`) and bushes (`PBUSH`); M of
+`CONM2`.
 `global-stiffness` and `part-stiffness` are E, `global-density` is rho, `thickness-scale` is t,
 `adhesive-stiffness` is E of the solid parts named. `orthotropic-material`, `sensor-mass` and
 `suspension` are freed as they are; they take no sd, low and high. An effect whose place is unknown

@@ -12,7 +12,7 @@ from .benched_recording import PLAIN, Recorder
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
 
-SETS = ("tailgate", "panels", "forms", "outside", "joints")
+SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
@@ -66,6 +66,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
     panels: the same on plate and panel, our fine mesh and CalculiX in turn.
     forms: on each form a null and one other kind, the kinds in turn.
+    frames: on the tube frame every kind of the catalogue that beams may have, and both nulls.
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
@@ -74,6 +75,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "tailgate": _tailgate,
         "panels": _panels,
         "forms": _forms,
+        "frames": _frames,
         "outside": _outside,
         "joints": _joints,
     }
@@ -99,6 +101,11 @@ def _forms(seed: int) -> Iterator[Order]:
         kinds = [k for k in CATALOGUED if form.rolled or k not in ON_SHEETS][1:]
         for k, kind in enumerate(("nothing", kinds[(seed + 5 * s) % len(kinds)])):
             yield Order(name, kind, seed, _mesh(kind, MESHES[(seed + s + k) % 2]))
+
+
+def _frames(seed: int) -> Iterator[Order]:
+    for k, kind in enumerate(kind for kind in CATALOGUED if kind not in ON_SHEETS):
+        yield Order("tube frame", kind, seed, _mesh(kind, MESHES[(seed + k) % 2]))
 
 
 def _outside(seed: int) -> Iterator[Order]:

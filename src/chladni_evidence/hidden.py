@@ -66,15 +66,21 @@ class Site:
         """A point of a sheet."""
         return int(rng.choice(self.rows(self.part(rng))))
 
-    def normal(self, row: int) -> np.ndarray:
-        """Unit normal at a point; on a beam, a direction across it."""
+    def normal(self, row: int, rng: np.random.Generator | None = None) -> np.ndarray:
+        """Unit normal at a point; on a beam, a direction across it, any of them where drawn."""
         n = point_normals(self.article.points, self.article.shells.nodes)[row]
         if n.any():
             return np.asarray(n)
         beams = self.article.beams.nodes
         ends = beams[(beams == row).any(axis=1)][0]
         x = np.diff(self.article.points[ends], axis=0)
-        return np.asarray(tangents(x / np.linalg.norm(x))[0][0])
+        u, v = (t[0] for t in tangents(x / np.linalg.norm(x)))
+        angle = 0.0 if rng is None else rng.uniform(0, 2 * np.pi)
+        return np.asarray(np.cos(angle) * u + np.sin(angle) * v)
+
+    def up(self, row: int) -> np.ndarray:
+        """How a cord pulls at a point: along the normal of a sheet; a frame of tubes lies flat."""
+        return self.normal(row) if len(self.article.shells) else np.array([0.0, 0.0, 1.0])
 
 
 def _same(values: np.ndarray) -> np.ndarray:

@@ -44,9 +44,9 @@ def point_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def extra_support(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A spring to ground across the sheet, 5 to 50 % of m ω_1²."""
+    """A spring to ground across the sheet or tube, 5 to 50 % of m ω_1²."""
     row, k = site.row(rng), float(np.exp(rng.uniform(-3.0, -0.7))) * site.scale * size
-    n = site.normal(row)
+    n = site.normal(row, rng)
     truth = {"value": k, "point_m": site.article.points[row].tolist(), "direction": n.tolist()}
     return Hidden(with_ground_bushes(site.article, np.array([row]), n[None], k), truth)
 
@@ -59,12 +59,15 @@ def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def suspension(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A spring to ground across the sheet at every hanger, each 2 to 8 % of m ω_1²."""
+    """A spring to ground across the sheet at every hanger, each 2 to 8 % of m ω_1².
+
+    Of a frame of tubes, which lies flat, they are along z.
+    """
     a = site.article
     every = np.arange(len(a.parts))
     rows = np.array([_nearest(a, every, x) for x in site.hangers])
     k = float(np.exp(rng.uniform(-3.9, -2.5))) * site.scale * size
-    n = np.array([site.normal(int(r)) for r in rows])
+    n = np.array([site.up(int(r)) for r in rows])
     return Hidden(with_ground_bushes(a, rows, n, k), {"value": k})
 
 
@@ -144,7 +147,7 @@ def sensor_fault(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
     row = site.row(rng)
-    n = site.normal(row)
+    n = site.normal(row, rng)
     m = float(rng.uniform(0.005, 0.01)) * site.mass * size
     f = float(np.exp(rng.uniform(np.log(1.3 * site.first), np.log(0.8 * site.f_max))))
     k, c = m * (2 * np.pi * f) ** 2, 2 * 0.02 * m * 2 * np.pi * f

@@ -18,7 +18,7 @@ from chladni.io.nastran import write_assembly
 from chladni.io.uff.estimate_stamp import stamp
 from chladni.io.uff.write_uff import write_uff
 from chladni.model.assembly import Assembly
-from chladni.model.properties import ShellSection
+from chladni.model.properties import BeamSection, ShellSection
 from chladni.output import write_json, write_text
 from chladni.units import units
 
@@ -141,15 +141,27 @@ def made_case(
 
 
 def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
-    """E, rho and t of every sheet of the article [SI], and what each part of the deck weighs."""
-    sheets = [p for p in article.parts if isinstance(p.section, ShellSection)]
-    known = {q: {p.name: value(p, q) for p in sheets} for q in ("E", "rho", "t")}
+    """E, rho, t [SI] and wall [of the deck's] of sheets and tubes, what each part weighs.
+
+    The wall is what the area became.
+    """
+    known: dict[str, dict[str, float]] = {q: {} for q in ("E", "rho", "t", "wall")}
+    weight = {}
+    beams = deck.points[deck.beams.nodes]
+    length = np.linalg.norm(beams[:, 1] - beams[:, 0], axis=1)
     area = cell_areas(deck.points, deck.shells.nodes) * deck.thickness()
-    weight = {
-        p.name: float(area[deck.shells.part == k].sum() * value(p, "rho"))
-        for k, p in enumerate(deck.parts)
-        if isinstance(p.section, ShellSection)
-    }
+    for k, (was, p) in enumerate(zip(deck.parts, article.parts, strict=False)):
+        if isinstance(p.section, ShellSection):
+            known["t"][p.name] = value(p, "t")
+            volume = area[deck.shells.part == k].sum()
+        elif isinstance(p.section, BeamSection) and isinstance(was.section, BeamSection):
+            known["wall"][p.name] = p.section.area / was.section.area
+            volume = was.section.area * length[deck.beams.part == k].sum()
+        else:
+            continue
+        for q in ("E", "rho"):
+            known[q][p.name] = value(p, q)
+        weight[p.name] = float(volume * value(p, "rho"))
     return {"values": known, "part_mass_kg": weight}
 
 

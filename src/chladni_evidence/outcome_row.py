@@ -11,6 +11,7 @@ from .outside_kinds import OUTSIDE
 
 Row = dict[str, Any]
 NULLS = ("nothing", "calibration")
+QUANTITIES = ("E", "rho", "t", "wall")
 NAMED = ("missing physics", "measurement fault")
 ADMITTED = ("not in catalogue", "nonlinear")
 ALSO = {  # names that are right as well
@@ -114,11 +115,11 @@ def _gain(d: Row) -> float | None:
 
 
 def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
-    """{E, rho, t: [intervals that hold the truth, intervals]}; of parts together: their mean.
+    """{E, rho, t, wall: [intervals that hold the truth, intervals]}; of parts together: their mean.
 
     The mean is of logarithms, weighted with the parts' mass.
     """
-    count = {name: [0, 0] for name in ("E", "rho", "t")}
+    count = {name: [0, 0] for name in QUANTITIES}
     for entry in d.get("calibrated") or []:
         quantity, _, parts = entry["where"].partition(" of ")
         known = truth["values"].get(quantity, {})
@@ -184,8 +185,8 @@ def _of(flags: Sequence[bool]) -> str:
 
 def _overall(rows: Sequence[Row]) -> list[str]:
     lines = []
-    for name in ("E", "rho", "t"):
-        inside, every = (sum(r["covered"][name][k] for r in rows) for k in (0, 1))
+    for name in QUANTITIES:
+        inside, every = (sum(r["covered"].get(name, (0, 0))[k] for r in rows) for k in (0, 1))
         if every:
             lines.append(f"{name} inside its interval: {inside} of {every}")
     nulls = [r for r in rows if r["effect"] in NULLS]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.freed import defaults_without_shells, freed
+from chladni.effects.freed import defaults_of_solids, freed
 from chladni.effects.points import with_masses, with_springs
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
@@ -129,8 +129,6 @@ def test_pickles(reduced):
     assert_allclose(made.bushes.stiffness, np.exp(0.5) * jointed().bushes.stiffness)
 
 
-def test_a_deck_without_shells_frees_its_materials():
-    found = defaults_without_shells(jointed())
-    assert [(p.field, p.positions) for p in found] == [
-        ("E", (1,)), ("rho", (1,)), ("E", (2,)), ("rho", (2,)),
-    ]  # fmt: skip
+def test_of_solids_their_materials_are_free():
+    found = defaults_of_solids(jointed())
+    assert [(p.field, p.positions) for p in found] == [("E", (1,)), ("rho", (1,))]

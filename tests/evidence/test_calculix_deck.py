@@ -97,7 +97,7 @@ def test_tubes():
         **{"length": 0.6, "width": 0.4, "height": 0.3, "bay": 0.5, "narrow": 1.0},
         **{"rail": 0.02, "brace": 0.014, "t rail": 1.5e-3, "t brace": 1e-3},
     }
-    a = tube_frame(d, 0.05)
+    a = tube_frame(d, 0.03)
     f, _ = calculix_modes(a, 14, np.array([0]))
     np.testing.assert_allclose(f[6:], ours(a, 14)[6:], rtol=0.02)
 

@@ -93,7 +93,7 @@ def test_intervals_of_parts_together_are_held_against_their_mean():
         {"where": "E of welds", "low": 0.0, "high": 1.0},
     ]
     covered = row(answer(calibrated=entries), told())["covered"]
-    assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1]}
+    assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1], "wall": [0, 0]}
 
 
 def test_what_an_answer_leaves_open_is_no_crash():

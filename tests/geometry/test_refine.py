@@ -10,7 +10,10 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.fem.assemble import structure
 from chladni.geometry.refine import refined
-from chladni_specimens.plates import box, grid, plate, sheet
+from chladni.model.assembly import Beams
+from chladni.model.properties import BeamSection, Part
+from chladni_specimens.forms import FORMS
+from chladni_specimens.plates import STEEL, box, grid, plate, sheet
 
 
 def area(assembly):
@@ -119,3 +122,34 @@ def test_frequencies_converge_at_second_order():
     assert np.all(steps[1] < steps[0] / 2.5)
     assert np.all(steps[2] < steps[1] / 2.5)
     assert steps[2].max() < 0.005
+
+
+def test_a_frame_of_beams_becomes_the_one_meshed_twice_as_fine():
+    form = FORMS["tube frame"]
+    deck, fine = form.made(1), form.made(1, 2.0)
+    halved, due = (
+        normal_modes(structure(a).system, 30).frequency[6:] for a in (refined(deck), fine)
+    )
+    assert_allclose(halved, due, rtol=1e-8)
+    pinned = replace(deck.beams, pins=np.ones_like(deck.beams.pins))
+    pins = refined(replace(deck, beams=pinned)).beams.pins
+    assert pins.sum() == pinned.pins.sum()  # none where a beam was cut
+
+
+def test_a_stiffener_along_shells_takes_the_points_their_sides_get():
+    made = plate(0.4, 0.3, 4, 3, 1e-3)
+    n = len(made.points)
+    edge = np.array([[0, 1], [1, 2]])
+    stiff = Beams(
+        np.array([900, 901]), edge, np.array([1, 1]), np.tile([0, 0, 1.0], (2, 1)),
+        np.zeros((2, 2, 3)), np.zeros((2, 2, 6), bool),
+    )  # fmt: skip
+    bar = Part(9, "bar", BeamSection(STEEL, 1e-4, 1e-9, 1e-9, 0.0, 2e-9))
+    both = replace(made, parts=(*made.parts, bar), beams=stiff)
+    fine = refined(both)
+    assert len(fine.points) == len(refined(made).points)
+    assert len(fine.beams) == 4
+    assert len(np.unique(fine.beams.nodes)) == 5
+    middle = np.setdiff1d(fine.beams.nodes, edge)
+    assert (middle >= n).all()
+    assert np.isin(middle, fine.shells.nodes).all()

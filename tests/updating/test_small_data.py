@@ -42,7 +42,8 @@ def plate_deck(held: bool = False) -> str:
 
 def bar_deck() -> str:
     """A steel cantilever of ten bars, 0.3 m."""
-    cards = ["SOL 103", "CEND", "SPC = 1", "BEGIN BULK", "MAT1,1,210.+9,,.3,7850."]
+    cards = ["SOL 103", "CEND", "SPC = 1", "BEGIN BULK", "PARAM,COUPMASS,1"]
+    cards += ["MAT1,1,210.+9,,.3,7850."]
     cards += ["PBARL,1,1,,BAR", "+,.02,.003"]
     cards += [f"GRID,{k + 1},,{0.03 * k},0.,0." for k in range(11)]
     cards += [f"CBAR,{k + 1},1,{k + 1},{k + 2},0.,1.,0." for k in range(10)]
@@ -110,8 +111,7 @@ def test_a_deck_of_bars_is_calibrated(tmp_path: Path) -> None:
     case = load_case(folder)
     ratio = {c.estimate.name: c.estimate.value for c in calibrate(case).calibrated}
     assert ratio["E"] / 210e9 / (ratio["rho"] / 7850) == pytest.approx(1.02**2, rel=5e-3)
-    with pytest.raises(ChladniError, match="no shells"):
-        diagnose(case)
+    assert not diagnose(case).effects
 
 
 def first_of(folder: Path) -> np.ndarray:

@@ -227,7 +227,7 @@ def fields_of(part: Part) -> tuple[str, ...]:
     """What of a part can be freed."""
     section = part.section
     if isinstance(section, BeamSection):
-        return ("E", "rho")
+        return ("E", "rho", "wall") if section.tube else ("E", "rho")
     if isinstance(section, SolidSection):
         return ("E", "rho", "nu") if isinstance(section.material, Isotropic) else ()
     material = section.membrane or section.bending

@@ -43,7 +43,7 @@ class Key:
     choices: tuple[str, ...] = ()
 
 
-FIELDS = ("E", "rho", "nu", "t", "E1", "E2", "G12", "nu12", "K", "M")
+FIELDS = ("E", "rho", "nu", "t", "wall", "E1", "E2", "G12", "nu12", "K", "M")
 ALIASES = {  # effects that are an ordinary number by another name
     "global-stiffness": "E",
     "part-stiffness": "E",
@@ -153,7 +153,7 @@ SCHEMA = (
         "The number that is free, one factor for all its parts; or an effect's name, where it "
         "acts being known.", '"E"', _VARIED, FREEABLE),
     Key("parameter", "sd", "number, 0.001 to 2", "of the deck's value",
-        "0.06 (E, rho), 0.05 (t), 0.1 (nu), 0.3 (others)",
+        "0.06 (E, rho), 0.05 (t, wall), 0.1 (nu), 0.3 (others)",
         "Tolerance: standard deviation of the prior of ln(value / deck's value). `study` goes two "
         "of them far where `low` or `high` is missing.", "0.03", _VARIED),
     Key("parameter", "low", "number below 1", "of the deck's value", "none",

@@ -23,8 +23,8 @@ def run(
         list[str] | None,
         typer.Option(
             help='A number and its range, as "t of inner=0.6:0.8" in the deck\'s own units, '
-            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log" (repeatable); '
-            "without any the [[parameter]] of the case."
+            '"E=90%:110%" of the deck\'s value, "K of PBUSH 7=10:1e4:log", or an effect, as '
+            '"point-mass at 412=0.01:0.2" (repeatable); without any the [[parameter]] of the case.'
         ),
     ] = None,
     samples: Annotated[int, typer.Option(help="How many samples, at most.")] = 100,

@@ -147,4 +147,5 @@ FAMILY = Family(
     cards=("MAT1", "PSOLID", "CHEXA", "CPENTA", "CTETRA"),
     settled_by="pull a coupon of the adhesive, or cut through the joint and look at it",
     needs="adhesive of solids between sheets",
+    on_sheets=True,
 )

@@ -135,6 +135,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
         np.array([e.place.along[0] for e in effects if e.place is not None]),
         points,
         sp.csr_array(sp.vstack([e.rows for e in effects])),
+        np.full(len(effects), -1),
+        np.zeros((len(effects), 3)),
     )
     base = context.bases[-1]
     scores = context.scan.point_scores(len(context.bases) - 1, "K", TRIED, places)
@@ -163,4 +165,5 @@ FAMILY = Family(
     cards=("GRID", "RBE3", "CBUSH", "PBUSH", "CORD2R"),
     settled_by="push a feeler gauge between the sheets there, and measure at two levels",
     needs="sheets that almost touch, away from joints",
+    on_sheets=True,
 )

@@ -233,4 +233,5 @@ FAMILY = Family(
     candidates=candidates,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="look for a crack there with dye or a magnifying glass, and tap on both its sides",
+    on_sheets=True,
 )

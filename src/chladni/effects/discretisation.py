@@ -83,13 +83,14 @@ Places = Callable[[Structure], sp.csr_array]  # rows of what was measured, on an
 def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> list[MeshError]:
     """What the mesh of a structure hides up to somewhat above ``f_max``; nothing of a large one.
 
-    The error of its shells, and, where it has joints on whole shells, that of their footprints: of
-    all alike, and of each region by itself, for two meshers hang one joint on unlike shells.
+    The error of its elements, and, where it has joints on whole shells, that of their footprints:
+    of all alike, and of each region by itself, for two meshers hang one joint on unlike shells.
     With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
     ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
     """
     built = model.structure
-    if len(built.system.dofs) > MOST or not len(built.assembly.shells):
+    made = built.assembly
+    if len(built.system.dofs) > MOST or not len(made.shells) + len(made.beams):
         return []
     above = ABOVE if len(built.system.dofs) < LARGE else ABOVE_LARGE
     coarse = _CoarseModes.of(

@@ -50,8 +50,9 @@ class Article:
         return tuple(self.assembly.ids[nearest_points(self.assembly.points, where)].tolist())
 
     def shell_grid(self, rng: np.random.Generator) -> int:
-        """Id of a grid of the deck's shells, any of them."""
-        return int(self.deck.ids[rng.choice(np.unique(self.deck.shells.nodes))])
+        """Id of a grid of the deck's shells, or of its beams where it has none, any of them."""
+        nodes = self.deck.shells.nodes if len(self.deck.shells) else self.deck.beams.nodes
+        return int(self.deck.ids[rng.choice(np.unique(nodes))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,7 @@ class Family:
     no_cards : why none can
     settled_by : the measurement that tells it from what looks like it, in words
     needs : what a structure must have beside its sheets for it to act, in words; "": nothing
+    on_sheets : whether it acts on shells alone, so that a structure of beams is not asked for it
     """
 
     effect: type[Effect]
@@ -78,6 +80,7 @@ class Family:
     no_cards: str = ""
     settled_by: str = ""
     needs: str = ""
+    on_sheets: bool = False
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z]+(-[a-z]+)*", self.name) or self.name == Effect.name:
@@ -96,7 +99,9 @@ class Family:
         return self.effect.name
 
     def proposed(self, context: SearchContext) -> list[Candidate]:
-        """What of this family is worth a fit."""
+        """What of this family is worth a fit; nothing where it has nothing to act on."""
+        if self.on_sheets and not context.where.groups.sheet.any():
+            return []
         if self.candidates is not None:
             return list(self.candidates(context))
         assert self.placed is not None

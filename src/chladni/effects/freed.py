@@ -1,9 +1,9 @@
 """The numbers a user frees: a field of parts, joints or masses, one factor e^y for all of them.
 
 y(x) is x within bounds and bends towards them, y = b tanh(x / b), so a bound is never passed and
-the slope at the deck's own value is one. Parts of several kinds share the factor: shells by their
-fields, solids, beams, springs, bushes and masses by their operators. Operators of two numbers of
-one part add up; their product, of second order, is left out.
+the slope at the deck's own value is one. Parts of several kinds share the factor: shells and
+beams by their fields, solids, fasteners, springs, bushes and masses by their operators. Operators
+of two numbers of one part add up; their product, of second order, is left out.
 """
 
 from collections.abc import Sequence
@@ -17,16 +17,17 @@ from ..fem.derivative import Slope, by_part, of_lumps, of_part
 from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
-from ..model.properties import Isotropic, Part, ShellSection
+from ..model.properties import Isotropic, Part, ShellSection, SolidSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
-from .ordinary import SPREAD, ordinary, scaled, value, with_sheets
+from .ordinary import SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
 from .shell_groups import ShellGroups
 
 UNITS = {
     **dict.fromkeys(("E", "E1", "E2", "G12"), "Pa"),
-    **{"rho": "kg/m3", "t": "m", "nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
+    **{"rho": "kg/m3", "t": "m", "wall": "of the deck's"},
+    **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
 }
 SD = {**SPREAD, "nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
 SD_OTHERS = 0.3  # joints and directional moduli are known worse
@@ -120,9 +121,9 @@ def freed(groups: ShellGroups, free: FreeParameter) -> Freed:
     """The effect of one number a user frees."""
     built = groups.structure
     parts = built.assembly.parts
-    shells = [k for k in free.positions if isinstance(parts[k].section, ShellSection)]
     members: list[Effect] = []
-    plain = [k for k in shells if free.field in ("E", "rho", "t")]
+    grouped = set(groups.part.tolist())
+    plain = [k for k in free.positions if k in grouped and free.field in (*SHEET, *TUBE)]
     if plain:
         members.append(ordinary(groups, free.field, plain))
     members += [_of_part(built, k, free.field) for k in free.positions if k not in plain]
@@ -159,11 +160,11 @@ def freed_effect(effect: Effect, called: str) -> Freed:
     )  # fmt: skip
 
 
-def defaults_without_shells(assembly: Assembly) -> list[FreeParameter]:
-    """E and rho of every material of solids and beams."""
+def defaults_of_solids(assembly: Assembly) -> list[FreeParameter]:
+    """E and rho of every material of solids."""
     by_material: dict[object, list[int]] = {}
     for k, part in enumerate(assembly.parts):
-        if not isinstance(part.section, ShellSection):
+        if isinstance(part.section, SolidSection):
             by_material.setdefault(part.section.material, []).append(k)
     return [
         FreeParameter(name, name, positions=tuple(at))
@@ -177,12 +178,12 @@ def _lumps(free: FreeParameter) -> tuple[tuple[str, tuple[int, ...]], ...]:
 
 
 def _of_part(built: Structure, k: int, name: str) -> LinearScale:
-    """E or rho of solids and beams, Poisson's ratio, moduli of an orthotropic sheet."""
+    """E or rho of solids, also the wall of fasteners, nu, moduli of an orthotropic sheet."""
     part, write = built.assembly.parts[k], PartWriter(k, name)
     text = f"{name} of {part.name}"
-    if name in ("E", "rho"):
+    if name in TUBE:
         whole = mass_properties(built.assembly)[0]
-        heavier = mass_properties(write(built.assembly, 2.0))[0] if name == "rho" else whole
+        heavier = mass_properties(write(built.assembly, 2.0))[0] if name != "E" else whole
         slope = of_part(built, k, name)
         return linear_scale(text, name, "-", 1.0, slope, write, weight_slope=heavier - whole)
     v = number(part, name)
@@ -250,13 +251,12 @@ class LumpWriter:
 
 def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assembly:
     """The assembly with the number times a factor, everywhere it stands, nothing linearised."""
-    parts, whole = assembly.parts, free.field in ("E", "rho", "t")
-    shells = [k for k in free.positions if isinstance(parts[k].section, ShellSection)]
-    sheets = shells if whole else []
-    if sheets:
-        assembly = with_sheets(assembly, free.field, sheets, factor)
+    whole = free.field in (*SHEET, *TUBE)
+    of_solids = [k for k in free.positions if isinstance(assembly.parts[k].section, SolidSection)]
+    fields = [k for k in free.positions if whole and k not in of_solids]
+    assembly = with_scaled(assembly, free.field, fields, factor)
     for k in free.positions:
-        if k not in sheets:
+        if k not in fields:
             assembly = PartWriter(k, free.field)(assembly, factor)
     for family, rows in _lumps(free):
         if rows:
@@ -276,27 +276,28 @@ def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:
 def number(part: Part, name: str) -> float:
     """The deck's value of a field of a part."""
     section = part.section
-    if isinstance(section, ShellSection):
-        if name in ("E", "rho", "t"):
-            return value(part, name)
-        return float(getattr(section.membrane or section.bending, name))
-    return float(getattr(section.material, name))
+    if isinstance(section, SolidSection):
+        return float(getattr(section.material, name))
+    if name in (*SHEET, *TUBE):
+        return value(part, name)
+    assert isinstance(section, ShellSection)
+    return float(getattr(section.membrane or section.bending, name))
 
 
 def changed(part: Part, name: str, factor: float) -> Part:
     """The part with a field times a factor; E takes all moduli along."""
     section = part.section
-    if isinstance(section, ShellSection):
-        if name in ("E", "rho", "t"):
-            return scaled(part, name, factor)
-        new = {
-            n: replace(m, **{name: getattr(m, name) * factor})
-            for n in ("membrane", "bending", "shear", "coupling")
-            if (m := getattr(section, n)) is not None and hasattr(m, name)
-        }
-        return part.with_section(**new)
-    material = section.material
-    new_values = {name: getattr(material, name) * factor}
-    if name == "E" and isinstance(material, Isotropic) and material.G is not None:
-        new_values["G"] = material.G * factor
-    return part.with_section(material=replace(material, **new_values))
+    if isinstance(section, SolidSection):
+        material = section.material
+        new_values = {name: getattr(material, name) * factor}
+        if name == "E" and isinstance(material, Isotropic) and material.G is not None:
+            new_values["G"] = material.G * factor
+        return part.with_section(material=replace(material, **new_values))
+    if name in (*SHEET, *TUBE):
+        return scaled(part, name, factor)
+    new = {
+        n: replace(m, **{name: getattr(m, name) * factor})
+        for n in ("membrane", "bending", "shear", "coupling")
+        if (m := getattr(section, n)) is not None and hasattr(m, name)
+    }
+    return part.with_section(**new)

@@ -163,4 +163,5 @@ FAMILY = Family(
     cards=("GRID", "RBE3", "CBUSH", "PBUSH", "CORD2R"),
     settled_by="cut through the hem and look whether its sheets touch or the sealant is hard",
     needs="strings of adhesive between two sheets",
+    on_sheets=True,
 )

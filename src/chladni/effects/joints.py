@@ -1,8 +1,9 @@
 """The joints of a structure: welds and fasteners one by one, beads of adhesive.
 
-A joint is what a deck has beside its sheets to hold them together: a solid of a metal or a short
-bar or a bush is a weld or a fastener, solids softer than ``SOFT`` that hang together are a bead.
-What a joint has in K is kept as rows b with K_j = bᵀ b, so that its loss is a change of low rank.
+A joint is what a deck has beside its sheets and beams to hold them together: a solid of a metal or
+a short bar or a bush is a weld or a fastener, solids softer than ``SOFT`` that hang together are a
+bead. What a joint has in K is kept as rows b with K_j = bᵀ b, so that its loss is a change of low
+rank.
 """
 
 from collections.abc import Iterator
@@ -13,15 +14,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..fem.assemble import Structure, over_all_motions
-from ..fem.energy import bare, picked
+from ..fem.energy import bare
 from ..fem.sparse_assembly import congruence
-from ..geometry.cells import components
-from ..model.assembly import Assembly, Average, RigidBody
+from ..geometry.beam_lines import connected_rows, fastener_bars, member_beams
+from ..model.assembly import Assembly, picked
 from ..model.properties import BeamSection, Isotropic, Part, SolidSection
 from .model_families import SOFT
 
 MOST_SOLIDS = 27  # of a weld: more of them in one piece are a casting
-MOST_BARS = 3  # of a fastener
 FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
 
 
@@ -36,8 +36,8 @@ class Connection:
     elements : (k,) int     rows of that group
     ids : ids of these elements
     point : (3,) [m]        its middle
-    parts : names of the sheets it holds, largest first
-    grids : ids of the grids of sheets it hangs on
+    parts : names of the sheets and beams it holds, largest first
+    grids : ids of the grids of these it hangs on
     """
 
     kind: str
@@ -97,15 +97,17 @@ def stiffness_rows(built: Structure, joint: Connection) -> sp.csr_array:
 
 
 def fasteners(built: Structure) -> list[Connection]:
-    """Every weld, screw and bush between sheets, with its rows, where the structure has sheets."""
-    if not len(built.assembly.shells):
-        return []
+    """Every weld, screw and bush between sheets or beams, with its rows."""
     a, columns = built.assembly, sp.csc_array(built.T)
+    members = member_beams(a)
+    if not len(a.shells) + len(members):
+        return []
     found = [
         replace(joint, rows=stiffness_rows(built, joint))
         for joint in (*_weld_solids(a), *_bars(a), *_bushes(a))
     ]
-    return [j for j in (_on_sheets(a, joint, _moved(columns, joint)) for joint in found) if j.parts]
+    held = [_held(a, members, joint, _moved(columns, joint)) for joint in found]
+    return [j for j in held if j.parts]
 
 
 def beads(built: Structure) -> list[Connection]:
@@ -113,14 +115,14 @@ def beads(built: Structure) -> list[Connection]:
 
     Those of a part come before what they consist of. They have no rows: they are many elements.
     """
-    assembly = built.assembly
+    assembly, none = built.assembly, np.zeros(0, int)
     out: list[Connection] = []
     for group, rows in solid_parts(assembly, soft=True):
-        pieces = list(_pieces(assembly.solids[group].nodes[rows]))
+        pieces = list(connected_rows(assembly.solids[group].nodes[rows]))
         whole = [rows] if len(pieces) > 1 else []
         for chosen in (*whole, *(rows[piece] for piece in pieces)):
             joint = _of_solids(assembly, group, chosen)
-            out.append(_on_sheets(assembly, joint, _touched(built, joint)))
+            out.append(_held(assembly, none, joint, _touched(built, joint)))
     return [j for j in out if j.parts]
 
 
@@ -132,12 +134,23 @@ def _moved(columns: sp.csc_array, joint: Connection) -> np.ndarray:
     return np.unique(columns[:, np.unique(joint.rows.indices)].indices // 6)
 
 
-def _on_sheets(assembly: Assembly, joint: Connection, points: np.ndarray) -> Connection:
-    """The joint with the sheets that have some of these points (k,)."""
-    touching = np.isin(assembly.shells.nodes, points).any(axis=1)
-    parts, count = np.unique(assembly.shells.part[touching], return_counts=True)
+def _held(
+    assembly: Assembly, members: np.ndarray, joint: Connection, points: np.ndarray
+) -> Connection:
+    """The joint with the sheets, and the beams among ``members``, that have some of these points.
+
+    Parameters
+    ----------
+    members : (m,)   rows of beams
+    points : (k,)    rows of points
+    """
+    shells, beams = assembly.shells, picked(assembly.beams, members)
+    touching = [np.isin(group.nodes, points).any(axis=1) for group in (shells, beams)]
+    part = np.concatenate([g.part[at] for g, at in zip((shells, beams), touching, strict=True)])
+    nodes = [g.nodes[at].ravel() for g, at in zip((shells, beams), touching, strict=True)]
+    parts, count = np.unique(part, return_counts=True)
     names = tuple(assembly.parts[int(p)].name for p in parts[np.argsort(-count, kind="stable")])
-    on = np.intersect1d(points, assembly.shells.nodes[touching])
+    on = np.intersect1d(points, np.concatenate(nodes))
     return replace(joint, parts=names, grids=tuple(assembly.ids[on].tolist()))
 
 
@@ -160,16 +173,6 @@ def solid_parts(assembly: Assembly, soft: bool) -> Iterator[tuple[int, np.ndarra
                 yield group, np.flatnonzero(solids.part == part)
 
 
-def _pieces(nodes: np.ndarray) -> Iterator[np.ndarray]:
-    """Rows (k,) of elements that hang together by their nodes (m, n)."""
-    at, column = np.unique(nodes, return_inverse=True)
-    corners = column.reshape(nodes.shape)
-    piece = components(corners, len(at))[corners[:, 0]]
-    order = np.argsort(piece, kind="stable")
-    found = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
-    yield from sorted(found, key=lambda rows: int(rows[0]))
-
-
 def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
     solids = assembly.solids[group]
     middle = assembly.points[solids.nodes[rows]].mean(axis=(0, 1))
@@ -178,7 +181,7 @@ def _of_solids(assembly: Assembly, group: int, rows: np.ndarray) -> Connection:
 
 def _weld_solids(assembly: Assembly) -> Iterator[Connection]:
     for group, rows in solid_parts(assembly, soft=False):
-        for piece in _pieces(assembly.solids[group].nodes[rows]):
+        for piece in connected_rows(assembly.solids[group].nodes[rows]):
             if len(piece) <= MOST_SOLIDS:
                 yield _of_solids(assembly, group, rows[piece])
 
@@ -186,15 +189,9 @@ def _weld_solids(assembly: Assembly) -> Iterator[Connection]:
 def _bars(assembly: Assembly) -> Iterator[Connection]:
     """Bars by themselves whose ends are those of rigid spiders or means."""
     beams = assembly.beams
-    if not len(beams):
-        return
-    held = {r.independent if isinstance(r, RigidBody) else r.reference
-            for r in assembly.rigid if isinstance(r, RigidBody | Average)}  # fmt: skip
-    for piece in _pieces(beams.nodes):
-        nodes, count = np.unique(beams.nodes[piece], return_counts=True)
-        if len(piece) <= MOST_BARS and held.issuperset(nodes[count == 1].tolist()):
-            middle = assembly.points[nodes].mean(axis=0)
-            yield Connection("beams", 0, piece, tuple(beams.ids[piece].tolist()), middle)
+    for piece in fastener_bars(assembly):
+        middle = assembly.points[np.unique(beams.nodes[piece])].mean(axis=0)
+        yield Connection("beams", 0, piece, tuple(beams.ids[piece].tolist()), middle)
 
 
 def _bushes(assembly: Assembly) -> Iterator[Connection]:

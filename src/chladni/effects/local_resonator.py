@@ -16,7 +16,6 @@ import scipy.sparse as sp
 from ..dynamics.eigen import normal_modes
 from ..fem.assemble import structure
 from ..geometry.facets import point_normals, tangents
-from ..geometry.sampling import farthest_point_sample
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Bushes, Masses
 from .effect import Effect, Parameter, PointTerm
@@ -143,9 +142,10 @@ def with_oscillator(
 def candidates(context: SearchContext) -> list[Candidate]:
     """The best place and frequency about each baseline, by exact re-analysis."""
     where = context.where
-    some = farthest_point_sample(where.places.point, PLACES)
+    some = where.places.spread(PLACES)
     if context.scan is None:
-        at = [where.grids.position(where.places.grids[k]) for k in some[: PLACES // 3]]
+        few = where.places.only(some[: PLACES // 3])
+        at = [where.grids.position(*spot) for spot in zip(few.grids, few.normal, strict=True)]
         effects = [LocalResonator.near(where, k) for k in at]
         return best_places(context, effects, where.grids.point[at])
     mass, f_max = SHARE * where.setup.weight, where.setup.f_max
@@ -181,7 +181,8 @@ def _best(
     where = context.where
     amount, score = _scores(context, about, mass, hertz, places)
     k, level = np.unravel_index(int(np.argmin(score)), score.shape)
-    effect = LocalResonator.near(where, where.grids.position(places.grids[k]))
+    at = where.grids.position(places.grids[k], places.normal[k])
+    effect = LocalResonator.near(where, at)
     m, f = np.clip(amount[k, level], LEAST * mass, 10 * mass), hertz[level]
     ln_m, ln_f = (np.log(v / effect.parameters[p].scale) for v, p in ((m, 0), (f, 3)))
     return Candidate(effect, np.array([ln_m, 0.0, 0.0, ln_f]), context.bases[about])

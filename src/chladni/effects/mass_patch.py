@@ -108,4 +108,5 @@ FAMILY = Family(
     candidates=candidates,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="look what lies on the sheet there, and weigh it",
+    on_sheets=True,
 )

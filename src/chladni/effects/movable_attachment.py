@@ -2,7 +2,8 @@
 
 Between grids the motion of the sheet is interpolated by moving least squares with quadratic
 polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a fit can follow its
-slope.
+slope. On a line of beams it moves along the line; the second parameter of its place does nothing
+there and stays at its prior.
 """
 
 from collections.abc import Callable
@@ -13,7 +14,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import tangents
-from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
@@ -27,13 +27,13 @@ STEP = 1e-4  # of the local mesh size, for the slope of the interpolation weight
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Grids round a start, in the tangent plane.
+    """Grids round a start, in the tangent plane, or on its line of beams.
 
     Attributes
     ----------
     grids : (k,) int          ids
     flat : (k, 2)             places in the tangent plane, the start is the origin [m]
-    plane : (2, 3)            its axes
+    plane : (2, 3)            its axes; along a line of beams the second is zero
     origin : (3,) [m]
     rows : d lists            rows of the structure at these grids, one (k, n) per direction
     size : float              typical distance of neighbours [m]
@@ -49,6 +49,8 @@ class Patch:
     def weights(self, at: np.ndarray) -> np.ndarray:
         """Interpolation weights of the grids at a place of the plane (k,)."""
         d = (self.flat - at) / self.size
+        if not self.plane[1].any():
+            d[:, 1] = 0.0
         w = np.exp(-(d**2).sum(axis=1) / 1.8)
         P = np.stack(
             [np.ones(len(d)), d[:, 0], d[:, 1], d[:, 0] ** 2, d[:, 0] * d[:, 1], d[:, 1] ** 2], 1
@@ -101,7 +103,7 @@ class MovableAttachment(Effect):
         """About the grid it moved to, once that lies farther than ``FAR`` of the patch's size."""
         if np.abs(x[1:3]).max() < FAR:
             return None
-        k = where.grids.position(self.nearest(x))
+        k = where.grids.position(self.nearest(x), self.direction)
         return self.near(where, k), np.array([x[0], 0.0, 0.0, *x[3:]])
 
     def at(self, x: np.ndarray) -> np.ndarray:
@@ -143,16 +145,22 @@ def there(where: Surroundings, k: int) -> dict[str, Any]:
 
 
 def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
-    """The grids round the k-th of all that lie in the same face of the sheet."""
+    """The grids round the k-th of all that lie in the same face of the sheet, or on its line."""
     spots = where.grids
     d = spots.point - spots.point[k]
-    facing = np.abs(spots.normal @ spots.normal[k]) > FACING
-    distance = np.where(facing, np.linalg.norm(d, axis=1), np.inf)
-    near = np.argsort(distance, kind="stable")[:NEIGHBOURS]
+    if spots.line[k] < 0:
+        mine = (np.abs(spots.normal @ spots.normal[k]) > FACING) & (spots.line < 0)
+        plane, neighbours = np.stack(tangents(spots.normal[k])), NEIGHBOURS
+    else:
+        mine = np.zeros(len(spots), bool)
+        mine[np.unique(spots.grids, return_index=True)[1]] = True
+        mine = np.isin(spots.grids, spots.grids[spots.line == spots.line[k]]) & mine
+        plane, neighbours = np.stack([spots.along[k], np.zeros(3)]), NEIGHBOURS // 2
+    distance = np.where(mine, np.linalg.norm(d, axis=1), np.inf)
+    near = np.argsort(distance, kind="stable")[:neighbours]
     near = near[np.isfinite(distance[near])]
-    n = spots.normal[k]
-    plane = np.stack(tangents(n))
-    size = float(np.sort(distance)[1:5].mean())
+    next_ones = distance[near][1 : 5 if spots.line[k] < 0 else 3]
+    size = float(next_ones.mean())
     rows = tuple(
         where.groups.structure.along(spots.grids[near], np.tile(axis, (len(near), 1)))
         for axis in directions
@@ -178,8 +186,8 @@ def attachments(
     where = context.where
     grids, places = where.grids, where.places
     if context.scan is None:
-        some = farthest_point_sample(places.point, TRIED)
-        effects = [near(where, grids.position(places.grids[k])) for k in some]
+        some = places.spread(TRIED)
+        effects = [near(where, grids.position(places.grids[k], places.normal[k])) for k in some]
         return best_places(context, effects, places.point[some])
     chosen: list[int] = []
     out: list[Candidate] = []
@@ -190,7 +198,8 @@ def attachments(
             closer = around(grids, places, k)
             finer = context.scan.point_scores(about, matrix, strengths, closer)
             best, level = np.unravel_index(np.argmin(finer), finer.shape)
-            effect, c = near(where, grids.position(closer.grids[best])), strengths[level]
+            k_best = grids.position(closer.grids[best], closer.normal[best])
+            effect, c = near(where, k_best), strengths[level]
             start = np.array([p.mean for p in effect.parameters])
             start[0] = np.log(c / effect.parameters[0].scale)
             out.append(Candidate(effect, start, base))
@@ -202,4 +211,4 @@ def around(grids: ShellGrids, places: ShellGrids, k: int) -> ShellGrids:
     d = np.linalg.norm(places.point - places.point[k], axis=1)
     reach = np.sort(d)[min(4, len(d) - 1)]
     near = np.flatnonzero(np.linalg.norm(grids.point - places.point[k], axis=1) <= reach)
-    return grids.only(near[farthest_point_sample(grids.point[near], CLOSER)])
+    return grids.only(near[grids.only(near).spread(CLOSER)])

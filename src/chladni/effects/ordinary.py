@@ -9,16 +9,27 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..model.assembly import Assembly
-from ..model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
+from ..model.properties import (
+    Anisotropic,
+    BeamSection,
+    Isotropic,
+    Material,
+    Orthotropic,
+    Part,
+    ShellSection,
+)
 from .effect import ChannelChange, Effect, FieldChange, Parameter
 from .shell_groups import ShellGroups
 
-SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05}  # prior sd of ln(value / deck's value)
+SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
+UNITS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
+SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
+_AREAS = ("area", "I1", "I2", "I12", "J")  # what goes with the wall of a thin tube
 
 
 @dataclass(frozen=True, eq=False)
 class PartScale(Effect):
-    """E, rho or t of one part (or of several together) times e^x."""
+    """E, rho or t (of beams: the wall) of one part, or of several together, times e^x."""
 
     name = "part-scale"
     claim = "an ordinary value of the deck is off"
@@ -30,11 +41,12 @@ class PartScale(Effect):
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """ln factor x on the groups of these parts."""
-        return (FieldChange(self.quantity, x[0] * self.inside, self.inside[:, None]),)
+        name = "t" if self.quantity == "wall" else self.quantity
+        return (FieldChange(name, x[0] * self.inside, self.inside[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The deck with the value changed in these parts."""
-        return with_sheets(assembly, self.quantity, self.positions, float(np.exp(x[0])))
+        return with_scaled(assembly, self.quantity, self.positions, float(np.exp(x[0])))
 
 
 def ordinary(
@@ -43,10 +55,9 @@ def ordinary(
     """One ordinary parameter of these parts, with its prior."""
     parts = groups.structure.assembly.parts
     names = tuple(parts[k].name for k in positions)
-    units = {"E": "Pa", "rho": "kg/m3", "t": "m"}
     nominal = value(parts[positions[0]], quantity)
     sd = SPREAD[quantity] if sd is None else sd
-    parameter = Parameter(quantity, units[quantity], 0.0, sd, nominal, step=0.1)
+    parameter = Parameter(quantity, UNITS[quantity], 0.0, sd, nominal, step=0.1)
     inside = np.isin(groups.part, positions).astype(float)
     return PartScale(
         (parameter,), f"{quantity} of {', '.join(names)}", names,
@@ -55,32 +66,50 @@ def ordinary(
 
 
 def defaults(groups: ShellGroups) -> list[PartScale]:
-    """E and t of every shell part, rho of every material: what a user may calibrate anyway.
+    """E and t (of tubes: the wall) of every part, rho of every material: what may be calibrated.
 
     A part may have been given the wrong sheet, so that E is each part's own; weighing tells one
-    density at most.
+    density at most. Of a solid bar E and rho say all that its modes tell of its section.
     """
     parts = groups.structure.assembly.parts
     used = sorted(set(groups.part.tolist()))
     by_material: dict[int, list[int]] = {}
     for k in used:
-        section = parts[k].section
-        if isinstance(section, ShellSection):
-            material = section.membrane or section.bending
-            by_material.setdefault(id(material) if material is None else material.id, []).append(k)
+        material = _material(parts[k])
+        by_material.setdefault(id(material) if material is None else material.id, []).append(k)
     out = [ordinary(groups, "E", [k]) for k in used]
     out += [ordinary(groups, "rho", ks) for ks in by_material.values()]
-    return out + [ordinary(groups, "t", [k]) for k in used]
+    return out + [ordinary(groups, t, [k]) for k in used if (t := thickness_of(parts[k]))]
+
+
+def thickness_of(part: Part) -> str:
+    """What of a part is its thickness: t of a sheet, wall of a tube, "" of a solid bar."""
+    section = part.section
+    if isinstance(section, BeamSection):
+        return "wall" if section.tube else ""
+    return "t"
+
+
+def _material(part: Part) -> Material | None:
+    section = part.section
+    if isinstance(section, ShellSection):
+        return section.membrane or section.bending
+    return section.material
 
 
 def value(part: Part, quantity: str) -> float:
-    """E [Pa], rho [kg/m³] or t [m] of a shell part; E of an orthotropic sheet is sqrt(E1 E2)."""
-    section = part.section
-    if not isinstance(section, ShellSection):
-        raise TypeError(f"part {part.name} is no shell")
+    """E [Pa], rho [kg/m³] or t [m] of a part of shells, E, rho or wall (1) of one of beams.
+
+    E of an orthotropic sheet is sqrt(E1 E2).
+    """
+    section, material = part.section, _material(part)
+    if quantity not in (TUBE if isinstance(section, BeamSection) else SHEET):
+        raise TypeError(f"part {part.name} has no {quantity}")
+    if quantity == "wall":
+        return 1.0
     if quantity == "t":
+        assert isinstance(section, ShellSection)
         return section.thickness
-    material = section.membrane or section.bending
     if quantity == "rho" and material is not None:
         return material.rho
     if isinstance(material, Isotropic):
@@ -90,10 +119,10 @@ def value(part: Part, quantity: str) -> float:
     return float(np.sqrt(material.Q[0, 0] * material.Q[1, 1])) if material is not None else 0.0
 
 
-def with_sheets(
+def with_scaled(
     assembly: Assembly, quantity: str, positions: Sequence[int], factor: float
 ) -> Assembly:
-    """The assembly with E, rho or t of these shell parts times a factor."""
+    """The assembly with E, rho, t or wall of these parts of shells or beams times a factor."""
     parts = list(assembly.parts)
     for k in positions:
         parts[k] = scaled(parts[k], quantity, factor)
@@ -106,8 +135,12 @@ def with_sheets(
 
 
 def scaled(part: Part, quantity: str, factor: float) -> Part:
-    """The part with E, rho or t times a factor."""
+    """The part with E, rho, t or wall times a factor; one of solids is as it was."""
     section = part.section
+    if isinstance(section, BeamSection):
+        if quantity == "wall":
+            return part.with_section(**{n: getattr(section, n) * factor for n in _AREAS})
+        return part.with_section(material=_scaled_material(section.material, quantity, factor))
     if not isinstance(section, ShellSection):
         return part
     if quantity == "t":

@@ -215,4 +215,5 @@ FAMILY = Family(
     placed=material_axes,
     cards=("MAT8", "CORD2R", "CQUAD4", "CTRIA3"),
     settled_by="bend strips cut along the sheet and across it",
+    on_sheets=True,
 )

@@ -101,7 +101,7 @@ class SheetPatch(Effect):
         The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
         """
         part = int(groups.part[group])
-        inside = groups.connected == groups.connected[group]
+        inside = (groups.connected == groups.connected[group]) & groups.sheet
         assembly = groups.structure.assembly
         grids = np.unique(groups.nodes[inside[groups.group]])
         size = float(np.sqrt(groups.area[groups.part == part].sum()))
@@ -114,7 +114,8 @@ class SheetPatch(Effect):
         )
         return cls(
             unknown, f"on {name}", (name,), trials_factor=trials_factor,
-            shells=inside[groups.group], inside=inside.astype(float), centre=groups.centre,
+            shells=inside[groups.group[: len(assembly.shells)]],
+            inside=inside.astype(float), centre=groups.centre,
             surface=surface(groups, group, size), size=size, variance=groups.area / 12,
             points=assembly.points[grids], ids=assembly.ids[grids],
             spacing=float(np.sqrt(groups.area[inside].sum() / len(grids))), **cls.more(groups),
@@ -176,16 +177,17 @@ def patches(context: SearchContext, kind: type[SheetPatch], each: int = 2) -> li
     each : places per baseline
     """
     groups = context.where.groups
-    sheets = len(set(groups.connected.tolist()))
+    every = np.flatnonzero(groups.sheet)
+    sheets = len(set(groups.connected[every].tolist()))
     if context.scan is None:
-        some = farthest_point_sample(groups.centre, TRIED)
+        some = farthest_point_sample(groups.centre[every], TRIED)
         tried = [kind.on(groups, int(g), sheets) for g in some]
         return best_places(context, tried, groups.centre[some])
-    tried = [kind.on(groups, g, sheets) for g in range(len(groups))]
+    tried = [kind.on(groups, int(g), sheets) for g in every]
     effects = [e for e in tried for _ in RADII]
     starts = [np.array([kind.scanned, np.log(R), 0.0, 0.0]) for _ in tried for R in RADII]
     changes = np.stack([e.log(x) for e, x in zip(effects, starts, strict=True)], axis=1)
-    centre = np.repeat(groups.centre, len(RADII), axis=0)
+    centre = np.repeat(groups.centre[every], len(RADII), axis=0)
     least, most = kind.grows
     out: list[Candidate] = []
     taken: list[int] = []

@@ -1,35 +1,45 @@
-"""The shells of a structure, split by what scales them and gathered in groups.
+"""The shells and beams of a structure, split by what scales them and gathered in groups.
 
 A shell's stiffness is E (t A + t³ B); its mass is ρ t m.  With the element matrices of A, B and m
 projected group by group, any smooth field of thickness, modulus or density is a weight per group,
 and the reduced model never goes back to elements.
+
+Of a beam t is the wall of a thin tube: A (shear areas with it), I1, I2, I12 and J go with it, so
+that its stiffness is E t A and its mass ρ t m exactly.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..fem import shell
+from ..fem import beam, shell
 from ..fem.assemble import Structure
 from ..fem.shell_section import section_arrays
-from .shell_components import thickness_split
+from ..geometry.beam_lines import member_beams
+from ..model.assembly import Assembly, picked
+from ..model.properties import BeamSection
+from .shell_components import component_matrices, thickness_split
 
 
 @dataclass(frozen=True, eq=False)
 class ShellGroups:
-    """Element matrices of all shells and the groups they are gathered in.
+    """Element matrices of all shells, then of all member beams, and the groups they are in.
+
+    No fastener is among the beams: what is wrong with these is asked of joints. A beam has the rows
+    of its two ends; the other twelve are zero.
 
     Attributes
     ----------
     linear, cubic : (m, 24, 24)   stiffness that grows with t and with t³ [N/m]
     mass : (m, 24, 24)            [kg]
-    nodes : (m, 4)                rows of points
-    group : (m,)                  group of each shell
+    nodes : (m, 4)                rows of points; of a beam the second end thrice
+    group : (m,)                  group of each element
     centre : (g, 3)               area-weighted centre of each group [m]
-    area, weight : (g,)           [m²], [kg]
+    area, weight : (g,)           [m²] (of a beam: length times the root of A), [kg]
     part : (g,)                   position of the group's part
     """
 
@@ -48,14 +58,32 @@ class ShellGroups:
         return len(self.area)
 
     @cached_property
+    def sheet(self) -> np.ndarray:
+        """Which groups are of shells (g,) bool; these come first."""
+        n = self.group[: len(self.structure.assembly.shells)].max(initial=-1) + 1
+        return np.arange(len(self)) < n
+
+    @cached_property
     def connected(self) -> np.ndarray:
-        """Which connected sheet each group belongs to (g,): parts that share grids are one."""
+        """Which connected sheet, or beams, each group belongs to (g,): what shares grids is one."""
         assembly, parts = self.structure.assembly, self.part[self.group]
+        nodes = self.nodes.copy()
+        nodes[len(assembly.shells) :] += len(assembly.points)  # beams hold no sheets together
         touch = sp.coo_array(
-            (np.ones(4 * len(parts)), (np.repeat(parts, 4), self.nodes.ravel())),
-            shape=(len(assembly.parts), len(assembly.points)),
+            (np.ones(4 * len(parts)), (np.repeat(parts, 4), nodes.ravel())),
+            shape=(len(assembly.parts), 2 * len(assembly.points)),
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
+
+    def components(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """``linear`` and ``cubic`` by the component of the plane stiffness; beams go with Q66."""
+        m = len(self.structure.assembly.shells)
+        out = {}
+        for name, pair in component_matrices(self.structure.assembly).items():
+            beams = [A[m:] if name == "Q66" else 0 * A[m:] for A in (self.linear, self.cubic)]
+            A, B = (np.concatenate(both) for both in zip(pair, beams, strict=True))
+            out[name] = A, B
+        return out
 
     def project(
         self, matrices: np.ndarray, left: np.ndarray, right: np.ndarray | None = None
@@ -112,30 +140,71 @@ def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
 
 
 def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
-    """The shells of a structure, gathered in at most about ``most`` groups.
+    """The shells of a structure, and likewise its beams, gathered in about ``most`` groups.
 
     Transverse shear with residual bending flexibility grows with a power of t between one and
     three; its matrix is split so that value and first derivative are exact.
     """
-    assembly = structure.assembly
+    shells, beams = _shells(structure.assembly), _beams(structure.assembly)
+    linear, cubic, mass, nodes, centre, area, of = (
+        np.concatenate(pair) for pair in zip(shells, beams, strict=True)
+    )
+    first = group_of_shells(shells.centre, shells.part, shells.area, most)
+    second = group_of_shells(beams.centre, beams.part, beams.area, most)
+    group = np.concatenate([first, second + first.max(initial=-1) + 1])
+    n = group.max(initial=-1) + 1
+    extent = np.bincount(group, area, minlength=n)
+    middle = np.stack(
+        [np.bincount(group, area * centre[:, k], minlength=n) / extent for k in range(3)], axis=1
+    )
+    weight = np.einsum("eij,i,j->e", mass, _along_x(), _along_x())
+    part = np.zeros(n, dtype=int)
+    part[group] = of
+    return ShellGroups(
+        structure, linear, cubic, mass, nodes, group, middle, extent,
+        np.bincount(group, weight, minlength=n), part,
+    )  # fmt: skip
+
+
+class _Elements(NamedTuple):
+    """Matrices (m, 24, 24), nodes (m, 4), centres (m, 3), areas and parts (m,) of one kind."""
+
+    linear: np.ndarray
+    cubic: np.ndarray
+    mass: np.ndarray
+    nodes: np.ndarray
+    centre: np.ndarray
+    area: np.ndarray
+    part: np.ndarray
+
+
+def _shells(assembly: Assembly) -> _Elements:
     shells = assembly.shells
     geo = shell.geometry(assembly.points, shells)
     arrays = section_arrays(assembly, geo)
     linear, cubic = thickness_split(assembly, geo, arrays)
     mass = shell.mass(geo, shells.thickness, arrays.rho, arrays.nsm, assembly.coupled_mass)
     centre = assembly.points[shells.nodes].mean(axis=1)
-    group = group_of_shells(centre, shells.part, geo.area, most)
-    n = group.max() + 1 if len(group) else 0
-    area = np.bincount(group, geo.area, minlength=n)
-    middle = np.stack(
-        [np.bincount(group, geo.area * centre[:, k], minlength=n) / area for k in range(3)], axis=1
-    )
-    weight = np.einsum("eij,i,j->e", mass, _along_x(), _along_x())
-    part = np.zeros(n, dtype=int)
-    part[group] = shells.part
-    return ShellGroups(
-        structure, linear, cubic, mass, shells.nodes, group, middle, area,
-        np.bincount(group, weight, minlength=n), part,
+    return _Elements(linear, cubic, mass, shells.nodes, centre, geo.area, shells.part)
+
+
+def _beams(assembly: Assembly) -> _Elements:
+    """The members; what they carry of non-structural mass stays with the rest."""
+    beams = picked(assembly.beams, member_beams(assembly))
+    plain = tuple(
+        part.with_section(nonstructural=0.0, nonstructural_inertia=0.0)
+        if isinstance(part.section, BeamSection) else part
+        for part in assembly.parts
+    )  # fmt: skip
+    alone = replace(assembly.with_parts(plain), beams=beams)
+    nodes, K, M = beam.stiffness_and_mass(alone)
+    K, M = (np.pad(A, ((0, 0), (0, 12), (0, 12))) for A in (K, M))
+    ends = assembly.points[nodes]
+    areas = np.array([getattr(p.section, "area", 0.0) for p in plain])[beams.part]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return _Elements(
+        K, np.zeros_like(K), M, nodes[:, [0, 1, 1, 1]], ends.mean(axis=1),
+        length * np.sqrt(areas), beams.part,
     )  # fmt: skip
 
 

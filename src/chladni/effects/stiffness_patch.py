@@ -103,4 +103,5 @@ FAMILY = Family(
     candidates=candidates,
     cards=("MAT1", "MAT8", "PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="tap the sheet there and beside it with a small hammer, and gauge its thickness",
+    on_sheets=True,
 )

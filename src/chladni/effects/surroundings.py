@@ -1,4 +1,4 @@
-"""What an effect may know before anything is fitted: the shells, their grids, the test."""
+"""What an effect may know before anything is fitted: shells, beams, their grids, the test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..fem.locate import Share
-from ..geometry.facets import point_normals
+from ..geometry.beam_lines import lines
+from ..geometry.facets import point_normals, tangents, unit
+from ..geometry.sampling import farthest_point_sample
 from .shell_groups import ShellGroups
 
 
@@ -37,46 +39,97 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class ShellGrids:
-    """Grids of shells where something unknown may sit.
+    """Grids of shells and beams where something unknown may sit, each with a direction.
+
+    A grid of shells stands here once, with the normal of the surface; one of beams once for every
+    direction across a beam that ends there.
 
     Attributes
     ----------
     grids : (k,) int      ids
-    normal : (k, 3)       of the surface, unit length
+    normal : (k, 3)       of the surface, or across the beam, unit length
     point : (k, 3) [m]
     rows : (k, n)         translation along the normal
+    line : (k,) int       number of the line of beams it lies on, -1 on shells
+    along : (k, 3)        of that line, unit length; zero on shells
     """
 
     grids: np.ndarray
     normal: np.ndarray
     point: np.ndarray
     rows: sp.csr_array
+    line: np.ndarray
+    along: np.ndarray
 
     def __len__(self) -> int:
         return len(self.grids)
 
-    def position(self, grid: int) -> int:
-        """Position of a grid among them."""
-        return int(np.flatnonzero(self.grids == grid)[0])
+    def position(self, grid: int, towards: np.ndarray | None = None) -> int:
+        """Position of a grid among them; of several the first, or that most in this direction."""
+        at = np.flatnonzero(self.grids == grid)
+        if towards is None:
+            return int(at[0])
+        return int(at[np.argmax(np.abs(self.normal[at] @ towards))])
 
     def only(self, chosen: np.ndarray) -> Self:
         """Some of them."""
-        return type(self)(
-            self.grids[chosen], self.normal[chosen], self.point[chosen], self.rows[chosen]
-        )
+        return type(self)(**{name: value[chosen] for name, value in vars(self).items()})
+
+    def spread(self, most: int) -> np.ndarray:
+        """Positions of a sample far from each other, in all directions each has.
+
+        Of grids with one direction ``most`` at most, of others half as many.
+        """
+        grids, first = np.unique(self.grids, return_index=True)
+        several = len(grids) < len(self.grids)
+        some = farthest_point_sample(self.point[first], most // 2 if several else most)
+        order = [np.flatnonzero(self.grids == g) for g in grids[some]]
+        return np.concatenate([np.zeros(0, int), *order])
 
 
 def shell_grids(groups: ShellGroups) -> ShellGrids:
-    """All grids of shells that can move along the normal there."""
+    """All grids of shells that can move along the normal there, and of beams that can across."""
     assembly = groups.structure.assembly
     normal = point_normals(assembly.points, assembly.shells.nodes)
-    at = np.flatnonzero(normal.any(axis=1))
-    normal = normal[at]
-    rows = groups.structure.along(assembly.ids[at], normal)
-    moving = np.flatnonzero(np.diff(rows.indptr) > 0)
-    return ShellGrids(
-        assembly.ids[at[moving]], normal[moving], assembly.points[at[moving]], rows[moving]
+    on_shells = np.flatnonzero(normal.any(axis=1))
+    none = np.full(len(on_shells), -1), np.zeros((len(on_shells), 3))
+    on_beams, *of_beams = _across_beams(groups)
+    at = np.concatenate([on_shells, on_beams])
+    ways, line, along = (
+        np.concatenate(pair) for pair in zip((normal[on_shells], *none), of_beams, strict=True)
     )
+    rows = groups.structure.along(assembly.ids[at], ways)
+    moving = np.flatnonzero(np.diff(rows.indptr) > 0)
+    found = ShellGrids(assembly.ids[at], ways, assembly.points[at], rows, line, along)
+    return found.only(moving)
+
+
+SAME = 0.95  # cosine between directions across two beams of one grid that count as one
+
+
+def _across_beams(
+    groups: ShellGroups,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points on beams alone, with direction, line and its way there: (k,), (k, 3), (k,), (k, 3)."""
+    assembly = groups.structure.assembly
+    points, shells = assembly.points, len(assembly.shells)
+    nodes = groups.nodes[shells:, :2]
+    line, way = lines(points, nodes), unit(points[nodes[:, 1]] - points[nodes[:, 0]])
+    taken = set(assembly.shells.nodes.ravel().tolist())
+    found: list[tuple[int, np.ndarray, int, np.ndarray]] = []
+    ends, beam = nodes.ravel(), np.repeat(np.arange(len(nodes)), 2)
+    order = np.argsort(ends, kind="stable")
+    for at in np.split(order, np.flatnonzero(np.diff(ends[order])) + 1) if len(ends) else []:
+        row, has = int(ends[at[0]]), list[np.ndarray]()
+        for k in beam[at] if row not in taken else []:
+            for d in tangents(way[k]):
+                if all(abs(d @ other) < SAME for other in has):
+                    has.append(d)
+                    found.append((row, d, int(line[k]), way[k]))
+    if not found:
+        return np.zeros(0, int), np.zeros((0, 3)), np.zeros(0, int), np.zeros((0, 3))
+    row_of, across, line_of, along = (np.array(c) for c in zip(*found, strict=True))
+    return row_of, across, line_of, along
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +138,7 @@ class Surroundings:
 
     Attributes
     ----------
-    groups : the shells in groups
+    groups : shells and beams in groups
     grids : ShellGrids        all of them
     places : ShellGrids       a sample of them, tried where a place is unknown
     setup : Setup             of the test

@@ -24,23 +24,35 @@ class Suspension(AtPoints):
 
 
 def suspension(where: Surroundings) -> list[Suspension]:
-    """Springs at the hangers, along the surface normal or along every direction."""
+    """Springs at the hangers, along the surface normal or along every direction.
+
+    A tube has no normal: where a hanger is on one, every direction comes first, then each axis.
+    """
     hangers = tuple(where.setup.hangers)
     if not hangers:
         return []
-    known = {int(g): n for g, n in zip(where.grids.grids, where.grids.normal, strict=True)}
-    normal = np.array([known.get(int(g), np.array([0.0, 0.0, 1.0])) for g in hangers])
+    on_shells = where.grids.line < 0
+    known = dict(zip(where.grids.grids[on_shells], where.grids.normal[on_shells], strict=True))
     k = strength("K", "N/m", 0.1 * where.setup.stiffness, 2.0, (-3.0, -1.5, 0.0, 1.5))
     text = f"at hangers {', '.join(map(str, hangers))}"
-    along = where.groups.structure.along(np.array(hangers), normal)
-    every = np.tile(np.eye(3), (len(hangers), 1))
-    return [
-        Suspension((k,), text, grids=hangers, rows=along, directions=normal),
+    up = np.array([0.0, 0.0, 1.0])
+    ways = [("", np.array([known.get(g, up) for g in hangers]))]
+    if not known.keys() >= set(hangers):
+        axes = zip("xyz", np.eye(3), strict=True)
+        ways = [(f", along {a}", np.tile(e, (len(hangers), 1))) for a, e in axes]
+    everywhere = Suspension(
+        (k,), text + ", every direction", grids=tuple(np.repeat(hangers, 3)),
+        trials_factor=len(ways) + 1, rows=where.translations(hangers),
+        directions=np.tile(np.eye(3), (len(hangers), 1)),
+    )  # fmt: skip
+    one_way = [
         Suspension(
-            (k,), text + ", every direction", grids=tuple(np.repeat(hangers, 3)), trials_factor=2,
-            rows=where.translations(hangers), directions=every,
-        ),
+            (k,), text + how, grids=hangers, trials_factor=len(ways) + 1 if how else 1,
+            rows=where.groups.structure.along(np.array(hangers), n), directions=n,
+        )
+        for how, n in ways
     ]  # fmt: skip
+    return [*one_way, everywhere] if known.keys() >= set(hangers) else [everywhere, *one_way]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

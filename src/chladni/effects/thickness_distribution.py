@@ -88,4 +88,5 @@ FAMILY = Family(
     candidates=candidates,
     cards=("CQUAD4", "CTRIA3"),
     settled_by="gauge the thickness of the sheet there",
+    on_sheets=True,
 )

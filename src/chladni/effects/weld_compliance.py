@@ -32,7 +32,7 @@ SOUND = 40.0  # x of the deck's own
 BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
-NEEDS = "welds, screws or bushes between sheets"
+NEEDS = "welds, screws or bushes between sheets or beams"
 
 JointFamilies = dict[str, tuple[sp.csr_array, float]]
 

@@ -13,12 +13,21 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import ModelError
-from ..model.assembly import Assembly, Average, Bushes, Equation, Masses, RigidBody, Scalars
+from ..model.assembly import (
+    Assembly,
+    Average,
+    Bushes,
+    Equation,
+    Masses,
+    RigidBody,
+    Scalars,
+    picked,
+)
 from ..model.properties import BeamSection, Isotropic, Material, ShellSection, SolidSection
 from . import shell, solid, spring
 from .assemble import Structure, over_all_motions
 from .average import average_derivative, average_weights, lever
-from .energy import bare, only, picked
+from .energy import bare, only
 from .shell_section import modulus_derivative, section_arrays
 from .sparse_assembly import blocks, congruence, with_rotations
 
@@ -122,10 +131,10 @@ def _solid(structure: Structure, a: Assembly, section: SolidSection, name: str) 
 
 
 def of_part(structure: Structure, part: int, name: str) -> Slope:
-    """What a part of solids or beams has in K ("E": all moduli together) or M ("rho").
+    """What a part of solids or beams has in K ("E": all moduli together), M ("rho"), both ("wall").
 
-    Both are linear in it: K (1 + c) is the part with every modulus times 1 + c, M likewise; what is
-    non-structural stays out.
+    All are linear in it: K (1 + c) is the part with every modulus times 1 + c, M likewise; what is
+    non-structural stays out. With the wall of a tube go its area and all its moments.
     """
     a = only(structure.assembly, part)
     section = a.parts[part].section
@@ -134,10 +143,9 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
         a = replace(a, parts=tuple(replace(p, section=own) if k == part else p
                                    for k, p in enumerate(a.parts)))  # fmt: skip
     M, _, K, _ = over_all_motions(a)
-    none = _of(structure)
-    if name == "E":
-        return replace(none, K=congruence(structure.T, K))
-    return replace(none, M=congruence(structure.T, M))
+    found = {"E": {"K": K}, "rho": {"M": M}, "wall": {"K": K, "M": M}}[name]
+    carried = {matrix: congruence(structure.T, A) for matrix, A in found.items()}
+    return replace(_of(structure), **carried)
 
 
 def of_lumps(structure: Structure, family: str, rows: Sequence[int]) -> Slope:

@@ -1,12 +1,11 @@
 """Where a structure keeps its mass and, in a motion, its strain and kinetic energy."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells
+from ..model.assembly import Assembly, Beams, Bushes, Masses, Scalars, Shells, picked
 from . import beam, shell, solid
 from .assemble import PIECE, Structure, over_all_motions
 from .shell_section import section_arrays
@@ -127,8 +126,3 @@ def _quadratic(
     u = np.asarray(structure.T @ phi).reshape(len(structure.assembly.points), 6, -1)
     u_e = u[nodes, :motions].reshape(len(nodes), K.shape[1], phi.shape[1])
     return 0.5 * np.einsum("eir,eir->er", u_e, K @ u_e)
-
-
-def picked(family: Any, which: np.ndarray) -> Any:
-    """Some members of a family of elements, by their rows or a mask."""
-    return replace(family, **{name: value[which] for name, value in vars(family).items()})

@@ -1,4 +1,4 @@
-"""The same structure with every shell split in four: what the mesh hides becomes visible.
+"""The same structure with every shell split in four, every beam in two: what the mesh hides shows.
 
 New nodes lie on the smooth surface through the old ones where the sheet is smooth (cubic edges
 from vertex normals, Vlachos et al. 2001, Curved PN triangles), on the chord at folds.
@@ -8,18 +8,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.assembly import Assembly, Shells
+from ..model.added_points import with_points
+from ..model.assembly import Assembly, Beams, Shells, picked
+from .beam_lines import member_beams
 from .facets import cell_normals, point_normals
 
 SMOOTH = np.cos(np.radians(35.0))  # facets that differ by more make a fold
 
 
 def refined(assembly: Assembly) -> Assembly:
-    """The assembly with every shell halved along both directions; all else as it was.
+    """The assembly with every shell halved along both directions and every member beam in two.
 
-    Old points keep their rows and ids; new ones follow with new ids.
+    All else is as it was. Old points keep their rows and ids; new ones follow with new ids. A beam
+    along a side of a shell gets the point that this side got.
     """
+    halved, middle = _finer_shells(assembly)
+    return _finer_beams(halved, middle)
+
+
+Middles = tuple[np.ndarray, int]  # sides of shells (k, 2) that got a point, the first of these
+
+
+def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
     shells = assembly.shells
+    if not len(shells):
+        return assembly, (np.zeros((0, 2), int), 0)
     tri = shells.triangle
     edges, of = _edges(shells.nodes)
     normal, smooth = smooth_normals(assembly)
@@ -31,18 +44,37 @@ def refined(assembly: Assembly) -> Assembly:
     # the centre of a bent patch: Coons' blend of its sides
     centre = sides.mean(axis=1) * 2 - centre if len(quads) else centre
     points = np.concatenate([assembly.points, middle, centre])
-    first = int(assembly.ids.max()) + 1
-    ids = np.concatenate([assembly.ids, first + np.arange(m + len(quads))])
-    return replace(
-        assembly,
-        ids=ids,
-        points=points,
-        shells=_split(shells, of + n, n + m),
-        axes=None if assembly.axes is None else _padded(assembly.axes, len(points)),
-        scalar_points=None
-        if assembly.scalar_points is None
-        else np.append(assembly.scalar_points, np.zeros(m + len(quads), bool)),
-    )
+    grown, _ = with_points(assembly, points[n:])
+    return replace(grown, shells=_split(shells, of + n, n + m)), (edges, n)
+
+
+def _finer_beams(assembly: Assembly, sides: Middles) -> Assembly:
+    """Two beams in place of each member; ``sides`` are those of the shells that were halved."""
+    beams, members = assembly.beams, member_beams(assembly)
+    if not len(members):
+        return assembly
+    ends, (edges, first) = np.sort(beams.nodes[members], axis=1), sides
+    known = {pair: first + k for k, pair in enumerate(map(tuple, edges.tolist()))}
+    middle = np.array([known.get(pair, -1) for pair in map(tuple, ends.tolist())])
+    own, at = np.unique(ends[middle < 0], axis=0, return_inverse=True)
+    grown, rows = with_points(assembly, assembly.points[own].mean(axis=1))
+    middle[middle < 0] = np.asarray(rows)[at.ravel()]
+    others = picked(beams, np.setdiff1d(np.arange(len(beams)), members))
+    free = np.zeros((len(members), 6), bool)
+    halves = []
+    for end in (0, 1):
+        half = picked(beams, members)
+        nodes, offset, pins = half.nodes.copy(), half.offset.copy(), half.pins.copy()
+        nodes[:, 1 - end], pins[:, 1 - end] = middle, free
+        offset[:, 1 - end] = half.offset.mean(axis=1)
+        ids = half.ids + end * int(beams.ids.max())
+        halves.append(replace(half, ids=ids, nodes=nodes, offset=offset, pins=pins))
+    return replace(grown, beams=_joined(others, *halves))
+
+
+def _joined(*groups: Beams) -> Beams:
+    columns = {name: [getattr(g, name) for g in groups] for name in vars(groups[0])}
+    return Beams(**{name: np.concatenate(every) for name, every in columns.items()})
 
 
 def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +154,3 @@ def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
         shells.axis[at],
         shells.offset[at],
     )
-
-
-def _padded(axes: np.ndarray, n: int) -> np.ndarray:
-    return np.concatenate([axes, np.broadcast_to(np.eye(3), (n - len(axes), 3, 3))])

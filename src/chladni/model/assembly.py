@@ -7,7 +7,7 @@ point are counted (Nastran's CD), as rows of unit vectors, or None where all are
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -266,3 +266,8 @@ class Assembly:
     def thickness(self) -> np.ndarray:
         """Mean thickness of every shell (n,) [m]."""
         return self.shells.thickness.mean(axis=1)
+
+
+def picked(family: Any, which: np.ndarray) -> Any:
+    """Some members of a family of elements, by their rows or a mask."""
+    return replace(family, **{name: value[which] for name, value in vars(family).items()})

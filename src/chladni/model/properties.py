@@ -5,6 +5,8 @@ from typing import Self
 
 import numpy as np
 
+HOLLOW, CLOSED = 1.5, 0.5  # where a section counts as a tube: see BeamSection.tube
+
 
 @dataclass(frozen=True)
 class Isotropic:
@@ -138,6 +140,16 @@ class BeamSection:
     neutral: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_at: tuple[float, float] = (0.0, 0.0)  # [m]
     nonstructural_inertia: float = 0.0  # about its own centre [kg m]
+
+    @property
+    def tube(self) -> bool:
+        """True of a closed tube, A and all moments of which go with the thickness of its wall.
+
+        4π √(I1 I2) / A² is 1 of a round bar, π/3 of any rectangular one, and R/t of a thin tube; J
+        is 2 I of a round tube, and next to nothing of an open profile.
+        """
+        hollow = 4 * np.pi * np.sqrt(self.I1 * self.I2) > HOLLOW * self.area**2
+        return bool(hollow and self.J > CLOSED * min(self.I1, self.I2))
 
 
 Section = ShellSection | SolidSection | BeamSection

@@ -4,14 +4,14 @@ Every draw is a reduced model over the deck's own modes far beyond the band and 
 drawn models solved in full, so fifty draws cost little more than one.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import rigid_modes
 from ..dynamics.reduction import orthonormal
-from ..effects.ordinary import PartScale, ordinary
+from ..effects.ordinary import PartScale, ordinary, thickness_of
 from ..effects.shell_groups import shell_groups
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
@@ -58,13 +58,17 @@ def ensemble(
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
     modal = normal_modes(built.system, band=REACH * f_max, points=where)
     groups = shell_groups(built, 1)
-    parts = np.unique(groups.part).tolist()
-    effects = tuple(ordinary(groups, "t", [p], spread) for p in parts)
+    parts = built.assembly.parts
+    effects = tuple(
+        ordinary(groups, t, [p], spread)
+        for p in np.unique(groups.part).tolist()
+        if (t := thickness_of(parts[p]))
+    )
     blocks = [modal.shapes]
     rng = np.random.default_rng(0)
     for k in range(FULL):
         progress(f"drawn model {k + 1} of {FULL} for the basis", (k + 1) / (FULL + 2))
-        blocks.append(_solved(built, effects, random(rng, len(parts), spread), 1.1 * f_max))
+        blocks.append(_solved(built, effects, random(rng, len(effects), spread), 1.1 * f_max))
     basis = orthonormal(built.system.M, blocks, kept=modal.shapes.shape[1])
     return Ensemble(reduce(groups, basis), effects, int(rigid_modes(modal).sum()))
 
@@ -88,11 +92,10 @@ def _solved(
 
 def with_thickness(built: Structure, effects: tuple[PartScale, ...], x: np.ndarray) -> Structure:
     """The structure assembled anew with the thickness of each part times e^x."""
-    shells, scale = built.assembly.shells, np.zeros(len(built.assembly.parts))
+    made = built.assembly
     for effect, value in zip(effects, x, strict=True):
-        scale[list(effect.positions)] = value
-    t = shells.thickness * np.exp(scale)[shells.part][:, None]
-    return structure(replace(built.assembly, shells=replace(shells, thickness=t)))
+        made = effect.apply(made, np.array([value]))
+    return structure(made)
 
 
 def drawn(

@@ -9,6 +9,7 @@ import numpy as np
 from ..dynamics.frf import FRF, UNIT
 from ..effects.estimate import Location
 from ..ema.correlation import deviation
+from ..geometry.cells import point_means
 from ..updating.result import Alternative, NamedEffect, Scores
 from ..view import annotations, plots, scene
 from ..view.surface import Surface
@@ -119,10 +120,16 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
 
 def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
     """What the explanation leaves, on the mesh: grey where the test is blind."""
-    if result.left_where is None:
+    left = result.left_where
+    if left is None:
         return {}
-    values = np.full(len(shown.seen.faces), np.nan)  # faces of shells come first
-    values[: len(result.left_where.gain)] = result.left_where.gain
+    if len(left.gain):
+        values = np.full(len(shown.seen.faces), np.nan)  # faces of shells come first
+        values[: len(left.gain)] = left.gain
+    else:
+        beams = shown.seen.lines[: len(left.on_beams)]  # without shells all of them are members
+        ends = np.repeat(left.on_beams[:, None], 2, axis=1)
+        values = point_means(beams, ends, len(shown.seen.points))
     top = max(float(np.nanmax(values)), CALM)
     name = "gain of a local change of stiffness or mass [-2 ln p]"
     path = scene.scalar_map(

@@ -31,6 +31,7 @@ from .sensitivity import Sensitivity, sensitivity, worth_telling
 from .study_settings import StudySettings
 from .study_store import OWN, StudyStore, opened_store, row_of
 from .variation import Variation, of_case, of_text, refuse_impossible
+from .varied_effects import effect_of, of_effect
 from .workers import affordable, results
 
 RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
@@ -115,7 +116,8 @@ def study(
 
     Parameters
     ----------
-    vary : ranges as "t of inner=0.6:0.8" or "E=90%:110%"; of a case its [[parameter]] without any
+    vary : ranges as "t of inner=0.6:0.8", "E=90%:110%" or "point-mass at 412=0.01:0.2"; of a case
+        its [[parameter]] without any
     out : folder of the store: a study that was begun there goes on where it stopped
     workers : local processes (a script that asks for more than one needs the usual
               ``if __name__ == "__main__":``); None: one per core, or this one where they would not
@@ -133,6 +135,8 @@ def study(
     if workers is not None and workers < 1:
         raise FileError(f"workers = {workers}; at least one has to do it")
     settings = settings or StudySettings()
+    if isinstance(source, Case) and any(effect_of(text) == "suspension" for text in vary):
+        source = replace(source, given=tuple(g for g in source.given if g[1] != "hangers"))  # used
     model = as_model(source, "study")
     case = source if isinstance(source, Case) else None
     varied, notes = _varied(model, case, vary)
@@ -181,7 +185,12 @@ def _varied(
     """What is varied, and what the user should know of it."""
     notes: list[str] = []
     if vary:
-        found = [of_text(text, model.assembly, model.deck, model.units) for text in vary]
+        found = [
+            of_effect(text, model.assembly, case, model.units)
+            if effect_of(text)
+            else of_text(text, model.assembly, model.deck, model.units)
+            for text in vary
+        ]
         if case is not None and case.parameters:
             notes = ["The [[parameter]] of the case are not used: --vary says what is varied."]
     else:
@@ -209,10 +218,15 @@ def _choices(assembly: Assembly) -> str:
 
 
 def _places(varied: Sequence[Variation], own: np.ndarray) -> np.ndarray:
-    """The deck's own values in the unit cube (d,), beyond it where a range leaves them out."""
+    """The deck's own values in the unit cube (d,), beyond it where a range leaves them out.
+
+    Of what the deck has nothing of, and a range in the logarithm never reaches, the lower end.
+    """
     out = []
     for v, value in zip(varied, own, strict=True):
-        if v.log:
+        if v.log and value == 0:
+            out.append(0.0)
+        elif v.log:
             out.append(np.log(value / v.low) / np.log(v.high / v.low))
         else:
             out.append((value - v.low) / (v.high - v.low))

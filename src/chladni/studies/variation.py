@@ -68,7 +68,10 @@ def of_case(
     out, notes = [], []
     for free in frees:
         if free.field not in FIELDS:
-            notes.append(f"{free.name} is an effect, not a number of the deck: it is not varied.")
+            notes.append(
+                f"{free.name} is an effect, not a number of the deck: it is not varied "
+                f'(--vary "{free.field}=LOW:HIGH" does, of one that has one number).'
+            )
             continue
         sd = SD.get(free.field, SD_OTHERS) if free.sd is None else free.sd
         low = float(np.exp(-_SDS * sd)) if free.low is None else free.low
@@ -100,7 +103,7 @@ def of_text(text: str, assembly: Assembly, deck: Deck | None, units: Units | Non
     section = _section(text, found[1], found[2], assembly)
     free = free_parameter(section, assembly, deck)
     if free.field not in FIELDS:
-        raise FileError(f"--vary {text!r}: {free.field} is an effect; a study varies numbers")
+        raise FileError(f"--vary {text!r}: {free.field} is an effect, which no part has")
     nominal, unit = _nominal(assembly, free, units is not None)
     low, high, log = _range(text, span, nominal, _scale(text, span, assembly, free, units))
     return Variation(_called(free), free, nominal, low, high, unit, log)
@@ -152,6 +155,8 @@ def _scale(
     plain = any("%" not in piece for piece in span.split(":")[:2])
     _, unit = _nominal(assembly, free, True)
     if not plain or (units is None and unit != "of the deck's"):
+        return 1.0
+    if free.field == "wall":
         return 1.0
     if unit == "of the deck's":
         values = np.unique(values_of(assembly, free))

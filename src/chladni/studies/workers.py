@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import FileError
 from .sample import SampleResult, StudyModel, computed
+from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
 WORTH = 10.0  # seconds of one process above which it pays to start others
@@ -115,7 +116,7 @@ def _distributed(
             ahead = _AHEAD * _threads(client)
         while waiting and len(asked) < ahead:
             k = waiting.pop()
-            future = client.submit(computed, held, k, X[k], pure=False)
+            future = client.submit(_on_worker, held, k, X[k], pure=False)
             asked[future] = k
             ready.add(future)
         future = next(ready)
@@ -132,6 +133,12 @@ def _threads(client: Any) -> int:
 
 def _itself(study: StudyModel) -> StudyModel:
     return study
+
+
+def _on_worker(study: StudyModel, number: int, values: np.ndarray) -> SampleResult:
+    """A sample in a process that does nothing else."""
+    keep_freed_memory()
+    return computed(study, number, values)
 
 
 def _result(future: Any, k: int) -> SampleResult:

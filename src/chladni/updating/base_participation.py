@@ -22,7 +22,7 @@ class BaseParticipation:
     ----------
     motion : BaseMotion
     groups : (g, r, k)    Φᵀ Tᵀ M_g R b [√kg]
-    rest : (r, k)         of all that is no shell
+    rest : (r, k)         of all that is in no group
     """
 
     motion: BaseMotion

@@ -39,6 +39,18 @@ def candidates(problem: UpdatingProblem, null: HypothesisFit) -> list[Candidate]
     ]
 
 
+def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
+    """What a structure of beams is not asked for, and why; nothing of one that has shells."""
+    if problem.where.groups.sheet.any():
+        return ()
+    names = ", ".join(family.name for family in families() if family.on_sheets)
+    return (
+        f"not looked for, since the deck has no shells for them to act on: {names}",
+        "a joint where beams share a grid is no element of the deck, so that a compliant one is "
+        "not looked for by name; a bush between beams is",
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class UpdatingContext:
     """An updating problem as families of effects see it.

@@ -103,7 +103,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     gained = score - base.score(base.residual[:, None])[0]
     return Detectable(
         places.grids, places.point, weight * _smallest(gained, due), shares[0], shares[1],
-        reduced.groups.group, due, len(f), weight,
+        reduced.groups.group[: len(built.assembly.shells)], due, len(f), weight,
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
 from .adequacy import FitTest, adequacy
-from .candidates import candidates
+from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
 from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
@@ -104,7 +104,7 @@ def diagnose(
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)
-    found = Diagnosis(nominal, null, plain, tuple(hypotheses), called)
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), called, unasked(problem))
     return tested(found, problem)
 
 

@@ -1,6 +1,6 @@
 """Where on a structure lies what an explanation leaves, and where the test could not tell.
 
-Round every group of shells the stiffness, and the density, are changed a little, smoothly over a
+Round every group of shells, or beams, stiffness and density are changed a little, smoothly over a
 tenth of the sheet. To first order the best amount a of such a change lowers -2 ln p by
 (cᵀC⁻¹r)² / cᵀC⁻¹c with r the residual of the fit, c its slope along the change and C the covariance
 under all that the fit has free (Rao's score test, 1948). cᵀC⁻¹c is what the sensors know of it:
@@ -29,12 +29,14 @@ class LeftWhere:
     Attributes
     ----------
     gain : (m,)     in -2 ln evidence, of each shell of the assembly; NaN where the test is blind
+    on_beams : (k,) the same of each member beam
     parts : names of the parts that gain most, best first
     grid, point_m : where the best change sits [m]
     best : float    its gain
     """
 
     gain: np.ndarray
+    on_beams: np.ndarray
     parts: tuple[str, ...]
     grid: int
     point_m: tuple[float, float, float]
@@ -42,8 +44,8 @@ class LeftWhere:
 
     @property
     def blind(self) -> float:
-        """Share of the shells where the test would not notice half the stiffness or mass."""
-        return float(np.isnan(self.gain).mean())
+        """Share of the elements where the test would not notice half the stiffness or mass."""
+        return float(np.isnan(np.concatenate([self.gain, self.on_beams])).mean())
 
 
 def left_where(
@@ -86,6 +88,7 @@ def _told(groups: ShellGroups, gain: np.ndarray) -> LeftWhere:
     d = np.linalg.norm(assembly.points[rows] - groups.centre[best], axis=1)
     row = int(rows[np.argmin(d)])
     x, y, z = (float(v) for v in assembly.points[row])
+    of_shells, of_beams = np.split(gain[groups.group], [len(assembly.shells)])
     return LeftWhere(
-        gain[groups.group], parts, int(assembly.ids[row]), (x, y, z), float(gain[best])
+        of_shells, of_beams, parts, int(assembly.ids[row]), (x, y, z), float(gain[best])
     )

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ..effects.discretisation import Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
-from ..effects.freed import UNITS, defaults_without_shells, freed, freed_effect
+from ..effects.freed import UNITS, defaults_of_solids, freed, freed_effect
 from ..effects.model_families import joint_nuisances, model_families
 from ..effects.ordinary import channel_gain, defaults, random_field
 from ..effects.registry import family
@@ -329,15 +329,15 @@ def setup_of(question: Question, f_max: float) -> Setup:
 
 
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
-    """What the user frees, or E and t of every part of shells and rho of every material.
+    """What the user frees; else E and t (wall) of every part, rho of every material.
 
-    Without shells, E and rho of every material of solids and beams.
+    Of shells and beams, that is; where there are neither, E and rho of every material of solids.
     """
     if question.parameters:
         return [_freed(question, reduced, f_max, p) for p in question.parameters]
     if len(reduced.groups):
         return list(defaults(reduced.groups))
-    return [freed(reduced.groups, p) for p in defaults_without_shells(question.assembly)]
+    return [freed(reduced.groups, p) for p in defaults_of_solids(question.assembly)]
 
 
 def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:

@@ -1,8 +1,8 @@
 """The reduced model in which every hypothesis is tried.
 
-K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells, M likewise;
-E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small dense
-eigenproblem; derivatives are exact, because K and M are known functions of the fields.
+K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
+likewise; E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small
+dense eigenproblem; derivatives are exact, because K and M are known functions of the fields.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect, count
-from ..effects.shell_components import COMPONENTS, component_matrices
+from ..effects.shell_components import COMPONENTS
 from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
 from ..fem.base_motion import BaseMotion
@@ -31,12 +31,12 @@ class Reduced:
 
     Attributes
     ----------
-    groups : of the structure's shells
+    groups : of the structure's shells and beams
     basis : (n, r)            M-orthonormal
     linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
     mass : (g, r)             these three are stacks of r by r matrices, one for each group
-    K0, M0 : (r, r)           all that is no shell
-    weight0 : float           mass beside the shells [kg]
+    K0, M0 : (r, r)           all that is in no group
+    weight0 : float           mass beside the groups [kg]
     base : what a moving base does to the basis, or None where forces drive the structure
     """
 
@@ -112,7 +112,7 @@ class Reduced:
         """Element matrices that grow with t and with t³, by the names of ``linear``."""
         if "" in self.linear:
             return {"": (self.groups.linear, self.groups.cubic)}
-        return component_matrices(self.groups.structure.assembly)
+        return self.groups.components()
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
         """The same model, split into components where the effect changes one of them."""
@@ -121,7 +121,7 @@ class Reduced:
 
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
-        pieces = component_matrices(self.groups.structure.assembly)
+        pieces = self.groups.components()
         linear = {k: Whole(self.groups.project(A, self.basis)) for k, (A, _) in pieces.items()}
         cubic = {k: Whole(self.groups.project(B, self.basis)) for k, (_, B) in pieces.items()}
         return replace(self, linear=linear, cubic=cubic)

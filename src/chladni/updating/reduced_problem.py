@@ -1,4 +1,4 @@
-"""A structure made ready for trying hypotheses: groups of shells, basis, factor, places."""
+"""A structure made ready for trying hypotheses: groups of elements, basis, factor, places."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,6 @@ from ..effects.surroundings import ShellGrids, shell_grids
 from ..fem.assemble import Structure
 from ..fem.base_motion import base_motion
 from ..fem.modelled import Modelled, modelled
-from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
@@ -108,7 +107,7 @@ def reduced_problem(
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
     shells = shell_groups(built, groups)
     grids = shell_grids(shells)
-    chosen = grids.only(farthest_point_sample(grids.point, most))
+    chosen = grids.only(grids.spread(most))
     return ReducedProblem(
         built,
         shells,

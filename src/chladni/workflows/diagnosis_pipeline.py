@@ -57,7 +57,7 @@ from .screening_of_case import (
     unmendable,
 )
 
-BLIND_SHARE = 0.05  # of the shells
+BLIND_SHARE = 0.05  # of the shells and beams
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +87,10 @@ def explained(
         If the recording shows a fault that no fit could make up for.
     """
     progress("identifying the recording", 0.0)
-    if diagnosing and not len(case.assembly.shells):
+    if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
         raise FileError(
-            f"{case.path}: the deck has no shells, and what diagnose looks for sits on shells; "
-            "calibrate and correlate take any deck"
+            f"{case.path}: the deck has neither shells nor beams, and what diagnose looks for sits "
+            "on these; calibrate and correlate take any deck"
         )
     asked = question(case)
     try:
@@ -265,7 +265,7 @@ def _blind(spot: LeftWhere | None) -> tuple[str, ...]:
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
     return (
-        f"on {spot.blind:.0%} of the sheet the test would not notice a local loss of half the "
+        f"on {spot.blind:.0%} of the structure the test would not notice a local loss of half the "
         "stiffness or mass (grey in the map of what is left)",
     )
 

@@ -38,7 +38,7 @@ def smallest_findings(
     if not model.unit:
         raise FileError(f"{model.source}: what a test finds needs the unit system (--units)")
     if not len(model.assembly.shells):
-        raise FileError(f"{model.source} has no shells, and what is looked for sits on shells")
+        raise FileError(f"{model.source} has no shells, and what a layout finds is told of shells")
     progress("predicted evidence", 0.1)
     outputs, inputs = layout_places(model, layout)
     asked = Question(

@@ -8,6 +8,7 @@ from chladni.model.assembly import Assembly, Beams
 from chladni.model.properties import BeamSection, Isotropic, Part
 
 STEEL = Isotropic(210e9, 0.3, 7850.0, id=1)
+COARSE = 0.06  # elements of the coarsest mesh [m]
 
 
 def pipe(outer: float, t: float, material: Isotropic = STEEL) -> BeamSection:
@@ -23,7 +24,11 @@ def pipe(outer: float, t: float, material: Isotropic = STEEL) -> BeamSection:
 
 
 def tube_frame(d: Mapping[str, float], h: float) -> Assembly:
-    """A flat ladder of two rails and three cross members, a bow over its one end, two struts."""
+    """A flat ladder of two rails and three cross members, a bow over its one end, two struts.
+
+    A finer mesh splits the elements of the coarse one, so that all have the grids of that.
+    """
+    split = max(1, round(COARSE / h))
     L, W, H, bay = d["length"], d["width"], d["height"], d["bay"]
     corners = np.array(
         [(x, y, 0.0) for x in (0.0, bay * L, L) for y in (0.0, W)]
@@ -34,7 +39,7 @@ def tube_frame(d: Mapping[str, float], h: float) -> Assembly:
     points, bars, part = [*corners], [], []
     for k, members in enumerate((rails, braces)):
         for a, b in members:
-            n = max(2, round(float(np.linalg.norm(corners[b] - corners[a])) / h))
+            n = split * max(2, round(float(np.linalg.norm(corners[b] - corners[a])) / COARSE))
             inner = len(points) + np.arange(n - 1)
             points += list(corners[a] + np.arange(1, n)[:, None] / n * (corners[b] - corners[a]))
             chain = np.r_[a, inner, b]

@@ -237,3 +237,36 @@ def test_what_no_card_says_is_refused(deck):
     )
     with pytest.raises(ModelError, match="Anisotropic"):
         changes(made, before, after, units)
+
+
+TUBES = {  # cards of a property 7 in mm-t-s, of a tube of 20 mm with a wall of 1.5 mm or alike
+    "PBAR": "PBAR,7,1,87.2,3754.,3754.,7508.,,,\n+,,,,,,,,,\n+,.5,.5",
+    "PBARL": "PBARL,7,1,,TUBE\n+,10.,8.5",
+    "PBEAM": "PBEAM,7,1,87.2,3754.,3754.,,7508.",
+    "PBEAML": "PBEAML,7,1,,BOX\n+,20.,16.,1.5,1.2",
+}
+
+
+@pytest.mark.parametrize("kind", TUBES)
+def test_the_wall_of_a_tube_stands_in_its_card(tmp_path, kind):
+    element = "CBEAM" if kind.startswith("PBEAM") else "CBAR"
+    lines = ["SOL 103", "CEND", "BEGIN BULK", "MAT1,1,210000.,,.3,7.85-9", TUBES[kind]]
+    lines += ["MAT1,2,70000.,,.33,2.7-9", "PBAR,8,1,100.,900.,900.,1500."]
+    lines += [f"GRID,{k + 1},,{100.0 * k},{20.0 * k * k},0." for k in range(8)]
+    lines += [f"{element},{k},7,{k},{k + 1},0.,0.,1." for k in range(1, 6)]
+    lines += [f"CBAR,{k},8,{k},{k + 1},0.,0.,1." for k in range(6, 8)]
+    path = tmp_path / "deck.bdf"
+    path.write_text("\n".join([*lines, "ENDDATA", ""]))
+    units, found = UNITS["mm-t-s"], read_deck(path)
+    before = assembly(found, units)
+    tube = before.part(7)
+    groups = shell_groups(structure(before))
+    stiff, wall = (ordinary(groups, q, [tube]) for q in ("E", "wall"))
+    after = wall.apply(stiff.apply(before, np.array([0.1])), np.array([-0.2]))
+    again, fresh, gone = repaired(found, before, after, units)
+    same(again, after, before)
+    section, due = again.parts[again.part(7)].section, after.parts[after.part(7)].section
+    for name in ("area", "I1", "I2", "J"):
+        assert getattr(section, name) == pytest.approx(getattr(due, name), rel=1e-6)
+    assert section.shear == pytest.approx(due.shear)
+    assert not [line for line in (*fresh, *gone) if line.startswith(("GRID", "CB", "PBAR,8"))]

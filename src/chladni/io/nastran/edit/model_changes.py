@@ -12,6 +12,7 @@ from ....units import Units
 from ....units import units as unit_system
 from .. import Add, Deck, Replace, SetColumns, SetField
 from .added_elements import added_cards
+from .beam_changes import with_sections
 from .changes import Change
 from .free_ids import FreeIds, free_ids
 from .joint_changes import joint_changes
@@ -47,6 +48,7 @@ def changes(
     out += laminate_changes(deck, before, after, units, free.materials)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after, free.properties)
+    out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := added_cards(before, after, units, free):
         out.append(Add(cards, "put in by the diagnosis"))

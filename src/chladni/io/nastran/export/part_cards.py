@@ -88,7 +88,7 @@ def _property(part: Part, pid: int, mid: list[int | None], units: Units) -> tupl
     if isinstance(s, SolidSection):
         return "PSOLID", [pid, mid[0], None, None, None, "FULL" if s.full else None]
     if isinstance(s, BeamSection):
-        return _beam(s, pid, mid[0], units)
+        return beam_card(s, pid, mid[0], units)
     values: list[Value] = [pid, mid[0], s.thickness / L, mid[1]]
     values += [None if s.bending_ratio == 1 else s.bending_ratio, mid[2]]
     values += [None if s.shear_ratio == 5 / 6 else s.shear_ratio]
@@ -96,7 +96,8 @@ def _property(part: Part, pid: int, mid: list[int | None], units: Units) -> tupl
     return "PSHELL", values + ([None, None, mid[3]] if mid[3] else [])
 
 
-def _beam(s: BeamSection, pid: int, mid: int | None, units: Units) -> tuple[str, list[Value]]:
+def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, list[Value]]:
+    """(card name, fields): PBAR, PBEAM or PROD."""
     L = units.length
     nsm = s.nonstructural / (units.mass / L)
     A, I1, I2, I12, J = s.area / L**2, *(x / L**4 for x in (s.I1, s.I2, s.I12, s.J))

@@ -1,0 +1,131 @@
+"""Effects of the catalogue over a range: what a sample holds is what the catalogue would write."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import chladni
+from chladni.arrays import fingerprint
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.points import with_masses
+from chladni.errors import FileError
+from chladni.fem.assemble import structure
+from chladni.model.ground_springs import with_ground_bushes
+from chladni.studies import StudySettings
+from chladni.studies.parameter_study import study
+from chladni.studies.varied_effects import effect_of, of_effect
+from chladni.units import UNITS
+from chladni.workflows.loaded_model import Model
+from chladni_specimens.forms import FORMS
+from chladni_specimens.plates import plate
+
+GRID = 12
+
+
+def sheet():
+    return plate(0.4, 0.3, 5, 4, 1.5e-3)
+
+
+def first(assembly):
+    return normal_modes(structure(assembly).system, 12).frequency[6:]
+
+
+def model(tmp_path, made=None):
+    return Model(tmp_path / "plate", sheet() if made is None else made)
+
+
+def test_a_mass_at_a_grid_is_a_mass_at_that_grid():
+    varied = of_effect(f"point-mass at {GRID}=1e-5:2e-4", sheet(), None, UNITS["mm-t-s"])
+    assert (varied.low, varied.high, varied.unit) == pytest.approx((0.01, 0.2, "kg"))
+    made, due = varied.applied(sheet(), 0.15), with_masses(sheet(), (GRID,), 0.15)
+    assert_allclose(made.masses.matrix, due.masses.matrix, atol=1e-15)
+    assert made.masses.node.tolist() == due.masses.node.tolist()
+    assert varied.applied(sheet(), 0.0) is not None
+    assert not len(varied.applied(sheet(), 0.0).masses)
+
+
+def test_a_support_pushes_across_the_sheet():
+    varied = of_effect(f"extra-support at {GRID}=1e2:1e5:log", sheet(), None, None)
+    row = sheet().rows([GRID])
+    due = with_ground_bushes(sheet(), row, np.array([[0.0, 0, 1]]), 5e3)
+    assert_allclose(first(varied.applied(sheet(), 5e3)), first(due), rtol=1e-9)
+    assert (varied.unit, varied.log) == ("deck units", True)
+
+
+def test_it_goes_to_workers_and_is_known_again():
+    a, b, c = (
+        of_effect(f"point-mass at {grid}=0.01:0.2", sheet(), None, UNITS["SI"])
+        for grid in (GRID, GRID, GRID + 1)
+    )
+    again = pickle.loads(pickle.dumps(a))
+    assert_allclose(again.applied(sheet(), 0.1).masses.matrix[0, 0, 0], 0.1)
+    assert fingerprint(a) == fingerprint(b) != fingerprint(c)
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "oat", "morris"])
+def test_a_study_weighs_what_it_puts_on(tmp_path, sampler):
+    ranges = (
+        f"point-mass at {GRID}=0.01:0.2",
+        f"extra-support at {GRID + 5}=1e2:1e5:log",
+        "t=90%:110%",
+    )
+    found = study(model(tmp_path), ranges, StudySettings(samples=16, sampler=sampler))
+    assert not found.failed
+    assert found.nominal[f"point-mass at {GRID}"] == 0
+    t = found.column("t") / sheet().parts[0].section.thickness
+    bare = found.nominal["mass_kg"] * t
+    assert_allclose(
+        found.column("mass_kg") - bare, found.column(f"point-mass at {GRID}"), atol=1e-9
+    )
+
+
+def test_a_mass_on_a_tube(tmp_path):
+    frame = FORMS["tube frame"].made(1)
+    found = study(model(tmp_path, frame), ("point-mass at 20=0.1:0.5",), StudySettings(samples=4))
+    heavier = found.column("point-mass at 20")[:4]
+    assert_allclose(found.column("mass_kg") - found.nominal["mass_kg"], heavier, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("point-mass=0.1:0.2", "where\\? write point-mass at GRID"),
+        ("point-mass at 99999=0.1:0.2", "grid 99999 is on no shell and no beam"),
+        ("crack=1:2", "crack takes more than one number or a grid; what can be varied are"),
+        ("local-resonator at 12=1:2", "local-resonator takes more than one number"),
+        ("orthotropic-material=1:2", "takes more than one number"),
+        ("suspension=1:2", "where it acts is not known; a case"),
+        ("point-mass at 12=90%:110%", "nothing there of which to take a share"),
+        ("point-mass at 12=2:1", "must increase"),
+        ("point-mass at 12=0:1:log", "must increase and not begin below zero"),
+        ("point-mass at 12=a:b", "is no range"),
+        ("point-mass of plate=1:2", 'is not of the form "point-mass at 412'),
+    ],
+)
+def test_what_cannot_be_varied_is_told(text, said):
+    assert effect_of(text)
+    with pytest.raises(FileError, match=said):
+        of_effect(text, sheet(), None, UNITS["SI"])
+
+
+def test_numbers_of_the_deck_are_no_effects():
+    assert [effect_of(t) for t in ("t of inner=0.6:0.8", "E=90%:110%", "K of PBUSH 7=1:2")] == [
+        "", "", "",
+    ]  # fmt: skip
+
+
+def test_cords_of_a_case_are_used_where_they_are_varied(deck, tmp_path):
+    text = f'[model]\ndeck = "plate.bdf"\nunits = "SI"\n[test]\nhangers = [{GRID}, {GRID + 3}]\n'
+    (tmp_path / "plate.bdf").write_text(deck.read_text())
+    (tmp_path / "case.toml").write_text(text)
+    case, few = chladni.load_case(tmp_path), StudySettings(samples=4, modes=3)
+    held = chladni.study(case, ("suspension=10:1e3:log",), few)
+    assert held.nominal["suspension"] == 0
+    stiffer = held.column("f1_hz") / held.nominal["f1_hz"]  # Rayleigh: no spring lowers a mode
+    assert stiffer.min() > 1 - 1e-9
+    assert stiffer[np.argmax(held.column("suspension"))] > 1 + 1e-5
+    assert not [n for n in held.notes if "hangers" in n]
+    idle = chladni.study(case, ("t=90%:110%",), few)
+    assert [n for n in idle.notes if "hangers" in n]
