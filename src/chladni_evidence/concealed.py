@@ -27,7 +27,7 @@ from chladni.units import units
 from chladni_specimens.holed_plate import holed_plate
 from chladni_specimens.plates import STEEL, folded_panel
 
-from .score import NULLS
+from .outcome_row import NULLS
 
 NUMBERED = 7  # families before the nulls in the order that seeds the random numbers of a case
 

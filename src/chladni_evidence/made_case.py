@@ -136,6 +136,7 @@ def made_case(
         "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
         "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
         "drive": bench.drive.labels[0], "mass_kg": weight,
+        "unweighed_kg": hidden.unweighed,
     }  # fmt: skip
     return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth, tested)
 
