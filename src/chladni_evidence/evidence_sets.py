@@ -7,11 +7,18 @@ from typing import Literal, get_args
 from chladni.errors import LabelError, did_you_mean
 from chladni_specimens.forms import FORMS
 
-from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailgate_bench
+from .bench_of_structure import (
+    SPECIMENS,
+    TAILGATE,
+    Bench,
+    form_bench,
+    panel_bench,
+    tailgate_bench,
+)
 from .benched_recording import PLAIN, Recorder
-from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
 from .made_case import KINDS
+from .package_kinds import package_kinds
 
 SETS = ("tailgate", "panels", "forms", "outside", "joints")
 Purpose = Literal["tune", "report"]
@@ -61,7 +68,8 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     """All cases of a set.
 
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
-    panels: the same on plate and panel, our fine mesh and CalculiX in turn.
+    panels: the same on plate and panel, our fine mesh and CalculiX in turn; and the effects of
+    installed packages, on our mesh.
     forms: on each form a null and one other kind, the kinds in turn.
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
@@ -89,17 +97,17 @@ def chosen(
     LabelError
         If there is no such set, kind or structure, or no case is left.
     """
+    whole = orders(name, seeds)
+    hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
     every = ("tailgate", *SPECIMENS, *FORMS)
-    for what, asked, known in (("kind", kinds, KINDS), ("structure", structures, every)):
+    for what, asked, known in (("kind", kinds, hidden), ("structure", structures, every)):
         for word in asked:
             if word not in known:
                 raise LabelError(
                     f"no {what} {word!r}; {did_you_mean(word, known)}there are {', '.join(known)}"
                 )
     left = [
-        o
-        for o in orders(name, seeds)
-        if o.kind in (kinds or KINDS) and o.structure in (structures or every)
+        o for o in whole if o.kind in (kinds or hidden) and o.structure in (structures or every)
     ]
     if not left:
         raise LabelError(
@@ -118,6 +126,7 @@ def _panels(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(CATALOGUED):
             yield Order(structure, kind, seed, _mesh(kind, MESHES[(seed + k + s) % 2]))
+        yield from (Order(structure, kind, seed, "fine") for kind in package_kinds())
 
 
 def _forms(seed: int) -> Iterator[Order]:

@@ -30,6 +30,7 @@ from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
 from .joint_kinds import JOINTS
 from .outside_kinds import OUTSIDE
+from .package_kinds import package_kinds
 from .part_scatter import scattered
 from .response_of_article import accelerance, decades_apart, seen
 
@@ -173,13 +174,13 @@ def _sized(
     band: np.ndarray,
 ) -> tuple[Hidden, float, float]:  # fmt: skip
     """The effect at the smallest size that does, how far it moves the responses, and the size."""
-    size = 1.0
+    size, hide = 1.0, KINDS.get(kind) or package_kinds()[kind]
     for _ in range(TRIES):
-        hidden = KINDS[kind](site, np.random.default_rng(seed), size)
+        hidden = hide(site, np.random.default_rng(seed), size)
         if kind == "nothing":
             return hidden, 0.0, size
         moved = decades_apart(hidden.spoil(rig.responses(hidden, band)[0]), own)
-        if kind in UNSIZED or moved >= TWICE * min(scatter, FULL):
+        if kind in UNSIZED or kind not in KINDS or moved >= TWICE * min(scatter, FULL):
             break
         size *= GROWTH
     if kind not in UNSIZED and moved < NOTHING:
