@@ -7,6 +7,7 @@ SHA-256 and that of the case's files, one line a case, written before any answer
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 from chladni.errors import AccuracyError, FileError, named
 from chladni.output import write_json
 
-from .evidence_sets import REPORTING, Purpose
+from .evidence_sets import PURPOSES, REPORTING, Purpose
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,10 @@ def published(place: BlindFolder) -> Seals:
         lines = {str(n): str(line).split() for n, line in held.pop("cases").items()}
         truths, files = ({n: words[k] for n, words in lines.items()} for k in (1, 3))
         found = Seals(**held, truths=truths, files=files)
-        if found.purpose not in ("tune", "report"):
-            raise ValueError(f"purpose {found.purpose!r}, tune or report is known")
+        if strange := [n for n in truths if not re.fullmatch(r"[\w-]+", n)]:
+            raise ValueError(f"{strange[0]!r} is no name of a case")
+        if found.purpose not in PURPOSES:
+            raise ValueError(f"purpose {found.purpose!r}; there are {', '.join(PURPOSES)}")
     except (KeyError, IndexError, AttributeError, TypeError, ValueError) as error:
         raise FileError(f"{place.seals} does not have the form of seals: {error}") from error
     return found

@@ -74,6 +74,7 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
     unchanged_cases(place, seals)
     due = hash_of(place.seals)
     for name in seals.truths:
+        _answers(place.answer(name))
         given = read_json(place.answer(name), "")
         if (given.get("seals"), given.get("files")) != (due, seals.files[name]):
             raise FileError(
@@ -95,8 +96,17 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
 def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
     found = []
     for name in seals.truths:
-        given, truth = read_json(place.answer(name), ""), opened_truth(place, seals, name)
-        plain = given.get("calibrate")
-        asked = row(Answer(**given["diagnose"]), truth, Answer(**plain) if plain else None)
-        found.append({"case": name, "purpose": seals.purpose, **asked})
+        answer, plain = _answers(place.answer(name))
+        judged = row(answer, opened_truth(place, seals, name), plain)
+        found.append({"case": name, "purpose": seals.purpose, **judged})
     return found
+
+
+def _answers(path: Path) -> tuple[Answer, Answer | None]:
+    """Of the diagnosis, and of plain calibration where it was asked."""
+    given = read_json(path, "")
+    try:
+        plain = given.get("calibrate")
+        return Answer(**given["diagnose"]), Answer(**plain) if plain else None
+    except (KeyError, TypeError) as error:
+        raise FileError(f"{path} does not have the form of an answer: {error}") from error

@@ -159,8 +159,10 @@ def test_a_half_made_case_is_made_again(tmp_path, monkeypatch):
     (place.case("case-1") / ".part-left").write_text("half")
     honest = blind_make.made_case
     monkeypatch.setattr(blind_make, "made_case", lambda *a: made.append(a) or honest(*a))
-    assert make(asked, tmp_path, "tune", "forms", 1, str) == due
+    again = make(asked, tmp_path, "tune", "forms", 1, str)
+    assert again.truths == due.truths  # a recording holds the time it was written at
     assert len(made) == 1
+    assert not (place.case("case-1") / ".part-left").exists()
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path):
@@ -212,6 +214,9 @@ def test_what_is_not_as_published_is_refused(tmp_path, calls):
             score([tmp_path], str)
         changed(path, new, old)
     score([tmp_path], str)
+    changed(place.answer("case-2"), "gigabytes", "bytes")
+    with pytest.raises(FileError, match="form of an answer"):
+        score([tmp_path], str)
     changed(place.case("case-1") / "case.toml", "1", "3")
     with pytest.raises(FileError, match="files of case-1"):
         run(tmp_path, 1, str)
@@ -257,7 +262,16 @@ def test_tuning_and_report_are_never_scored_together(tmp_path, calls):
 
 
 @pytest.mark.parametrize(
-    "text", ["[1]", "{}", '{"cases": {"a": "b"}}', "not json", '{"cases": {}, "purpose": "tune"}']
+    "text",
+    [
+        "[1]",
+        "{}",
+        '{"cases": {"a": "b"}}',
+        "not json",
+        '{"cases": {}, "purpose": "tune"}',
+        '{"cases": {"../a": "truth 1 files 2"}, "purpose": "tune", "set": "", "seeds": "",'
+        ' "version": "", "failed": 0}',
+    ],
 )
 def test_seals_that_are_none_are_refused(tmp_path, text):
     (tmp_path / "seals.json").write_text(text)

@@ -18,7 +18,7 @@ Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
 
 def make(
     set_name: Annotated[
-        str, typer.Option("--set", help="tailgate, panels, forms, outside or joints.")
+        str, typer.Option("--set", help="As panels, forms, tailgate, outside (of the catalogue).")
     ],
     seeds: Annotated[str, typer.Option(help="First and last, as 500-504.")],
     out: Annotated[Path, typer.Option("--out", help="A folder of its own.", metavar="DIR")],
@@ -54,7 +54,7 @@ def make(
 def run(
     out: Folder,
     workers: Workers = 1,
-    limit: Annotated[float, typer.Option(help="Seconds a diagnosis may take.")] = 3600.0,
+    limit: Annotated[float, typer.Option(help="Seconds a diagnosis may take.", min=1)] = 3600.0,
     calibrate: Annotated[
         bool,
         typer.Option(help="Calibrate every case as well, to be held beside the diagnosis."),
