@@ -7,6 +7,7 @@ import shutil
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,11 @@ def _each(orders: dict[str, Order], place: BlindFolder, workers: int, say: Say) 
         try:
             for done, job in enumerate(as_completed(jobs), 1):
                 say(_said(jobs[job], job.result(), done, len(orders)))
+        except BrokenProcessPool as error:
+            raise FileError(
+                "a process that made cases was ended from outside, as where memory runs short; "
+                "the same command goes on, with fewer --workers"
+            ) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in multiprocessing.active_children():

@@ -6,6 +6,7 @@ Without it a killed run leaves diagnoses behind that go on for minutes, in the w
 import multiprocessing
 import os
 import runpy
+import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -13,7 +14,9 @@ from multiprocessing.connection import wait
 
 
 def leash_to_parent() -> None:
-    """Of a worker of a pool: watch the process that started it."""
+    """Of a worker of a pool: watch the process that started it, which alone is interrupted."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
     if parent is not None:
         _end_after(lambda: wait([parent.sentinel]))
