@@ -104,6 +104,13 @@ def test_some_of_a_set():
             chosen(*asked)
 
 
+@pytest.mark.parametrize("step", ["make", "run", "score"])
+def test_every_step_explains_itself(step):
+    done = call(step, "--help")
+    assert done.exit_code == 0
+    assert "DIR" in done.output
+
+
 @pytest.mark.parametrize("text", ["109-100", "some", "-3", ""])
 def test_seeds_that_are_no_range_are_refused(text):
     with pytest.raises(LabelError, match="are no range"):
@@ -127,7 +134,7 @@ def test_seeds_that_tune_never_report(tmp_path):
 def test_made_cases_are_sealed_and_kept(tmp_path):
     """Names tell nothing, hashes are those of the files, what cannot be made is counted."""
     said, asked = [], [MASS, IMPOSSIBLE, NULL]
-    seals = make(asked, tmp_path, "tune", "forms", 1, said.append)
+    seals = make(asked, tmp_path, "tune", "forms", 2, said.append)
     place = BlindFolder(tmp_path)
     assert (len(seals.truths), seals.failed, seals.purpose) == (2, 1, "tune")
     assert seals == published(place)
@@ -194,6 +201,28 @@ def test_answers_are_given_once_and_scored_after_all(tmp_path, calls):
     assert [r["outcome"] for r in rows] == ["right", "crash"]
     assert json.loads((tmp_path / "score.json").read_text()) == rows
     assert "false alarms: 0 of 2" in (tmp_path / "table.txt").read_text()
+
+
+def test_an_interruption_ends_diagnoses_and_keeps_answers(tmp_path, calls, monkeypatch):
+    """What was at work is stopped and leaves no answer; the same call goes on."""
+    place, at_once = sealed(tmp_path), blind_run.answered
+
+    def answer(command, case, out, limit, stop):
+        if case.name == "case-2":
+            assert stop.wait(60)
+        return at_once(command, case, out, limit, stop)
+
+    def interrupted(text):
+        if text.startswith("case-1"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(blind_run, "answered", answer)
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path, 2, interrupted)
+    assert place.answer("case-1").exists()
+    assert not place.answer("case-2").exists()
+    monkeypatch.setattr(blind_run, "answered", at_once)
+    assert run(tmp_path, 2, str) == ["case-2"]
 
 
 def test_what_is_not_as_published_is_refused(tmp_path, calls):
