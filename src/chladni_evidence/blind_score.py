@@ -97,7 +97,13 @@ def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
     found = []
     for name in seals.truths:
         answer, plain = _answers(place.answer(name))
-        judged = row(answer, opened_truth(place, seals, name), plain)
+        truth = opened_truth(place, seals, name)
+        try:
+            judged = row(answer, truth, plain)
+        except KeyError as error:
+            raise FileError(
+                f"{place.truth(name)} holds no {error}; it was made by chladni {seals.version}"
+            ) from error
         found.append({"case": name, "purpose": seals.purpose, **judged})
     return found
 
