@@ -290,6 +290,15 @@ def test_tuning_and_report_are_never_scored_together(tmp_path, calls):
     assert len(score([one.out], str)) == 2
 
 
+def test_a_truth_of_another_version_is_named(tmp_path, calls, monkeypatch):
+    monkeypatch.delitem(TRUTH, "mass_kg")
+    monkeypatch.setitem(PLAIN, "mass", {"model_kg": 1.0})
+    sealed(tmp_path)
+    run(tmp_path, 1, str)
+    with pytest.raises(FileError, match="holds no 'mass_kg'; it was made by chladni"):
+        score([tmp_path], str)
+
+
 @pytest.mark.parametrize(
     "text",
     [
