@@ -1,14 +1,17 @@
-"""Make the demonstration case: a panel with something concealed, recorded on our own bench.
+"""Make a demonstration case: a panel with something concealed in it, recorded on our own bench.
 
-Run from the checkout: ``python meshes/make_demo.py``; it writes ``demo/`` and ``demo.truth.json``.
+Run from the checkout: ``python meshes/make_demo.py``; it writes ``demo/`` and ``demo.truth.json``
+anew. Those that ship were made by an earlier bench; README and tests tell their numbers.
 """
 
 from pathlib import Path
 
-from chladni_evidence.concealed import SPECIMENS, made, write
+from chladni_evidence.blind_make import made_of
+from chladni_evidence.evidence_sets import Order
+from chladni_evidence.made_case import write_case
 
 HERE = Path(__file__).resolve().parent
 
 if __name__ == "__main__":
-    case = made(SPECIMENS["panel"], "point-mass", 7)
-    write(case, HERE / "demo", HERE / "demo.truth.json")
+    case = made_of(Order("panel", "point-mass", 560, "fine"))
+    write_case(case, HERE / "demo", HERE / "demo.truth.json")

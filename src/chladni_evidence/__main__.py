@@ -4,13 +4,14 @@ import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 from chladni.errors import ChladniError, LabelError
 
-from .benched_recording import PLAIN, Recorder
-from .evidence_run import run
-from .evidence_sets import SETS, orders, purpose, seed_range
+from .benched_recording import PLAIN, RECORDERS
+from .blind_make import make
+from .blind_run import run
+from .blind_score import score
+from .evidence_sets import MEANT, SETS, chosen, purpose, seed_range
 from .fuzz import DUE, fuzz
 from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
@@ -30,15 +31,15 @@ def main(words: list[str] | None = None) -> int:
 
 
 def _run(asked: argparse.Namespace) -> int:
-    """Cases made, diagnosed, scored."""
-    chosen = orders(asked.set, _seeds(asked))
-    for key in ("kinds", "structures"):
-        wanted, field = getattr(asked, key), key[:-1]
-        chosen = [o for o in chosen if not wanted or getattr(o, field) in wanted.split(",")]
-    if not chosen:
-        raise LabelError(f"no case of the set {asked.set} is left by --kinds and --structures")
-    chosen = [replace(o, recorder=asked.recorder) for o in chosen]
-    run(chosen, asked.out, asked.workers, _say, asked.limit)
+    """Cases made, diagnosed, scored: the three steps of ``chladni blind``."""
+    seeds = seed_range(asked.seeds)
+    kinds, structures = (t.split(",") if t else [] for t in (asked.kinds, asked.structures))
+    orders = [
+        replace(o, recorder=asked.recorder) for o in chosen(asked.set, seeds, kinds, structures)
+    ]
+    make(orders, asked.out, purpose(seeds), asked.set, asked.workers, _say)
+    run(asked.out, asked.workers, _say, asked.limit)
+    score([asked.out], _say)
     return 0
 
 
@@ -79,7 +80,7 @@ COMMANDS = {
 def _seeds(asked: argparse.Namespace) -> range:
     """The seeds, and on the terminal what they are for."""
     seeds = seed_range(asked.seeds)
-    _say(purpose(seeds))
+    _say(MEANT[purpose(seeds)])
     return seeds
 
 
@@ -111,7 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--structures", default="", help="only these, with commas")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds a diagnosis may take")
     command.add_argument(
-        "--recorder", choices=get_args(Recorder), default=PLAIN,
+        "--recorder", choices=RECORDERS, default=PLAIN,
         help="how recordings are made: noise on every line, or a test on the virtual bench",
     )  # fmt: skip
     command.add_argument("--out", type=Path, required=True)

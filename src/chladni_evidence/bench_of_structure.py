@@ -23,13 +23,47 @@ from chladni_specimens.plates import folded_panel
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
-from .concealed import SPECIMENS
 from .footing import Spots
 
 ZETA = 0.007  # median damping ratio of an article
 FLAT = 0.999  # length of the mean normal of a point's shells where a sensor can be glued
 FINER = {"fine": 1.7, "calculix": 1.3}  # meshes of a form's articles against the deck's
 TAILGATE = {"16 mm": 0.016, "12 mm": 0.012, "calculix": 0.022}  # CalculiX halves them by itself
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A small structure, how its articles are meshed, and how it is tested.
+
+    ``build(times)`` makes the mesh of the deck (1) or one every element of which is cut (2),
+    ``unlike()`` a mesh with no point of the deck's.
+    """
+
+    build: Callable[[int], Assembly]
+    unlike: Callable[[], Assembly]
+    f_max: float  # highest recorded frequency [Hz]
+    fit: tuple[float, float]  # band to fit [Hz]
+    sensors: int = 20
+
+
+def _plate(size: float, times: int = 1) -> Assembly:
+    """500 x 400 x 1.2 mm steel, hole of 100 mm off the middle."""
+    return holed_plate(0.5, 0.4, (0.2, 0.22, 0.05), size, 1.2e-3, times=times)
+
+
+def _panel(size: float) -> Assembly:
+    """600 x 300 mm, 1 mm, bulging by 10 mm, long edges folded down."""
+    return folded_panel(0.6, 0.3, 0.04, 0.01, size, 1e-3)
+
+
+SPECIMENS = {
+    "plate": Specimen(
+        lambda times: _plate(0.025, times), lambda: _plate(0.021), 230.0, (15.0, 190.0)
+    ),
+    "panel": Specimen(
+        lambda times: _panel(0.02 / times), lambda: _panel(0.017), 380.0, (12.0, 310.0)
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,14 +141,10 @@ def panel_bench(name: str, seed: int) -> Bench:
     modes = normal_modes(built.system, 20)
     moving = (built.T @ modes.shapes[:, 6:]).reshape(len(deck.points), 6, -1)[:, :3]
     every = glue_candidates(deck)
-    other: dict[str, Callable[[], Assembly]] = {
-        "plate": lambda: holed_plate(0.5, 0.4, (0.2, 0.22, 0.05), 0.021, 1.2e-3),
-        "panel": lambda: folded_panel(0.6, 0.3, 0.04, 0.01, 0.017, 1e-3),
-    }
     return Bench(
         name=name,
         deck=deck,
-        meshes={"fine": lambda: spec.build(2), "calculix": other[name]},
+        meshes={"fine": lambda: spec.build(2), "calculix": spec.unlike},
         outputs=every.only(_spread(every, spec.sensors, rng)),
         drive=every.only(_driven(deck, every, moving, rng)),
         hangers=_hung(every),

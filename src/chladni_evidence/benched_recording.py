@@ -8,7 +8,7 @@ converter.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from .hidden import Hidden
 from .response_of_article import seen
 
 Recorder = Literal["independent noise", "stepped-sine", "burst-random"]
+RECORDERS: tuple[Recorder, ...] = get_args(Recorder)
 PLAIN: Recorder = "independent noise"
 LINES = 1500  # of burst random over the band, at most: more take minutes to identify
 DELAY = 200.0  # cycles: of the transient of a mode of 0.4 % damping 0.7 % is left

@@ -1,4 +1,4 @@
-"""The one door to the diagnosis: a case folder goes in, an answer comes out, blindly.
+"""The one door to diagnosis and calibration: a case folder goes in, an answer comes out, blindly.
 
 It calls the command line in a process of its own, so that seconds and memory are the user's and a
 crash is an answer too. Whatever the diagnosis becomes, only this file has to follow.
@@ -11,6 +11,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 EVERY = 0.2  # how often the process is looked at [s]
@@ -41,16 +42,25 @@ class Answer:
         return self.code not in (0, 2, 3) or (self.code == 0 and not self.result)
 
 
-def diagnosed(case: Path, out: Path, limit: float = 3600.0) -> Answer:
-    """Diagnose the case into ``out`` with nothing but its folder; its words go to ``out``.log."""
+def answered(
+    command: str, case: Path, out: Path, limit: float = 3600.0, stop: Event | None = None
+) -> Answer:
+    """Diagnose (or ``calibrate``) a case into ``out`` with nothing but its folder.
+
+    Its words go to ``out``.log. It ends with this process, at ``stop``, and after ``limit`` s.
+    """
     out.parent.mkdir(parents=True, exist_ok=True)
-    log, start = out.with_suffix(".log"), time.monotonic()
-    command = [sys.executable, "-m", "chladni", "diagnose", str(case), "--out", str(out)]
+    log, start = out.with_name(f"{out.name}.log"), time.monotonic()
+    asked = [command, str(case), "--out", str(out)]
     with log.open("wb") as words:
         process = subprocess.Popen(
-            command, stdout=words, stderr=subprocess.STDOUT, env={**os.environ, **_ONE_THREAD}
-        )
-        code, kilobytes = _ended(process, start + limit)
+            [sys.executable, "-m", "chladni_evidence.leash", *asked],
+            stdin=subprocess.PIPE, stdout=words, stderr=subprocess.STDOUT,
+            env={**os.environ, **_ONE_THREAD},
+        )  # fmt: skip
+        assert process.stdin is not None
+        with process.stdin:
+            code, kilobytes = _ended(process, start + limit, stop or Event())
     answer = out / "diagnosis.json"
     result = json.loads(answer.read_text(encoding="utf-8")) if answer.exists() else {}
     said = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
@@ -58,13 +68,13 @@ def diagnosed(case: Path, out: Path, limit: float = 3600.0) -> Answer:
     return Answer(code, time.monotonic() - start, kilobytes / 2**20, last, result)
 
 
-def _ended(process: subprocess.Popen[bytes], deadline: float) -> tuple[int, int]:
+def _ended(process: subprocess.Popen[bytes], deadline: float, stop: Event) -> tuple[int, int]:
     """Exit code and highest resident memory [kB] of a process, which is ended at the deadline."""
     while True:
         pid, status, usage = os.wait4(process.pid, os.WNOHANG)
         if pid:
             process.returncode = os.waitstatus_to_exitcode(status)
             return process.returncode, usage.ru_maxrss
-        if time.monotonic() > deadline:
+        if time.monotonic() > deadline or stop.is_set():
             process.kill()
-        time.sleep(EVERY)
+        stop.wait(EVERY)

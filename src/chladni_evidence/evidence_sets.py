@@ -1,19 +1,29 @@
 """Which cases a set of evidence consists of; which seeds tune and which report."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
-from chladni.errors import LabelError
+from chladni.errors import LabelError, did_you_mean
 from chladni_specimens.forms import FORMS
 
-from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailgate_bench
+from .bench_of_structure import (
+    SPECIMENS,
+    TAILGATE,
+    Bench,
+    form_bench,
+    panel_bench,
+    tailgate_bench,
+)
 from .benched_recording import PLAIN, Recorder
-from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
+from .made_case import KINDS
+from .package_kinds import package_kinds
 
 SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints")
-TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
+Purpose = Literal["tune", "report"]
+PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
+REPORTING = 600  # seeds below tune scales and code, those from here on report
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
     "thickness-distribution", "orthotropic-material", "stiffness-patch", "mass-patch", "crack",
@@ -45,12 +55,6 @@ class Order:
     mesh: str
     recorder: Recorder = PLAIN
 
-    @property
-    def name(self) -> str:
-        """Name of its folder; what is hidden cannot be read from it."""
-        mark = hashlib.sha256(f"{self.kind} {self.mesh}".encode()).hexdigest()[:6]
-        return f"{self.structure.replace(' ', '-')}-{self.seed}-{mark}"
-
     def bench(self) -> Bench:
         """The structure on the bench."""
         if self.structure == "tailgate":
@@ -64,7 +68,8 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     """All cases of a set.
 
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
-    panels: the same on plate and panel, our fine mesh and CalculiX in turn.
+    panels: the same on plate and panel, our fine mesh and CalculiX in turn; and the effects of
+    installed packages, on our mesh.
     forms: on each form a null and one other kind, the kinds in turn.
     frames: on the tube frame every kind of the catalogue that beams may have, and both nulls.
     outside: every kind outside the catalogue, and those that came into it late, the structures in
@@ -84,6 +89,35 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     return [order for seed in seeds for order in made[name](seed)]
 
 
+def chosen(
+    name: str, seeds: Sequence[int], kinds: Sequence[str] = (), structures: Sequence[str] = ()
+) -> list[Order]:
+    """The cases of a set, or of these kinds and structures alone.
+
+    Raises
+    ------
+    LabelError
+        If there is no such set, kind or structure, or no case is left.
+    """
+    whole = orders(name, seeds)
+    hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
+    every = ("tailgate", *SPECIMENS, *FORMS)
+    for what, asked, known in (("kind", kinds, hidden), ("structure", structures, every)):
+        for word in asked:
+            if word not in known:
+                raise LabelError(
+                    f"no {what} {word!r}; {did_you_mean(word, known)}there are {', '.join(known)}"
+                )
+    left = [
+        o for o in whole if o.kind in (kinds or hidden) and o.structure in (structures or every)
+    ]
+    if not left:
+        raise LabelError(
+            f"no case of the set {name} is of these seeds, {', '.join((*kinds, *structures))}"
+        )
+    return left
+
+
 def _tailgate(seed: int) -> Iterator[Order]:
     meshes = list(TAILGATE)
     for k, kind in enumerate(CATALOGUED):
@@ -94,6 +128,7 @@ def _panels(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(CATALOGUED):
             yield Order(structure, kind, seed, _mesh(kind, MESHES[(seed + k + s) % 2]))
+        yield from (Order(structure, kind, seed, "fine") for kind in package_kinds())
 
 
 def _forms(seed: int) -> Iterator[Order]:
@@ -142,20 +177,24 @@ def seed_range(text: str) -> range:
     return range(int(first), int(last) + 1)
 
 
-def purpose(seeds: Sequence[int]) -> str:
-    """What these seeds are for, in a sentence.
+def purpose(seeds: Sequence[int]) -> Purpose:
+    """What these seeds are for.
 
     Raises
     ------
     LabelError
-        If some of them tune and others report, or some are for neither.
+        If some of them tune and others report.
     """
-    tuning = [s in TUNING for s in seeds]
-    if all(tuning):
-        return f"seeds {seeds[0]}-{seeds[-1]} are for tuning: never report them"
-    if any(tuning) or min(seeds) < REPORTING:
+    tuning = [s < REPORTING for s in seeds]
+    if any(tuning) != all(tuning):
         raise LabelError(
-            f"seeds {seeds[0]}-{seeds[-1]}: {TUNING[0]}-{TUNING[-1]} tune, from {REPORTING} on "
+            f"seeds {min(seeds)}-{max(seeds)}: those below {REPORTING} tune, from {REPORTING} on "
             "they report; a run is for one or the other"
         )
-    return f"seeds {seeds[0]}-{seeds[-1]} report: nothing may be looked up or tuned on them"
+    return "tune" if tuning[0] else "report"
+
+
+MEANT: dict[Purpose, str] = {
+    "tune": "these seeds are for tuning: never report them",
+    "report": "these seeds report: nothing may be looked up or tuned on them",
+}

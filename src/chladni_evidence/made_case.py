@@ -30,6 +30,7 @@ from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
 from .joint_kinds import JOINTS
 from .outside_kinds import OUTSIDE
+from .package_kinds import package_kinds
 from .part_scatter import scattered
 from .response_of_article import accelerance, decades_apart, seen
 
@@ -136,6 +137,7 @@ def made_case(
         "moved_by_scatter_decades": scatter, "moved_by_effect_decades": effect,
         "scales": scales, "frequency_hz": modes.frequency[modes.frequency < 1.5 * bench.held[1]],
         "drive": bench.drive.labels[0], "mass_kg": weight,
+        "unweighed_kg": hidden.unweighed,
     }  # fmt: skip
     return MadeCase(bench, frf, weight * (1 + LIGHT * noise.normal()), truth, tested)
 
@@ -184,13 +186,13 @@ def _sized(
     band: np.ndarray,
 ) -> tuple[Hidden, float, float]:  # fmt: skip
     """The effect at the smallest size that does, how far it moves the responses, and the size."""
-    size = 1.0
+    size, hide = 1.0, KINDS.get(kind) or package_kinds()[kind]
     for _ in range(TRIES):
-        hidden = KINDS[kind](site, np.random.default_rng(seed), size)
+        hidden = hide(site, np.random.default_rng(seed), size)
         if kind == "nothing":
             return hidden, 0.0, size
         moved = decades_apart(hidden.spoil(rig.responses(hidden, band)[0]), own)
-        if kind in UNSIZED or moved >= TWICE * min(scatter, FULL):
+        if kind in UNSIZED or kind not in KINDS or moved >= TWICE * min(scatter, FULL):
             break
         size *= GROWTH
     if kind not in UNSIZED and moved < NOTHING:

@@ -64,7 +64,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, fault):
+def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, tmp_path, fault):
     """It names the package and what to do, on the command line too, without a traceback."""
     entry, source, said = FAULTS[fault]
     installed("heavy-bolts", {"bolts": entry}, broken=source)
@@ -74,7 +74,8 @@ def test_a_package_that_cannot_be_used_is_one_sentence(installed, monkeypatch, f
     assert "the package heavy-bolts offers the effect" in str(caught.value)
     assert "uninstall" in str(caught.value)
     assert "\n" not in str(caught.value)
-    done = CliRunner().invoke(application(), ["blind", "--effects", "point-mass"])
+    asked = ["blind", "make", "--set", "panels", "--seeds", "560", "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(application(), asked)
     assert done.exit_code == 2
     assert "heavy-bolts" in done.output
     assert "Traceback" not in done.output

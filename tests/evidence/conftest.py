@@ -2,10 +2,16 @@
 
 import pytest
 
-from chladni_evidence.blind import line
-from chladni_evidence.score import confusion, scored, summary
+from chladni.report.diagnosis_json import diagnosis_json
+from chladni_evidence.blind_diagnosis import Answer
+from chladni_evidence.outcome_row import line, row
+from chladni_evidence.outcome_table import confusion, overall, table
 
 ROWS = pytest.StashKey()
+UNKNOWN = {  # of articles others made
+    "mesh": "as built", "values": {}, "part_mass_kg": {}, "mass_kg": float("nan"),
+    "unweighed_kg": 0.0,
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -13,16 +19,16 @@ def evidence(request):
     """Score a result against its truth and keep the row for the table."""
 
     def keep(found, truth):
-        row = scored(found, truth)
-        request.config.stash.setdefault(ROWS, []).append(row)
-        return row
+        scored = row(Answer(0, 0.0, 0.0, "", diagnosis_json(found)), {**UNKNOWN, **truth})
+        request.config.stash.setdefault(ROWS, []).append(scored)
+        return scored
 
     return keep
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """One line a case, the confusion matrix, rates by effect."""
+    """One line a case, rates by effect, the confusion matrix."""
     if rows := config.stash.get(ROWS, []):
         terminalreporter.section("evidence")
-        text = [*map(line, rows), "", confusion(rows), "", summary(rows)]
+        text = [*map(line, rows), "", table(rows), "", confusion(rows), "", overall(rows)]
         terminalreporter.write_line("\n".join(text))

@@ -1,15 +1,17 @@
 """What an answer is worth against a truth."""
 
+import numpy as np
 import pytest
 
 from chladni_evidence.blind_diagnosis import Answer
-from chladni_evidence.outcome_row import line, row, table
+from chladni_evidence.outcome_row import line, row
+from chladni_evidence.outcome_table import beside, confusion, overall, table, tables
 
 TRUTH = {
     "effect": "point-mass", "structure": "tailgate", "seed": 600, "mesh": "16 mm",
     "point_m": [0.0, 0.0, 0.0], "moved_by_effect_decades": 0.3, "moved_by_scatter_decades": 0.1,
     "values": {"E": {"a": 200e9, "b": 220e9}, "rho": {"a": 7850.0, "b": 7850.0}, "t": {"a": 1e-3}},
-    "part_mass_kg": {"a": 1.0, "b": 1.0},
+    "part_mass_kg": {"a": 1.0, "b": 1.0}, "mass_kg": 2.0, "unweighed_kg": 0.0, "value": 0.1,
 }  # fmt: skip
 HELD = {"Q_calibrated": 0.5, "Q_with_effect": 0.2, "Q_floor": 0.1}
 
@@ -85,15 +87,102 @@ def test_figures():
     assert "50 mm off" in line(r)
 
 
+def estimate(value, low, high, **more):
+    return {"value": value, "low": low, "high": high, **more}
+
+
 def test_intervals_of_parts_together_are_held_against_their_mean():
     """E of a and b is (200·220)^½ GPa for equal masses."""
     entries = [
-        {"where": "E of a, b", "low": 209e9, "high": 211e9},
-        {"where": "t of a", "low": 1.1e-3, "high": 1.2e-3},
-        {"where": "E of welds", "low": 0.0, "high": 1.0},
+        estimate(210e9, 209e9, 211e9, where="E of a, b"),
+        estimate(1.15e-3, 1.1e-3, 1.2e-3, where="t of a"),
+        estimate(0.5, 0.0, 1.0, where="E of welds"),
+        estimate(7850.0, None, None, where="rho of a"),
     ]
     covered = row(answer(calibrated=entries), told())["covered"]
-    assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1], "wall": [0, 0]}
+    assert covered == {"E": [1, 1], "rho": [0, 0], "t": [0, 1], "wall": [0, 0], "effect": [0, 0]}
+
+
+@pytest.mark.parametrize(("sigmas", "inside"), [(1.6, 1), (1.7, 0), (-1.6, 1), (-1.7, 0)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_interval_of_95_percent_is_scored_as_one_of_90(sigmas, inside, sign):
+    """Ends at 1.960 sd are drawn in to 1.645, in ln where all is positive, else as they are."""
+
+    def off(by):
+        return float(0.1 * np.exp(0.3 * by)) if sign > 0 else -0.1 + 0.3 * by
+
+    effects = answer().result["effects"]
+    effects[0]["parameters"] = [estimate(off(0), off(-1.96), off(1.96), name="M")]
+    truth = told(value=off(sigmas))
+    assert row(answer(effects=effects), truth)["covered"]["effect"] == [inside, 1]
+    assert row(answer(effects=effects), {**truth, "effect": "mass-patch"})["covered"]["effect"] == [
+        0, 0,
+    ]  # fmt: skip
+
+
+def test_parameters_with_names_of_their_own_are_held_against_these():
+    effects = answer("orthotropic-material").result["effects"]
+    effects[0]["parameters"] = [estimate(2.0, 1.0, 3.0, name=n) for n in ("E1", "E2", "nu12")]
+    truth = told("orthotropic-material", E1=2.1, E2=9.0)
+    del truth["value"]
+    assert row(answer("orthotropic-material", effects=effects), truth)["covered"]["effect"] == [
+        1,
+        2,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "truth", "kin"),
+    [
+        (answer("mass-patch"), told(), True),
+        (answer("suspension"), told(), False),
+        (answer("crack"), told("stiffness-patch"), True),
+        (fault(), told("duplicated-pair"), True),
+        (answer(None, "calibration only"), told("nothing"), True),
+        (answer(None, "calibration only"), told(), False),
+        (answer("point-mass"), told("rotor"), False),
+    ],
+)
+def test_family(given, truth, kin):
+    assert row(given, truth)["kin"] is kin
+
+
+@pytest.mark.parametrize(("structure", "near"), [("tailgate", True), ("plate", False)])
+def test_a_place_is_near_on_the_scale_of_the_structure(structure, near):
+    """100 mm off: within 150 mm on the tailgate, beyond 60 mm elsewhere."""
+    effects = answer().result["effects"]
+    effects[0]["where"]["point_m"] = [0.1, 0.0, 0.0]
+    assert row(answer(effects=effects), told(structure=structure))["near"] is near
+    assert row(answer(None, "calibration only"), told())["near"] is None
+
+
+def test_plain_calibration_stands_beside():
+    """It lies 10 % about E where the diagnosis lies 1 %; held-out Q 0.5 against 0.2."""
+    truth = told(values={"E": {"a": 200e9}, "rho": {}, "t": {}})
+
+    def said(off, **more):
+        entry = estimate(200e9 * np.exp(off), 1.0, 2.0, where="E of a")
+        return answer(calibrated=[entry], mass={"model_kg": 2.0 * np.exp(off)}, **more)
+
+    r = row(said(0.01), truth, said(0.1, name=None, verdict="calibration only", fit={
+        "held_out": {"Q_calibrated": 0.5, "Q_floor": 0.1}}))  # fmt: skip
+    one, other = r["beside"]["calibration"], r["beside"]["diagnosis"]
+    assert (one["E"], other["E"]) == (pytest.approx(0.1), pytest.approx(0.01))
+    assert (one["mass"], other["mass"]) == (pytest.approx(0.1), pytest.approx(0.01))
+    assert (one["Q"], other["Q"], one["t"]) == (0.5, 0.2, None)
+    lines = {text[:28].strip(): text[28:].split() for text in beside([r, r]).splitlines()}
+    assert lines["E off, %"] == ["10", "1", "2"]
+    assert lines["held-out Q"] == ["0.5", "0.2", "2"]
+    assert "t off, %" not in lines
+    assert "not asked" in beside([row(said(0.0), truth)])
+
+
+def test_a_deck_with_the_sensors_in_it_weighs_what_hangs_on_the_bench():
+    given = answer("sensor-mass", mass={"model_kg": 2.1})
+    assert row(given, told("sensor-mass", unweighed_kg=0.1))["beside"]["diagnosis"][
+        "mass"
+    ] == pytest.approx(0.0)
+    assert row(answer(mass={"model_kg": 2.1}), told())["beside"]["diagnosis"]["mass"] > 0.04
 
 
 def test_what_an_answer_leaves_open_is_no_crash():
@@ -103,9 +192,22 @@ def test_what_an_answer_leaves_open_is_no_crash():
     assert (r["outcome"], r["p"], r["gain_share"]) == ("none", None, None)
 
 
-def test_table_adds_up():
-    rows = [row(answer(), told()), row(answer("suspension"), told()), row(answer(), told("rotor"))]
-    text = table(rows)
-    assert "point-mass" in text
-    assert "outside the catalogue: 0 admitted, 1 wrong of 1" in text
-    assert [int(w) for w in text.splitlines()[1].split()[1:5]] == [2, 1, 0, 1]
+def test_tables_add_up():
+    """Every case once in the matrix; an unknown effect named is wrong, a null named an alarm."""
+    rows = [
+        row(answer(), told()), row(answer("suspension"), told()), row(answer(), told("rotor")),
+        row(answer(), told("nothing")), row(answer(code=2), told()), row(answer(code=1), told()),
+    ]  # fmt: skip
+    assert [int(w) for w in table(rows).splitlines()[1].split()[1:9]] == [4, 1, 0, 1, 0, 0, 1, 1]
+    _, *lines, legend = confusion(rows).splitlines()
+    counts = {text.split()[0]: text.split()[1:] for text in lines}
+    assert legend == "called 1: crash, 2: point-mass, 3: refused, 4: suspension"
+    assert counts["point-mass"] == ["1", "1", "1", "1"]
+    assert counts["nothing"] == [".", "1", ".", "."]
+    said = overall(rows)
+    assert "right name: 1/4; right family: 1/4" in said
+    assert "right place, of the right names that have one: 1/1" in said
+    assert "false alarms: 1 of 1" in said
+    assert "outside the catalogue: 0 admitted, 1 wrong of 1" in said
+    assert "75% of the way" in said
+    assert tables([])

@@ -87,9 +87,9 @@ def test_the_grain_of_a_spruce_plate(name, tmp_path, evidence):
     moduli = {modulus: truth[f"{modulus}_Pa"] for modulus in WITHIN}
     sealed = {
         "effect": "orthotropic-material",
-        "specimen": f"spruce {name}",
+        "structure": f"spruce {name}",
         "seed": 0,
-        "parameters": moduli,
+        **moduli,
     }
     evidence(read_diagnosis(out), sealed)
     found = {p["name"]: p["value"] for p in d["effects"][0]["parameters"]}

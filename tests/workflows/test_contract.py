@@ -29,7 +29,7 @@ WORKFLOW = {  # command: the function it calls
     "init": "chladni.workflows.case_draft.draft",
     "check": "chladni.workflows.case_check.check",
     "study": "chladni.studies.parameter_study.study",
-    "blind": "chladni_evidence.blind.answered_rows",
+    "blind": "chladni_evidence.blind_run.run",
     "specimen": "chladni_specimens.tailgate.tailgate.tailgate_specimen",
     "report": "chladni.report.page.write_page",
 }

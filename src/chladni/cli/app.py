@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Any
 
 import typer
@@ -17,7 +18,7 @@ import typer
 from ..errors import AccuracyError, ChladniError
 from .console import console, opened_console, say
 
-COMMANDS = (  # each a module here with a function ``run``
+COMMANDS = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
     "diagnose",
     "init",
     "check",
@@ -63,8 +64,20 @@ def application() -> typer.Typer:
     )
     app.callback()(_version)
     for name in COMMANDS:
-        app.command(name)(guarded(import_module(f".{name}", __package__).run))
+        module = import_module(f".{name}", __package__)
+        if hasattr(module, "STEPS"):
+            app.add_typer(_stepped(module), name=name)
+        else:
+            app.command(name)(guarded(module.run))
     return app
+
+
+def _stepped(module: ModuleType) -> typer.Typer:
+    """A command of several steps, each with options of its own."""
+    group = typer.Typer(help=module.HELP, no_args_is_help=True, rich_markup_mode=None)
+    for step in module.STEPS:
+        group.command(step.__name__)(guarded(step))
+    return group
 
 
 def guarded(command: Callable[..., Any]) -> Callable[..., Any]:

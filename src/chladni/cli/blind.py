@@ -1,41 +1,110 @@
-"""``chladni blind``: cases with an effect concealed, all of them, and the confusion matrix."""
+"""``chladni blind``: cases with an effect hidden are made, answered blindly, and scored."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar, cast
 
 import typer
 
-from ..output import locked, make_folder, write_json, write_text
+from ..errors import LabelError, did_you_mean
 from .console import say
-from .run import Out
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="What `blind make` wrote.")]
+Word = TypeVar("Word", bound=str)
+Workers = Annotated[int, typer.Option(help="Processes.", min=1)]
+
+
+def make(
+    set_name: Annotated[
+        str, typer.Option("--set", help="As panels, forms, tailgate, outside (of the catalogue).")
+    ],
+    seeds: Annotated[str, typer.Option(help="First and last, as 500-504.")],
+    out: Annotated[Path, typer.Option("--out", help="A folder of its own.", metavar="DIR")],
+    purpose: Annotated[
+        str, typer.Option(help="tune (seeds below 600) or report (from 600 on).")
+    ] = "tune",
+    kinds: Annotated[str, typer.Option(help="What is hidden, with commas; all if empty.")] = "",
+    structures: Annotated[str, typer.Option(help="With commas; all if empty.")] = "",
+    recorder: Annotated[
+        str,
+        typer.Option(
+            help="independent noise on every line, or a test on the virtual bench: stepped-sine, "
+            "burst-random."
+        ),
+    ] = "independent noise",
+    workers: Workers = 1,
+) -> None:
+    """Make cases, seal their truths, publish the hashes.
+
+    They are in seals.json, of every truth and of every case's own files, before any answer is.
+    Stopped, it goes on with the same command.
+    """
+    from chladni_evidence.benched_recording import RECORDERS
+    from chladni_evidence.blind_make import make
+    from chladni_evidence.evidence_sets import PURPOSES, chosen, seed_range
+
+    by, why = _one_of("--recorder", recorder, RECORDERS), _one_of("--purpose", purpose, PURPOSES)
+    asked = chosen(set_name, seed_range(seeds), _names(kinds), _names(structures))
+    with _kept():
+        make([replace(o, recorder=by) for o in asked], out, why, set_name, workers, say)
 
 
 def run(
-    seeds: Annotated[str, typer.Option(help="First and last seed, as 100-109.")] = "100-101",
-    effects: Annotated[str, typer.Option(help="Names, with commas; all where empty.")] = "",
-    structures: Annotated[str, typer.Option(help="plate, panel.")] = "plate,panel",
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
-    out: Out = None,
+    out: Folder,
+    workers: Workers = 1,
+    limit: Annotated[float, typer.Option(help="Seconds a diagnosis may take.", min=1)] = 3600.0,
+    calibrate: Annotated[
+        bool,
+        typer.Option(help="Calibrate every case as well, to be held beside the diagnosis."),
+    ] = True,
 ) -> None:
-    """Conceal effects, diagnose every case blindly, open the seals, print who was called what."""
-    from chladni_evidence.blind import answered_rows, blinds, line
-    from chladni_evidence.evidence_sets import seed_range
-    from chladni_evidence.score import Row, confusion, summary
+    """Answer cases from their folders alone.
 
-    place, rows = out or Path("runs") / "blind", []
-    make_folder(place)
-    cases = blinds(place, seed_range(seeds), _names(effects), _names(structures))
+    Stopped at any instant, it goes on with the same command.
+    """
+    from chladni_evidence.blind_run import run
 
-    def told(row: Row) -> None:
-        rows.append(row)
-        say(line(row))
-        write_json(place / "blind.json", rows)
+    with _kept():
+        run(out, workers, say, limit, calibrate)
 
-    with locked(place):
-        answered_rows(cases, workers, told)
-    text = f"{confusion(rows)}\n\n{summary(rows)}"
-    write_text(place / "confusion.txt", text + "\n")
-    say(text)
+
+def score(
+    outs: Annotated[list[Path], typer.Argument(metavar="DIR...", help="One folder or several.")],
+) -> None:
+    """Open the truths and score the answers.
+
+    Only once every case is answered: confusion, places, intervals, gain, false alarms.
+    Writes score.json and table.txt into the first folder.
+    """
+    from chladni_evidence.blind_score import score
+
+    score(outs, say)
+
+
+HELP = "Conceal effects in structures, diagnose them blindly, score the answers."
+STEPS = (make, run, score)
+
+
+@contextmanager
+def _kept() -> Iterator[None]:
+    """An interruption that says what becomes of what was done."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            "interrupted; what is finished is kept, and the same command goes on from there"
+        ) from None
+
+
+def _one_of(option: str, word: str, known: tuple[Word, ...]) -> Word:
+    """A word of those there are."""
+    if word not in known:
+        raise LabelError(
+            f"no {option} {word!r}; {did_you_mean(word, known)}there are {', '.join(known)}"
+        )
+    return known[known.index(cast(Word, word))]
 
 
 def _names(text: str) -> list[str]:

@@ -15,7 +15,10 @@ from chladni.io.nastran import assembly, read_deck
 from chladni.units import UNITS
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
-from chladni_evidence.concealed import Specimen, concealable, made, write
+from chladni_evidence.bench_of_structure import SPECIMENS, Specimen
+from chladni_evidence.blind_make import made_of
+from chladni_evidence.evidence_sets import Order, chosen
+from chladni_evidence.made_case import write_case
 from chladni_specimens.plates import plate
 
 
@@ -23,7 +26,7 @@ def small_plate(times):
     return plate(0.3, 0.2, 9 * times, 6 * times, 1.2e-3)
 
 
-SMALL = Specimen("tiny plate", small_plate, 420.0, (25.0, 330.0), sensors=8)
+SMALL = Specimen(small_plate, lambda: small_plate(3), 420.0, (25.0, 330.0), sensors=8)
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +64,17 @@ def test_reduced_model_agrees_with_the_changed_structure(edge_mass):
     assert_allclose(np.sqrt(lam) / (2 * np.pi), due, rtol=0.1 * moved)
 
 
-def test_it_can_be_concealed_and_others_keep_their_cases(edge_mass):
-    """It stands after all that were there, so their random numbers stay as they are."""
-    assert concealable()[-1] == "edge-mass"
-    assert concealable()[7:9] == ("nothing", "calibration")
+def test_it_is_hidden_in_the_blind_panels(edge_mass):
+    """Beside our own effects, whose cases stay as they are."""
+    (order,) = chosen("panels", [560], ["edge-mass"], ["panel"])
+    assert order == Order("panel", "edge-mass", 560, "fine")
 
 
-def test_concealed_in_a_plate_it_is_named_and_written(edge_mass, tmp_path):
-    case = made(SMALL, "edge-mass", 2)
+def test_concealed_in_a_plate_it_is_named_and_written(edge_mass, tmp_path, monkeypatch):
+    monkeypatch.setitem(SPECIMENS, "tiny plate", SMALL)
+    case = made_of(Order("tiny plate", "edge-mass", 560, "fine"))
     folder, out = tmp_path / "case", tmp_path / "out"
-    write(case, folder, tmp_path / "sealed.json")
+    write_case(case, folder, tmp_path / "sealed.json")
     done = CliRunner().invoke(application(), ["diagnose", str(folder), "--out", str(out)])
     assert done.exit_code == 0, done.output
     d = json.loads((out / "diagnosis.json").read_text())

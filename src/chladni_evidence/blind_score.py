@@ -1,0 +1,118 @@
+"""Answers held against their truths, which are opened only when every answer is on disk."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from chladni.errors import AccuracyError, FileError, LabelError, named
+from chladni.output import locked, write_json, write_text
+
+from .blind_diagnosis import Answer
+from .blind_folder import (
+    BlindFolder,
+    Seals,
+    hash_of,
+    opened_truth,
+    published,
+    read_json,
+    unchanged_cases,
+)
+from .evidence_sets import MEANT
+from .outcome_row import Row, line, row
+from .outcome_table import tables
+
+Say = Callable[[str], object]
+
+
+def score(outs: Sequence[Path], say: Say) -> list[Row]:
+    """Rows of all cases of one folder or several; ``score.json`` and ``table.txt`` in the first.
+
+    Raises
+    ------
+    LabelError
+        If some of the folders tune and others report, or hold the same case.
+    FileError
+        If a case has no answer, or one to other files or seals than the published ones.
+    AccuracyError
+        If a truth is not the published one, or an answer was changed after truths were opened.
+    """
+    every = [(BlindFolder(out), published(BlindFolder(out))) for out in outs]
+    if len({seals.purpose for _, seals in every}) > 1:
+        told = ", ".join(f"{place.out} is to {seals.purpose}" for place, seals in every)
+        raise LabelError(f"{told}; cases that tune and cases that report are never scored together")
+    sealed = Counter(h for _, seals in every for h in seals.truths.values())
+    if sealed and max(sealed.values()) > 1:
+        raise LabelError("some of the cases are in two of the folders, and would be counted twice")
+    for place, seals in every:
+        _answers_hold(place, seals)
+    rows = [r for place, seals in every for r in _rows(place, seals)]
+    text = f"{MEANT[every[0][1].purpose]}\n\n{tables(rows)}"
+    with locked(outs[0]):
+        write_json(outs[0] / "score.json", rows)
+        write_text(outs[0] / "table.txt", text + "\n")
+    for r in rows:
+        say(f"{r['case']}: {line(r)}")
+    for place, seals in every:
+        if seals.failed:
+            say(f"{place.out}: {seals.failed} cases could not be made, and are not counted")
+    say(f"\n{text}")
+    return rows
+
+
+def _answers_hold(place: BlindFolder, seals: Seals) -> None:
+    """Every case answered, after its seal and to the published files, and not since the opening.
+
+    An answer holds the hash of the seals, so it is no older than they are; the hashes of answers
+    are written down before the first truth is opened, so none is younger than that.
+    """
+    unanswered = [n for n in seals.truths if not place.answer(n).exists()]
+    if unanswered:
+        raise FileError(
+            f"{place.out}: no answer to {named(unanswered)} yet, so nothing is opened; "
+            f"`chladni blind run {place.out}` goes on"
+        )
+    unchanged_cases(place, seals)
+    due = hash_of(place.seals)
+    for name in seals.truths:
+        _answers(place.answer(name))
+        given = read_json(place.answer(name), "")
+        if (given.get("seals"), given.get("files")) != (due, seals.files[name]):
+            raise FileError(
+                f"{place.answer(name)} was not given to the case as it is published: it is older "
+                "than the seals, or of another folder; take it away and run again"
+            )
+    now = {name: hash_of(place.answer(name)) for name in seals.truths}
+    if seals.purpose == "report" and place.opened.exists():
+        before = read_json(place.opened, "")
+        changed = [n for n in now if before.get(n) != now[n]]
+        if changed:
+            raise AccuracyError(
+                f"{place.out}: answers to {named(changed)} are younger than the opening of their "
+                "truths; a report answers once, further cases need further seeds"
+            )
+    write_json(place.opened, now)
+
+
+def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
+    found = []
+    for name in seals.truths:
+        answer, plain = _answers(place.answer(name))
+        truth = opened_truth(place, seals, name)
+        try:
+            judged = row(answer, truth, plain)
+        except KeyError as error:
+            raise FileError(
+                f"{place.truth(name)} holds no {error}; it was made by chladni {seals.version}"
+            ) from error
+        found.append({"case": name, "purpose": seals.purpose, **judged})
+    return found
+
+
+def _answers(path: Path) -> tuple[Answer, Answer | None]:
+    """Of the diagnosis, and of plain calibration where it was asked."""
+    given = read_json(path, "")
+    try:
+        plain = given.get("calibrate")
+        return Answer(**given["diagnose"]), Answer(**plain) if plain else None
+    except (KeyError, TypeError) as error:
+        raise FileError(f"{path} does not have the form of an answer: {error}") from error

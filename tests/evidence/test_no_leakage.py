@@ -1,0 +1,92 @@
+"""A diagnosis never opens a truth, and no truth changes an answer."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.effects.points import with_masses
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
+from chladni_evidence.blind_folder import BlindFolder, Seals, hash_of, hash_of_case
+from chladni_evidence.blind_run import run
+from chladni_specimens.plates import plate
+
+CASE = """[model]
+deck = "plate.bdf"
+units = "SI"
+damping = 0.01
+[test]
+recordings = ["frf.npz"]
+mass = {mass}
+[band]
+fit = [20.0, 130.0]
+"""
+WATCH = """import os, sys
+log = os.open({log!r}, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+def hook(event, args):
+    if event in ("open", "os.listdir", "os.scandir", "os.rename"):
+        path = args[0] if args else None
+        if isinstance(path, (str, bytes, os.PathLike)):
+            os.write(log, os.fsencode(os.path.abspath(os.fsdecode(path))) + b"\\n")
+sys.addaudithook(hook)
+"""
+
+
+def write_case(folder):
+    """A plate of 4 x 4 shells with a mass on a corner, of which the deck does not know."""
+    folder.mkdir(parents=True)
+    deck, article = plate(0.3, 0.22, 4, 4, 1e-3), folder.parent / "article.bdf"
+    write_assembly(deck, folder / "plate.bdf")
+    write_assembly(with_masses(deck, (25,), 0.02), article)
+    built = chladni.load_model(article, "SI")
+    ends = [f"{g}:+Z" for g in (2, 4, 7, 18)]
+    (made,) = chladni.frf(built, ends, ["2:+Z"], np.linspace(15, 150, 200)).frfs
+    write_npz(folder / "frf.npz", made.to("accelerance"))
+    (folder / "case.toml").write_text(CASE.format(mass=round(chladni.modes(built, 7).mass, 5)))
+    article.unlink()
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory):
+    """Two cases of the same files and unlike truths, answered with every opening written down."""
+    place = BlindFolder(tmp_path_factory.mktemp("blind"))
+    names = ("case-1", "case-2")
+    write_case(place.case(names[0]))
+    place.case(names[1]).mkdir()
+    for path in place.case(names[0]).iterdir():
+        (place.case(names[1]) / path.name).write_bytes(path.read_bytes())
+    place.truth(names[0]).parent.mkdir()
+    for name, effect in zip(names, ("point-mass", "suspension"), strict=True):
+        place.truth(name).write_text(json.dumps({"effect": effect, "seed": 560}))
+    truths = {n: hash_of(place.truth(n)) for n in names}
+    files = {n: hash_of_case(place.case(n)) for n in names}
+    Seals("tune", "panels", "560-560", "0.1.0", 0, truths, files).write(place.seals)
+
+    watch, log = tmp_path_factory.mktemp("watch"), tmp_path_factory.mktemp("log") / "opened.txt"
+    (watch / "sitecustomize.py").write_text(WATCH.format(log=str(log)))
+    path = os.pathsep.join([str(watch), *filter(None, [os.environ.get("PYTHONPATH")])])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", path)
+        run(place.out, 2, str, calibrated=False)
+    return place, {Path(text) for text in log.read_text(errors="replace").splitlines()}
+
+
+def test_a_diagnosis_opens_its_own_case_and_nothing_else_of_the_benchmark(answered):
+    place, opened = answered
+    inside = {p.relative_to(place.out) for p in opened if p.is_relative_to(place.out)}
+    assert Path("cases/case-1/case.toml") in inside  # the watch is awake
+    assert Path("cases/case-2/frf.npz") in inside
+    assert {p.parts[0] for p in inside} == {"cases", "answers"}
+
+
+def test_truths_change_no_answer(answered):
+    """Of the same files the same is said, whatever lies sealed beside them."""
+    place, _ = answered
+    one, other = (json.loads(place.answer(n).read_text())["diagnose"] for n in ("case-1", "case-2"))
+    assert one["code"] == other["code"] == 0
+    assert one["result"]["verdict"] == "missing physics"
+    assert one["result"] == other["result"]
