@@ -11,8 +11,9 @@ from .bench_of_structure import TAILGATE, Bench, form_bench, panel_bench, tailga
 from .benched_recording import PLAIN, Recorder
 from .concealed import SPECIMENS
 from .hidden_kinds import CATALOGUED
+from .pair_kinds import PAIRS
 
-SETS = ("tailgate", "panels", "forms", "outside", "joints")
+SETS = ("tailgate", "panels", "forms", "outside", "joints", "pairs")
 TUNING, REPORTING = range(500, 600), 600  # seeds; reporting ones are those from here on
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
@@ -69,6 +70,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
+    pairs: two effects at once on plate and panel, our fine mesh and CalculiX in turn.
     """
     made = {
         "tailgate": _tailgate,
@@ -76,6 +78,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "forms": _forms,
         "outside": _outside,
         "joints": _joints,
+        "pairs": _pairs,
     }
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
@@ -110,6 +113,12 @@ def _outside(seed: int) -> Iterator[Order]:
 def _joints(seed: int) -> Iterator[Order]:
     for kind, homes in JOINED.items():
         yield from (Order(h, kind, seed, "16 mm" if h == "tailgate" else "fine") for h in homes)
+
+
+def _pairs(seed: int) -> Iterator[Order]:
+    for s, structure in enumerate(SPECIMENS):
+        for k, kind in enumerate(PAIRS):
+            yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:

@@ -60,7 +60,9 @@ def held_out_evidence(
     Parameters
     ----------
     unseen : samples held out, in the shape of ``problem.data.use``
+    null : without the effect that is asked about; or without several of the hypothesis
     """
+    asked = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
         data = null.data
@@ -75,7 +77,8 @@ def held_out_evidence(
         predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    sensors = None if hypothesis.effect.channels else gains[0]  # a fault concerns no other channel
+    faults = all(e.channels for e in asked)  # they concern no other channel
+    sensors = None if asked and faults else gains[0]
     return HeldOutEvidence(held, sensors, gains[1])
 
 

@@ -1,0 +1,307 @@
+"""Two effects at once, and three: what one left is searched again with it in place.
+
+1. grown: with what was found in the base, the whole catalogue is scanned again and the leading
+   candidates are fitted, all that was found before moving along;
+2. revised: each older one is sought anew beside the younger, for alone it had to explain more than
+   its own;
+3. backward: what does not gain its price beside the others goes (Efroymson 1960, stepwise
+   regression); two of one family stand at distinct places;
+4. where one effect alone leaves what it should explain and no second pays, the families in front
+   are tried in pairs, for an effect may explain only beside another.
+
+All of a set are compared with errors of the model's form as they spread from the set's own state.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ..effects.effect import Effect
+from ..effects.search_context import Candidate
+from ..errors import ModelError
+from .candidates import candidates, repeats
+from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
+from .likelihood import Responses
+from .map_fit import unknowns
+from .reduced_model import evaluate
+from .search_round import search_round, taken
+from .ties import TIED
+
+MOST = 3  # effects in one answer
+FITTED = 8  # candidates of a later round that are fitted
+PAIRED = 4  # families in front that are tried in pairs
+BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
+ATTEMPTS = 4  # rounds that may change the set
+
+Say = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Effects that explain the recording together, each of which pays; most gain first.
+
+    Attributes
+    ----------
+    hypothesis : all of them, comparable with the effects that were tried alone
+    own : the same with errors of the model's form as they spread from its own state
+    gains : in -2 ln evidence, what ``own`` loses without each, the others fitted again
+    without : comparable with ``own``, the best without each
+    rivals : of each, names of other families that would do in its place and how far behind
+    due : gain that each had to bring
+    """
+
+    hypothesis: HypothesisFit
+    own: HypothesisFit
+    gains: tuple[float, ...]
+    without: tuple[HypothesisFit, ...]
+    rivals: tuple[tuple[tuple[str, float], ...], ...]
+    due: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What was found beside a leader, in the order in which the sets grew, and how it went."""
+
+    sets: tuple[Several, ...]
+    note: str
+
+
+def several(
+    problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
+    progress: Say = lambda text, share: None,
+) -> Search:  # fmt: skip
+    """Sets of effects that grow from the best one, every member of which pays.
+
+    Parameters
+    ----------
+    singles : the best hypothesis of every family alone, best first
+    due : gain in -2 ln evidence that one effect needs to be named
+    unfit : whether the best of them does not fit
+    """
+    lead, *others = singles
+    progress(f"what {lead.name} leaves", 0.0)
+    search = _begun_with(problem, lead, due)
+    for other in others[:1]:
+        simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
+        if search.sets or unfit or simpler:
+            progress(f"what {other.name} leaves", 0.4)
+            search = _better(search, _begun_with(problem, other, due))
+    if not search.sets and unfit:
+        progress("effects in pairs", 0.8)
+        pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
+        search = replace(search, sets=tuple(pairs))
+    return search
+
+
+def price(due: float, size: int) -> float:
+    """Gain that the last of so many effects has to bring: every round of a search is paid for."""
+    return due + 2 * float(np.log(size))
+
+
+def _better(one: Search, other: Search) -> Search:
+    """The search that ended with the better set."""
+    if not (one.sets and other.sets):
+        return other if other.sets else one
+    ends = (s.sets[-1].hypothesis.neg2_log_evidence for s in (one, other))
+    return one if next(ends) <= next(ends) else other
+
+
+def _begun_with(problem: UpdatingProblem, lead: HypothesisFit, due: float) -> Search:
+    """The sets that grow from one hypothesis, until none more pays."""
+    current, out, note, seen = lead, list[Several](), "", list[set[int]]()
+    for _ in range(ATTEMPTS):
+        size = len(current.effects) + 1
+        if size > MOST:
+            break
+        more, note = _grown(problem, current, price(due, size))
+        if more is None:
+            break
+        found = _paying(problem, more, price(due, size))
+        if {id(e) for e in found.own.effects} in seen:
+            break
+        seen.append({id(e) for e in found.own.effects})
+        current = found.own
+        if len(found.gains) > 1:
+            out.append(found)
+    return Search(tuple(out), note)
+
+
+def _standing(
+    problem: UpdatingProblem, lead: HypothesisFit
+) -> tuple[UpdatingProblem, HypothesisFit]:
+    """The problem with a hypothesis in its base, errors spreading from it; its fit there."""
+    held = problem.holding([(e, lead.fit.of(e)) for e in lead.effects])
+    model, x = held.reduced.model, np.concatenate([lead.fit.of(e) for e in held.base])
+    if isinstance(lead.data, Responses) and lead.data.error is not None:
+        state = evaluate(model, held.base, x, False)
+        held = held.allowing_errors(state, lead.data.error.delta)
+    fit = fitted(model, held.base, held.data, held.mass_measurement, x)
+    found = tuple((e, fit.of(e)) for e, _ in held.found)
+    assert isinstance(fit.data, Responses)
+    return replace(held, found=found, data=fit.data), replace(lead, fit=fit, model=model)
+
+
+def _holding(
+    problem: UpdatingProblem, lead: HypothesisFit, effects: Sequence[Effect]
+) -> UpdatingProblem:
+    """The problem with some effects of a hypothesis in its base, and the data as it has them."""
+    held = problem.holding([(e, lead.fit.of(e)) for e in effects])
+    assert isinstance(lead.data, Responses)
+    return replace(held, data=lead.data.over(held.reduced.model))
+
+
+@dataclass(frozen=True, eq=False)
+class _More:
+    """A set with one effect more.
+
+    ``rivals`` would do in the places of its members, ``without`` are the best fits without them;
+    both by the id of the member, as far as they are known.
+    """
+
+    hypothesis: HypothesisFit
+    rivals: dict[int, list[HypothesisFit]]
+    without: dict[int, HypothesisFit]
+
+
+def _grown(
+    problem: UpdatingProblem, current: HypothesisFit, due: float
+) -> tuple[_More | None, str]:
+    """The set with the best effect more, if that pays, each older member sought anew beside it."""
+    held, null = _standing(problem, current)
+    found = _round(held, null, candidates(held, null, FITTED))
+    if not found:
+        return None, ""
+    gain = null.neg2_log_evidence - found[0].neg2_log_evidence
+    note = (
+        f"with {current.name} in place the best effect more, {found[0].effect.name}, gains "
+        f"{gain:.1f} in -2 ln evidence; {due:.0f} are needed"
+    )
+    if gain <= due:
+        return None, note
+    newest = id(found[0].effect)
+    more = _More(found[0], {newest: found[1:]}, {newest: null})
+    for member in current.effects:
+        more = _sought_anew(problem, more, member)
+    return more, note
+
+
+def _round(
+    held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate]
+) -> list[HypothesisFit]:
+    """A round of a search; what moved onto one of its own family that is there is left out."""
+    hypotheses = search_round(held, null, tried, lambda text, share: None)
+    return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
+
+
+def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
+    """The problem with what was found where a hypothesis has it."""
+    return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
+
+
+def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
+    """The set with what explains most in the place of one of its members, which may be itself."""
+    lead = more.hypothesis
+    rest = _without(problem, lead, member)
+    held = _holding(problem, rest, rest.effects)
+    tried = candidates(held, _in_order(held, rest), FITTED)
+    itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("ordinary", "nuisance")))
+    found = _round(held, _in_order(held, rest), [itself, *tried])
+    if not found:
+        return more
+    best = found[0]
+    if best.effect.name == member.name and best.neg2_log_evidence > lead.neg2_log_evidence - BETTER:
+        known = {**more.without, id(member): rest}
+        return _More(lead, {**more.rivals, id(member): found[1:]}, known)
+    new = id(best.effect)
+    return _More(best, {**more.rivals, new: found[1:]}, {new: rest})
+
+
+def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
+    """A fit of the base of a problem with its parameters in the order of that base."""
+    x = np.concatenate([fit.fit.of(e) for e in held.base])
+    model, data = held.reduced.model, held.data
+    again = fitted(model, held.base, data, held.mass_measurement, x, ROUGH)
+    return replace(fit, fit=again, model=model)
+
+
+def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> HypothesisFit:
+    """The best fit of all but one of a set's members, from where the set has them."""
+    first, *rest = (e for e in lead.effects if e is not member)
+    held = _holding(problem, lead, rest)
+    tries = []
+    for kinds in (("ordinary", "nuisance"), ("ordinary",)):
+        with suppress(ModelError):
+            base = taken(held, lead, kinds)
+            tries.append(held.fitted_with(first, lead.fit.of(first), base))
+    if not tries:
+        raise ModelError(f"without {member.name} no structure is left")
+    return min(tries, key=lambda t: t.neg2_log_evidence)
+
+
+def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
+    """The set less what does not gain its price beside the others."""
+    lead, known = more.hypothesis, more.without
+    while True:
+        if len(lead.effects) < 2:
+            return Several(lead, lead, (np.inf,), (lead,), ((),), due)
+        without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
+        gain = {key: t.neg2_log_evidence - lead.neg2_log_evidence for key, t in without.items()}
+        weakest = min(gain, key=lambda key: gain[key])
+        if gain[weakest] > due:
+            break
+        lead, known = without[weakest], {}
+    order = sorted(lead.effects, key=lambda e: -gain[id(e)])
+    own = replace(lead, effect=order[0], beside=tuple(order[1:]))
+    return Several(
+        _as_alone(problem, own), own, tuple(gain[id(e)] for e in order),
+        tuple(without[id(e)] for e in order),
+        tuple(_close(more.rivals.get(id(e), []), lead, e) for e in order), due,
+    )  # fmt: skip
+
+
+def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
+    """The set with errors of the model's form as single effects were compared with."""
+    data = problem.data.over(own.model)
+    fit = fitted(own.model, own.fit.effects, data, problem.mass_measurement, own.fit.x)
+    return replace(own, fit=fit)
+
+
+def _close(
+    rivals: Sequence[HypothesisFit], lead: HypothesisFit, member: Effect
+) -> tuple[tuple[str, float], ...]:
+    """Other families that do as well as a member in its place, and how far they stay behind."""
+    return tuple(
+        (t.effect.name, t.neg2_log_evidence - lead.neg2_log_evidence)
+        for t in rivals
+        if t.neg2_log_evidence - lead.neg2_log_evidence < TIED
+        and t.effect.becomes(t.fit.of(t.effect)) != member.name
+    )
+
+
+def _in_pairs(
+    problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float
+) -> list[Several]:
+    """The best pair of the families in front, if both of it pay."""
+    base, _ = _standing(problem, singles[0])
+    data = base.data
+    tries = []
+    for one, other in combinations(singles, 2):
+        held = problem.holding([(one.effect, one.fit.of(one.effect))])
+        held = replace(held, data=data.over(held.reduced.model))
+        with suppress(ModelError):
+            start = other.fit.of(other.effect)
+            tries.append(
+                held.fitted_with(other.effect, start, taken(held, one, ("ordinary",)), ROUGH)
+            )
+    if not tries:
+        return []
+    best = min(tries, key=lambda t: t.neg2_log_evidence)
+    fit = fitted(best.model, best.fit.effects, best.data, problem.mass_measurement, best.fit.x)
+    more = _More(replace(best, fit=fit), {}, {})
+    for member in best.beside:
+        more = _sought_anew(problem, more, member)
+    found = _paying(problem, more, due)
+    return [found] if len(found.gains) > 1 else []
