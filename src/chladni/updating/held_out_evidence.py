@@ -21,7 +21,7 @@ from .discrepancy import learned
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import beside, unknowns
-from .reduced_model import evaluate
+from .reduced_model import Reduced, evaluate
 from .scan import baseline
 
 BLOCKS = 8  # of neighbouring lines
@@ -53,19 +53,21 @@ class HeldOutEvidence:
 
 
 def held_out_evidence(
-    problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit
-) -> HeldOutEvidence:
+    problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit,
+    about: Reduced | None = None,
+) -> HeldOutEvidence:  # fmt: skip
     """Ask data that the fits did not see.
 
     Parameters
     ----------
     unseen : samples held out, in the shape of ``problem.data.use``
-    null : without the effect that is asked about; or without several of the hypothesis
+    null : without the effects that are asked about
+    about : the model whose state errors of form spread from; that of ``null`` unless it is given
     """
     asked = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
-        data = null.data
+        data = null.data.over(about or null.model)
         assert isinstance(data, (Responses, Poles))
         both = data.using(data.use | unseen)
         held = _news(problem, null, both) - _news(problem, hypothesis, both)

@@ -26,7 +26,7 @@ from .candidates import candidates, repeats
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import unknowns
-from .reduced_model import evaluate
+from .reduced_model import Reduced, evaluate
 from .search_round import search_round, taken
 from .ties import TIED
 
@@ -51,6 +51,7 @@ class Several:
     without : comparable with ``own``, the best without each
     rivals : of each, names of other families that would do in its place and how far behind
     due : gain that each had to bring
+    about : the model whose state errors of form spread from in ``own``
     """
 
     hypothesis: HypothesisFit
@@ -59,6 +60,7 @@ class Several:
     without: tuple[HypothesisFit, ...]
     rivals: tuple[tuple[tuple[str, float], ...], ...]
     due: float
+    about: Reduced
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,12 +160,14 @@ class _More:
     """A set with one effect more.
 
     ``rivals`` would do in the places of its members, ``without`` are the best fits without them;
-    both by the id of the member, as far as they are known.
+    both by the id of the member, as far as they are known. Errors of form spread from a state of
+    the model ``about``.
     """
 
     hypothesis: HypothesisFit
     rivals: dict[int, list[HypothesisFit]]
     without: dict[int, HypothesisFit]
+    about: Reduced
 
 
 def _grown(
@@ -182,7 +186,7 @@ def _grown(
     if gain <= due:
         return None, note
     newest = id(found[0].effect)
-    more = _More(found[0], {newest: found[1:]}, {newest: null})
+    more = _More(found[0], {newest: found[1:]}, {newest: null}, held.reduced.model)
     for member in current.effects:
         more = _sought_anew(problem, more, member)
     return more, note
@@ -214,9 +218,10 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     best = found[0]
     if best.effect.name == member.name and best.neg2_log_evidence > lead.neg2_log_evidence - BETTER:
         known = {**more.without, id(member): rest}
-        return _More(lead, {**more.rivals, id(member): found[1:]}, known)
+        return replace(more, rivals={**more.rivals, id(member): found[1:]}, without=known)
     new = id(best.effect)
-    return _More(best, {**more.rivals, new: found[1:]}, {new: rest})
+    rivals = {**more.rivals, new: found[1:]}
+    return replace(more, hypothesis=best, rivals=rivals, without={new: rest})
 
 
 def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
@@ -246,7 +251,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
     lead, known = more.hypothesis, more.without
     while True:
         if len(lead.effects) < 2:
-            return Several(lead, lead, (np.inf,), (lead,), ((),), due)
+            return Several(lead, lead, (np.inf,), (lead,), ((),), due, more.about)
         without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
         gain = {key: t.neg2_log_evidence - lead.neg2_log_evidence for key, t in without.items()}
         weakest = min(gain, key=lambda key: gain[key])
@@ -258,7 +263,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
     return Several(
         _as_alone(problem, own), own, tuple(gain[id(e)] for e in order),
         tuple(without[id(e)] for e in order),
-        tuple(_close(more.rivals.get(id(e), []), lead, e) for e in order), due,
+        tuple(_close(more.rivals.get(id(e), []), lead, e) for e in order), due, more.about,
     )  # fmt: skip
 
 
@@ -300,7 +305,7 @@ def _in_pairs(
         return []
     best = min(tries, key=lambda t: t.neg2_log_evidence)
     fit = fitted(best.model, best.fit.effects, best.data, problem.mass_measurement, best.fit.x)
-    more = _More(replace(best, fit=fit), {}, {})
+    more = _More(replace(best, fit=fit), {}, {}, base.reduced.model)
     for member in best.beside:
         more = _sought_anew(problem, more, member)
     found = _paying(problem, more, due)

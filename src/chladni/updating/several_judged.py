@@ -30,7 +30,7 @@ def named_together(
     lost = max(0.0, whole.neg2_log_evidence - more.hypothesis.neg2_log_evidence)
     notes = [_found(more)]
     for effect, gain, without in zip(more.own.effects, more.gains, more.without, strict=True):
-        heard = held_out_evidence(prepared.problem, prepared.unseen, without, more.own)
+        heard = held_out_evidence(prepared.problem, prepared.unseen, without, more.own, more.about)
         beside = f"{effect.name} beside {without.name}: {said(heard)}"
         if not carried(gain - lost, heard, more.due):
             return None, f"{_found(more)}; but data that no fit saw do not bear {beside}"
