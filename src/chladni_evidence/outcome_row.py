@@ -1,6 +1,7 @@
 """An answer held against the opened truth: one row of the table, and the table."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from .blind_diagnosis import Answer
 from .outside_kinds import OUTSIDE
+from .pair_kinds import AND, members
 
 Row = dict[str, Any]
 NULLS = ("nothing", "calibration")
@@ -27,9 +29,10 @@ VETO = re.compile(r"(\S+) gained .* in -2 ln evidence but left the data no fit s
 def row(answer: Answer, truth: Row) -> Row:
     """One case.
 
-    ``outcome``: right, wrong, none (nothing named where something was hidden), admitted (it says
-    it does not know), among (one of several it cannot tell, the right one with them), refused,
-    crash. ``by_evidence`` is the outcome had the held-out data no veto.
+    ``outcome``: right, part (of several that were hidden some, and nothing else), wrong, none
+    (nothing named where something was hidden), admitted (it says it does not know), among (one of
+    several it cannot tell, the right one with them), refused, crash. ``by_evidence`` is the outcome
+    had the held-out data no veto.
     """
     d = answer.result
     called, vetoed = _called(d), _vetoed(d)
@@ -55,9 +58,9 @@ def row(answer: Answer, truth: Row) -> Row:
 
 
 def _called(d: Row) -> str:
-    """The name given, else the verdict."""
+    """The names given, else the verdict."""
     if d.get("verdict") in NAMED and d.get("effects"):
-        return str(d["effects"][0]["name"])
+        return AND.join(sorted(str(e["name"]) for e in d["effects"]))
     return str(d.get("verdict", ""))
 
 
@@ -79,11 +82,14 @@ def _outcome(answer: Answer, called: str, truth: Row) -> str:
         return "right" if truth["effect"] in NULLS else "none"
     if _is(called, truth):
         return "right" if _channel(answer.result, truth) else "wrong"
+    if not Counter(members(called)) - Counter(members(truth["effect"])):
+        return "part"
     return "among" if any({called, truth["effect"]} <= names for names in among) else "wrong"
 
 
 def _is(called: str, truth: Row) -> bool:
-    return called == truth["effect"] or called in ALSO.get(truth["effect"], ())
+    names = sorted(members(called)), sorted(members(truth["effect"]))
+    return names[0] == names[1] or called in ALSO.get(truth["effect"], ())
 
 
 def _channel(d: Row, truth: Row) -> bool:
@@ -96,11 +102,24 @@ def _channel(d: Row, truth: Row) -> bool:
 
 
 def _place(d: Row, truth: Row) -> float | None:
-    """Distance of the place named from the true one [m]."""
-    if "point_m" not in truth or not d.get("effects"):
-        return None
-    point = d["effects"][0]["where"].get("point_m")
-    return None if not point else float(np.linalg.norm(np.subtract(point, truth["point_m"])))
+    """Distance of the place named from the true one [m]; of several the largest.
+
+    One effect is held against the truth whatever its name, one of several against its namesake.
+    """
+    hidden = truth.get("effects") or [{**truth, "effect": None}]
+    away = [
+        min(float(np.linalg.norm(np.subtract(p, t["point_m"]))) for p in known)
+        for t in hidden
+        if "point_m" in t and (known := _points(d, t["effect"]))
+    ]
+    return max(away, default=None)
+
+
+def _points(d: Row, name: str | None) -> list[list[float]]:
+    """Places that were named, of this effect, or of the first."""
+    effects = d.get("effects") or []
+    those = effects[:1] if name is None else [e for e in effects if e["name"] == name]
+    return [e["where"]["point_m"] for e in those if e["where"].get("point_m")]
 
 
 def _gain(d: Row) -> float | None:
@@ -155,7 +174,7 @@ def line(r: Row) -> str:
     return ", ".join([*words, f"{r['seconds']:.0f} s, {r['gigabytes']:.1f} GB"])
 
 
-OUTCOMES = ("right", "among", "wrong", "none", "admitted", "refused", "crash")
+OUTCOMES = ("right", "part", "among", "wrong", "none", "admitted", "refused", "crash")
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -25,6 +25,15 @@ def fault():
     return answer("sensor-fault", "measurement fault")
 
 
+def several(*names):
+    return answer(
+        effects=[
+            {"name": name, "where": {"point_m": [0.3 * k, 0.0, 0.0], "channels": []}}
+            for k, name in enumerate(names)
+        ]
+    )
+
+
 def told(effect="point-mass", **more):
     return {**TRUTH, "effect": effect, **more}
 
@@ -56,6 +65,11 @@ def told(effect="point-mass", **more):
             told("duplicated-pair", channel="8:+Z", copy_of="7:+Z"),
             "right",
         ),
+        (several("sensor-mass", "point-mass"), told("point-mass + sensor-mass"), "right"),
+        (several("point-mass", "point-mass"), told("point-mass + point-mass"), "right"),
+        (answer(), told("point-mass + point-mass"), "part"),
+        (several("point-mass", "crack"), told("point-mass + sensor-mass"), "wrong"),
+        (several("point-mass", "crack"), told(), "wrong"),
         (answer(code=2), told(), "refused"),
         (answer(code=1), told(), "crash"),
         (Answer(0, 1.0, 0.1, ""), told(), "crash"),
@@ -108,4 +122,16 @@ def test_table_adds_up():
     text = table(rows)
     assert "point-mass" in text
     assert "outside the catalogue: 0 admitted, 1 wrong of 1" in text
-    assert [int(w) for w in text.splitlines()[1].split()[1:5]] == [2, 1, 0, 1]
+    assert [int(w) for w in text.splitlines()[1].split()[1:5]] == [2, 1, 0, 0, 1]
+
+
+def test_of_several_the_place_farthest_off_counts():
+    """Each is held against the nearest that has its name."""
+    effects = [
+        {"effect": "point-mass", "point_m": [0.31, 0.0, 0.0]},
+        {"effect": "point-mass", "point_m": [0.0, 0.05, 0.0]},
+    ]
+    truth = told("point-mass + point-mass", effects=effects)
+    truth.pop("point_m")
+    assert row(several("point-mass", "point-mass"), truth)["place_m"] == pytest.approx(0.05)
+    assert row(several("sensor-mass", "crack"), truth)["place_m"] is None

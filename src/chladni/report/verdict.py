@@ -124,7 +124,7 @@ def _lacks(result: DiagnosisResult) -> list[str]:
     of_test = {known.name for known in families() if known.effect.kind == "test"}
     faults = [e for e in sure if e.name in of_test]
     physics = [e for e in sure if e.name not in of_test]
-    words = [f"The model lacks {_each(physics)}"] if physics else []
+    words = [f"The model lacks {_each(physics)}"] if physics or not (tied or faults) else []
     if tied:
         begun = "one of" if physics else "The model lacks one of"
         words.append(f"{begun} these, which the data cannot tell apart: {_tied(result)}")
