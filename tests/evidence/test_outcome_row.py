@@ -122,7 +122,7 @@ def test_table_adds_up():
     text = table(rows)
     assert "point-mass" in text
     assert "outside the catalogue: 0 admitted, 1 wrong of 1" in text
-    assert [int(w) for w in text.splitlines()[1].split()[1:5]] == [2, 1, 0, 0, 1]
+    assert [int(w) for w in text.splitlines()[1].split()[1:6]] == [2, 1, 0, 0, 1]
 
 
 def test_of_several_the_place_farthest_off_counts():

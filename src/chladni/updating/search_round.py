@@ -26,23 +26,33 @@ Say = Callable[[str, float], None]
 
 
 def search_round(
-    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say
-) -> list[HypothesisFit]:
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    least: float | None = None,
+) -> list[HypothesisFit]:  # fmt: skip
     """The best hypothesis of every family, best first.
 
     Parameters
     ----------
     null : the best without any of them
+    least : gain in -2 ln evidence by rough fits, below which none is followed further
     """
     hypotheses: list[HypothesisFit] = []
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.8 * k / len(tried))
         fits = _tried(problem, null, c.effect, c.start, c.base)
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]))
+    if least is not None and not _gained(null, hypotheses, least):
+        return simplest_first(hypotheses)
     progress("closing in on the place", 0.8)
     hypotheses = by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
     closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
     return simplest_first(by_family([*hypotheses, *closer]))
+
+
+def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
+    """Whether the best gains so much over the null."""
+    best = min((t.neg2_log_evidence for t in hypotheses), default=np.inf)
+    return bool(null.neg2_log_evidence - best > least)
 
 
 def _tried(

@@ -32,6 +32,7 @@ from .ties import TIED
 
 MOST = 3  # effects in one answer
 FITTED = 8  # candidates of a later round that are fitted
+WORTH = 0.25  # of the gain due, by rough fits: below it none of a round is followed further
 PAIRED = 4  # families in front that are tried in pairs
 BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
 ATTEMPTS = 4  # rounds that may change the set
@@ -175,7 +176,7 @@ def _grown(
 ) -> tuple[_More | None, str]:
     """The set with the best effect more, if that pays, each older member sought anew beside it."""
     held, null = _standing(problem, current)
-    found = _round(held, null, candidates(held, null, FITTED))
+    found = _round(held, null, candidates(held, null, FITTED), WORTH * due)
     if not found:
         return None, ""
     gain = null.neg2_log_evidence - found[0].neg2_log_evidence
@@ -193,10 +194,10 @@ def _grown(
 
 
 def _round(
-    held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate]
+    held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], least: float
 ) -> list[HypothesisFit]:
     """A round of a search; what moved onto one of its own family that is there is left out."""
-    hypotheses = search_round(held, null, tried, lambda text, share: None)
+    hypotheses = search_round(held, null, tried, lambda text, share: None, least)
     return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
 
 
@@ -212,7 +213,7 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     held = _holding(problem, rest, rest.effects)
     tried = candidates(held, _in_order(held, rest), FITTED)
     itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("ordinary", "nuisance")))
-    found = _round(held, _in_order(held, rest), [itself, *tried])
+    found = _round(held, _in_order(held, rest), [itself, *tried], 0.0)
     if not found:
         return more
     best = found[0]
