@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni.effects import extra_support, point_mass, sensor_mass
+from chladni.effects import point_mass, sensor_mass
 from chladni.effects.effect import Effect
+from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
@@ -24,17 +25,17 @@ from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.search_round import search_round
-from chladni.updating.several import Several, several
+from chladni.updating.several import _begun_with, _More, _paying, several
 from chladni.updating.several_judged import named_together
 
 SENSORS = [1, 7, 57, 63, 25, 39]
-TOP = 200.0
-FEW = (point_mass.FAMILY, extra_support.FAMILY, sensor_mass.FAMILY)
+TOP, LINES = 200.0, 30
+FEW = (point_mass.FAMILY, sensor_mass.FAMILY)
 
 
 @pytest.fixture(autouse=True)
 def few_families(monkeypatch):
-    """Three families are enough to go wrong with."""
+    """Two families are enough to go wrong with."""
     monkeypatch.setattr(scanned, "families", lambda: FEW)
 
 
@@ -46,13 +47,13 @@ def at(reduced, *xy):
 def problem_of(reduced, hidden, mass=0.0):
     """The plate, seen at six sensors, with effects hidden in it: [(effect, x)]."""
     rows = reduced.grids.rows[[reduced.grids.position(g) for g in SENSORS]]
-    s = 2 * np.pi * np.linspace(25, TOP, 40) * (0.08 + 1j)
+    s = 2 * np.pi * np.linspace(25, TOP, LINES) * (0.08 + 1j)
     base = (ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01))
     shares = tuple(((g, 1.0),) for g in SENSORS)
     setup = Setup(
         shares, (SENSORS[1], SENSORS[3]), mass_properties(reduced.structure.assembly)[0], TOP
     )
-    ones = np.ones((40, len(SENSORS), 1), complex)
+    ones = np.ones((LINES, len(SENSORS), 1), complex)
     empty = Responses(ones, s, rows, rows[[4]], np.ones(ones.shape[:2], bool))
     weighed = MassMeasurement(setup.weight + mass, 1e-3 * setup.weight)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
@@ -85,10 +86,12 @@ def singles_of(problem):
 
 
 def places(hypothesis):
-    return sorted(hypothesis.fit.effects and [
-        (e.name, *np.round(e.location(hypothesis.fit.of(e)).point_m or (0, 0, 0), 2))
-        for e in hypothesis.effects
-    ])  # fmt: skip
+    """Names and places [cm] of a set, in an order of their own."""
+    where = [e.location(hypothesis.fit.of(e)).point_m for e in hypothesis.effects]
+    return sorted(
+        (e.name, *np.round(p or (0, 0, 0), 2))
+        for e, p in zip(hypothesis.effects, where, strict=True)
+    )
 
 
 HERE, THERE = (0.1, 0.05), (0.3, 0.25)
@@ -138,7 +141,7 @@ def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
     for where in (HERE, THERE):
         of, x = lump(reduced, where, 1.5)
         alone = two.fitted_with(of(two.where), x, null.fit.x)
-        ends.append(places(several(two, [alone], DUE, False).sets[-1].own))
+        ends.append(places(_begun_with(two, alone, DUE).sets[-1].own))
     assert ends[0] == ends[1] == ends[2]
 
 
@@ -163,8 +166,6 @@ def test_a_mass_of_sensors_beside_a_lump(reduced):
 
 def test_what_does_not_pay_goes(two, found):
     """A third that stands beside the two and does nothing is dropped."""
-    from chladni.updating.several import _More, _paying
-
     both = found[1].sets[-1]
     held = two.holding([(e, both.own.fit.of(e)) for e in both.own.effects])
     held = replace(held, data=both.own.data.over(held.reduced.model))
@@ -175,8 +176,8 @@ def test_what_does_not_pay_goes(two, found):
     assert places(left.own) == places(both.own)
 
 
-def test_two_of_a_family_stand_apart(two, found):
-    """The same lump again, or one beside it, is none; another family may stand there."""
+def test_what_has_a_place_stands_at_one_of_its_own(two, found):
+    """The same lump again, one beside it, or a spring in its place is none; one elsewhere is."""
     both = found[1].sets[-1]
     e = both.own.effect
     x = both.own.fit.of(e)
@@ -184,11 +185,12 @@ def test_two_of_a_family_stand_apart(two, found):
     assert repeats(held, e, x)
     k = two.where.grids.position(e.nearest(x))
     assert repeats(held, PointMass.near(two.where, k), np.zeros(3))
-    assert not repeats(held, extra_support.ExtraSupport.near(two.where, k), np.zeros(5))
+    assert repeats(held, ExtraSupport.near(two.where, k), np.zeros(5))
     away = PointMass.near(two.where, at(two.reduced, *HERE))
     there = PointMass.near(two.where, at(two.reduced, *THERE))
     held = two.holding([(there, np.zeros(3))])
     assert not repeats(held, away, np.zeros(3))
+    assert not repeats(held, masses_of_sensors(two.where)[0], np.zeros(1))
 
 
 def test_what_is_written_holds_all_that_was_found(found):
@@ -253,9 +255,3 @@ def test_a_renewed_fit_that_lost_the_gain_is_not_named(monkeypatch, found):
     prepared = SimpleNamespace(problem=None, unseen=None)
     renewed = replace(both.hypothesis, fit=worse)
     assert named_together(prepared, alone, both, renewed)[0] is None
-
-
-def test_a_set_has_a_gain_for_each(found):
-    both = found[1].sets[-1]
-    assert isinstance(both, Several)
-    assert len(both.gains) == len(both.without) == len(both.rivals) == len(both.own.effects)

@@ -120,7 +120,8 @@ def _each(effects: Sequence[NamedEffect]) -> str:
 def _lacks(result: DiagnosisResult) -> list[str]:
     """What the model lacks, what is one of several, and which channel is at fault beside it."""
     tied = result.one_of[0] if result.one_of else ()
-    sure = [e for e in result.effects if e.name not in tied]
+    one = next((e for e in reversed(result.effects) if e.name in tied), None)
+    sure = [e for e in result.effects if e is not one]
     of_test = {known.name for known in families() if known.effect.kind == "test"}
     faults = [e for e in sure if e.name in of_test]
     physics = [e for e in sure if e.name not in of_test]

@@ -51,19 +51,21 @@ def candidates(
 
 
 def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
-    """Whether an effect at x is one that was found already: of its family and about its place."""
+    """Whether an effect at x is one that was found already, or stands where one was found.
+
+    What is local and alters one place in two ways is one thing that the catalogue does not hold: a
+    patch with sharp edges was a thinning, a crack and a mass, each of which paid.
+    """
     reach = APART * float(np.linalg.norm(np.ptp(problem.where.grids.point, axis=0)))
     mine = effect.location(x)
     for other, at in problem.found:
-        if other.name != effect.name:
-            continue
         its = other.location(at)
-        if mine.point_m is None or its.point_m is None:
-            same = mine.channels == its.channels if mine.channels else mine.text == its.text
-        else:
-            same = bool(np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach)
-        if same:
-            return True
+        if mine.point_m is not None and its.point_m is not None:
+            if np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach:
+                return True
+        elif other.name == effect.name and mine.channels == its.channels:
+            if mine.channels or mine.text == its.text:
+                return True
     return False
 
 

@@ -5,7 +5,7 @@
 2. revised: each older one is sought anew beside the younger, for alone it had to explain more than
    its own;
 3. backward: what does not gain its price beside the others goes (Efroymson 1960, stepwise
-   regression); two of one family stand at distinct places;
+   regression); what has a place stands at one of its own;
 4. where one effect alone leaves what it should explain and no second pays, the families in front
    are tried in pairs, for an effect may explain only beside another.
 
@@ -89,7 +89,7 @@ def several(
     search = _begun_with(problem, lead, due)
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
-        if search.sets or unfit or simpler:
+        if simpler or (unfit and not search.sets):
             progress(f"what {other.name} leaves", 0.4)
             search = _better(search, _begun_with(problem, other, due))
     if not search.sets and unfit:
@@ -187,7 +187,8 @@ def _grown(
     if gain <= due:
         return None, note
     newest = id(found[0].effect)
-    more = _More(found[0], {newest: found[1:]}, {newest: null}, held.reduced.model)
+    others = [t for t in found[1:] if _other(t, found[0].effect)]
+    more = _More(found[0], {newest: others}, {newest: null}, held.reduced.model)
     for member in current.effects:
         more = _sought_anew(problem, more, member)
     return more, note
@@ -217,12 +218,25 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     if not found:
         return more
     best = found[0]
-    if best.effect.name == member.name and best.neg2_log_evidence > lead.neg2_log_evidence - BETTER:
-        known = {**more.without, id(member): rest}
-        return replace(more, rivals={**more.rivals, id(member): found[1:]}, without=known)
+    if not _preferred(best, lead, member):
+        known, others = {**more.without, id(member): rest}, [t for t in found if _other(t, member)]
+        return replace(more, rivals={**more.rivals, id(member): others}, without=known)
     new = id(best.effect)
-    rivals = {**more.rivals, new: found[1:]}
+    rivals = {**more.rivals, new: [t for t in found[1:] if _other(t, best.effect)]}
     return replace(more, hypothesis=best, rivals=rivals, without={new: rest})
+
+
+def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
+    """Whether it is of another family, and as it was fitted no other name for the same."""
+    effect = hypothesis.effect
+    return member.name not in (effect.name, effect.becomes(hypothesis.fit.of(effect)))
+
+
+def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
+    """Whether another effect stands in the place of a member: it is better, or simpler and tied."""
+    ahead, x = lead.neg2_log_evidence - best.neg2_log_evidence, lead.fit.of(member)
+    simpler = member.becomes(x) == best.effect.name or bool(member.implausible(x))
+    return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
 
 
 def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
@@ -264,7 +278,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
     return Several(
         _as_alone(problem, own), own, tuple(gain[id(e)] for e in order),
         tuple(without[id(e)] for e in order),
-        tuple(_close(more.rivals.get(id(e), []), lead, e) for e in order), due, more.about,
+        tuple(_close(more.rivals.get(id(e), []), lead) for e in order), due, more.about,
     )  # fmt: skip
 
 
@@ -275,16 +289,10 @@ def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
     return replace(own, fit=fit)
 
 
-def _close(
-    rivals: Sequence[HypothesisFit], lead: HypothesisFit, member: Effect
-) -> tuple[tuple[str, float], ...]:
+def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[tuple[str, float], ...]:
     """Other families that do as well as a member in its place, and how far they stay behind."""
-    return tuple(
-        (t.effect.name, t.neg2_log_evidence - lead.neg2_log_evidence)
-        for t in rivals
-        if t.neg2_log_evidence - lead.neg2_log_evidence < TIED
-        and t.effect.becomes(t.fit.of(t.effect)) != member.name
-    )
+    behind = [(t.effect.name, t.neg2_log_evidence - lead.neg2_log_evidence) for t in rivals]
+    return tuple((name, gap) for name, gap in behind if gap < TIED)
 
 
 def _in_pairs(
