@@ -19,7 +19,7 @@ from chladni.updating import diagnosis as diagnosing
 from chladni.updating import several_judged
 from chladni.updating.candidates import candidates, repeats
 from chladni.updating.diagnosis import Diagnosis, threshold
-from chladni.updating.held_out_evidence import HeldOutEvidence
+from chladni.updating.held_out_evidence import HeldOutEvidence, held_out_evidence
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, as_written, fitted
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
@@ -30,6 +30,7 @@ from chladni.updating.several_judged import named_together
 
 SENSORS = [1, 7, 57, 63, 25, 39]
 TOP, LINES = 200.0, 30
+HELD = slice(-4, None)  # lines
 FEW = (point_mass.FAMILY, sensor_mass.FAMILY)
 
 
@@ -54,7 +55,9 @@ def problem_of(reduced, hidden, mass=0.0):
         shares, (SENSORS[1], SENSORS[3]), mass_properties(reduced.structure.assembly)[0], TOP
     )
     ones = np.ones((LINES, len(SENSORS), 1), complex)
-    empty = Responses(ones, s, rows, rows[[4]], np.ones(ones.shape[:2], bool))
+    use = np.ones(ones.shape[:2], bool)
+    use[HELD] = False
+    empty = Responses(ones, s, rows, rows[[4]], use)
     weighed = MassMeasurement(setup.weight + mass, 1e-3 * setup.weight)
     labels = tuple(f"{g}:+Z" for g in SENSORS)
     problem = UpdatingProblem(reduced, empty.over(reduced.model), weighed, base, (), setup, labels)
@@ -132,6 +135,15 @@ def test_each_gains_what_the_others_lose_without_it(two, found):
     for gain, without in zip(both.gains, both.without, strict=True):
         assert gain == pytest.approx(without.neg2_log_evidence - both.own.neg2_log_evidence)
         assert len(without.effects) == 1
+
+
+def test_each_is_borne_by_lines_that_no_fit_saw(two, found):
+    """Asked beside the other, of what was held out and of folds of what was fitted."""
+    both = found[1].sets[-1]
+    for without in both.without:
+        heard = held_out_evidence(two, ~two.data.use, without, both.own, both.about)
+        assert min(heard.votes.values()) > 0
+        assert len(heard.votes) == 3
 
 
 def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):

@@ -80,7 +80,7 @@ def several(
 
     Parameters
     ----------
-    singles : the best hypothesis of every family alone, best first
+    singles : the best hypothesis of every family alone, best first; a set must be ahead of them
     due : gain in -2 ln evidence that one effect needs to be named
     unfit : whether the best of them does not fit
     """
@@ -96,7 +96,9 @@ def several(
         progress("effects in pairs", 0.8)
         pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
         search = replace(search, sets=tuple(pairs))
-    return search
+    best = lead.neg2_log_evidence
+    ahead = (s for s in search.sets if best - s.hypothesis.neg2_log_evidence > s.due)
+    return replace(search, sets=tuple(ahead))
 
 
 def price(due: float, size: int) -> float:
@@ -298,8 +300,8 @@ def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[tuple[
 def _in_pairs(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float
 ) -> list[Several]:
-    """The best pair of the families in front, if both of it pay."""
-    base, _ = _standing(problem, singles[0])
+    """The best pair of the families in front, if it is ahead of one alone and both of it pay."""
+    base, alone = _standing(problem, singles[0])
     data = base.data
     tries = []
     for one, other in combinations(singles, 2):
@@ -310,9 +312,9 @@ def _in_pairs(
             tries.append(
                 held.fitted_with(other.effect, start, taken(held, one, ("ordinary",)), ROUGH)
             )
-    if not tries:
+    best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
+    if alone.neg2_log_evidence - best.neg2_log_evidence < WORTH * due:
         return []
-    best = min(tries, key=lambda t: t.neg2_log_evidence)
     fit = fitted(best.model, best.fit.effects, best.data, problem.mass_measurement, best.fit.x)
     more = _More(replace(best, fit=fit), {}, {}, base.reduced.model)
     for member in best.beside:
