@@ -64,7 +64,8 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
             if np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach:
                 return True
         elif other.name == effect.name and mine.channels == its.channels:
-            if mine.channels or mine.text == its.text:
+            whole = effect.remakes_structure and set(effect.parts) & set(other.parts)
+            if mine.channels or mine.text == its.text or whole:
                 return True
     return False
 

@@ -37,10 +37,11 @@ def search_round(
     least : gain in -2 ln evidence by rough fits, below which none is followed further
     """
     hypotheses: list[HypothesisFit] = []
+    whole = WHOLE if least is None else RUNNING  # the first round's are still there
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.8 * k / len(tried))
         fits = _tried(problem, null, c.effect, c.start, c.base)
-        hypotheses = _lighter(problem, by_family([*hypotheses, *fits]))
+        hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses)
     progress("closing in on the place", 0.8)
@@ -85,10 +86,12 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
     return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 
-def _lighter(problem: UpdatingProblem, hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
+def _lighter(
+    problem: UpdatingProblem, hypotheses: list[HypothesisFit], whole: int
+) -> list[HypothesisFit]:
     """All families; those far down and at rest keep their fit, not the basis made for it."""
-    out = hypotheses[:WHOLE]
-    for t in hypotheses[WHOLE:]:
+    out = hypotheses[:whole]
+    for t in hypotheses[whole:]:
         if t.fit.status is Status.OUT_OF_STEPS:
             out.append(t)
             continue

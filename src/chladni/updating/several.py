@@ -94,8 +94,9 @@ def several(
             search = _better(search, _begun_with(problem, other, due))
     if not search.sets and unfit:
         progress("effects in pairs", 0.8)
-        pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
-        search = replace(search, sets=tuple(pairs))
+        with suppress(ModelError):
+            pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
+            search = replace(search, sets=tuple(pairs))
     best = lead.neg2_log_evidence
     ahead = (s for s in search.sets if best - s.hypothesis.neg2_log_evidence > s.due)
     return replace(search, sets=tuple(ahead))
@@ -121,10 +122,14 @@ def _begun_with(problem: UpdatingProblem, lead: HypothesisFit, due: float) -> Se
         size = len(current.effects) + 1
         if size > MOST:
             break
-        more, note = _grown(problem, current, price(due, size))
-        if more is None:
+        try:
+            more, note = _grown(problem, current, price(due, size))
+            if more is None:
+                break
+            found = _paying(problem, more, price(due, size))
+        except ModelError as error:  # a fit that has left all structures that can be
+            note = f"what {current.name} leaves could not be searched: {error}"
             break
-        found = _paying(problem, more, price(due, size))
         if {id(e) for e in found.own.effects} in seen:
             break
         seen.append({id(e) for e in found.own.effects})
@@ -214,9 +219,9 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
     lead = more.hypothesis
     rest = _without(problem, lead, member)
     held = _holding(problem, rest, rest.effects)
-    tried = candidates(held, _in_order(held, rest), FITTED)
+    null = _in_order(held, rest)
     itself = Candidate(member, lead.fit.of(member), taken(held, lead, ("ordinary", "nuisance")))
-    found = _round(held, _in_order(held, rest), [itself, *tried], 0.0)
+    found = _round(held, null, [itself, *candidates(held, null, FITTED)], 0.0)
     if not found:
         return more
     best = found[0]
@@ -307,17 +312,18 @@ def _in_pairs(
     for one, other in combinations(singles, 2):
         held = problem.holding([(one.effect, one.fit.of(one.effect))])
         held = replace(held, data=data.over(held.reduced.model))
+        start = other.fit.of(other.effect)
+        if repeats(held, other.effect, start):
+            continue
         with suppress(ModelError):
-            start = other.fit.of(other.effect)
             tries.append(
                 held.fitted_with(other.effect, start, taken(held, one, ("ordinary",)), ROUGH)
             )
     best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
     if alone.neg2_log_evidence - best.neg2_log_evidence < WORTH * due:
         return []
-    fit = fitted(best.model, best.fit.effects, best.data, problem.mass_measurement, best.fit.x)
-    more = _More(replace(best, fit=fit), {}, {}, base.reduced.model)
-    for member in best.beside:
+    more = _More(best, {}, {}, base.reduced.model)
+    for member in (*best.beside, best.effect):
         more = _sought_anew(problem, more, member)
     found = _paying(problem, more, due)
     return [found] if len(found.gains) > 1 else []
