@@ -91,15 +91,19 @@ def several(
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not search.sets):
             progress(f"what {other.name} leaves", 0.4)
-            search = _better(search, _begun_with(problem, other, due))
+            search = _better(search, _begun_with(problem, other, due, lead))
     if not search.sets and unfit:
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
             search = replace(search, sets=tuple(pairs))
-    best = lead.neg2_log_evidence
-    ahead = (s for s in search.sets if best - s.hypothesis.neg2_log_evidence > s.due)
+    ahead = (s for s in search.sets if _gain(lead, s.hypothesis) > s.due)
     return replace(search, sets=tuple(ahead))
+
+
+def _gain(without: HypothesisFit, hypothesis: HypothesisFit) -> float:
+    """In -2 ln evidence."""
+    return without.neg2_log_evidence - hypothesis.neg2_log_evidence
 
 
 def price(due: float, size: int) -> float:
@@ -115,8 +119,10 @@ def _better(one: Search, other: Search) -> Search:
     return one if next(ends) <= next(ends) else other
 
 
-def _begun_with(problem: UpdatingProblem, lead: HypothesisFit, due: float) -> Search:
-    """The sets that grow from one hypothesis, until none more pays."""
+def _begun_with(
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, best: HypothesisFit | None = None
+) -> Search:
+    """The sets that grow from one hypothesis, until none more pays or they stay behind the best."""
     current, out, note, seen = lead, list[Several](), "", list[set[int]]()
     for _ in range(ATTEMPTS):
         size = len(current.effects) + 1
@@ -126,6 +132,10 @@ def _begun_with(problem: UpdatingProblem, lead: HypothesisFit, due: float) -> Se
             more, note = _grown(problem, current, price(due, size))
             if more is None:
                 break
+            if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
+                break
+            for member in current.effects:
+                more = _sought_anew(problem, more, member)
             found = _paying(problem, more, price(due, size))
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
@@ -181,12 +191,12 @@ class _More:
 def _grown(
     problem: UpdatingProblem, current: HypothesisFit, due: float
 ) -> tuple[_More | None, str]:
-    """The set with the best effect more, if that pays, each older member sought anew beside it."""
+    """The set with the best effect more, if that pays, and how much it gains."""
     held, null = _standing(problem, current)
     found = _round(held, null, candidates(held, null, FITTED), WORTH * due)
     if not found:
         return None, ""
-    gain = null.neg2_log_evidence - found[0].neg2_log_evidence
+    gain = _gain(null, found[0])
     note = (
         f"with {current.name} in place the best effect more, {found[0].effect.name}, gains "
         f"{gain:.1f} in -2 ln evidence; {due:.0f} are needed"
@@ -195,10 +205,7 @@ def _grown(
         return None, note
     newest = id(found[0].effect)
     others = [t for t in found[1:] if _other(t, found[0].effect)]
-    more = _More(found[0], {newest: others}, {newest: null}, held.reduced.model)
-    for member in current.effects:
-        more = _sought_anew(problem, more, member)
-    return more, note
+    return _More(found[0], {newest: others}, {newest: null}, held.reduced.model), note
 
 
 def _round(
@@ -241,7 +248,7 @@ def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
 
 def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
     """Whether another effect stands in the place of a member: it is better, or simpler and tied."""
-    ahead, x = lead.neg2_log_evidence - best.neg2_log_evidence, lead.fit.of(member)
+    ahead, x = _gain(lead, best), lead.fit.of(member)
     simpler = member.becomes(x) == best.effect.name or bool(member.implausible(x))
     return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
 
@@ -275,7 +282,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
         if len(lead.effects) < 2:
             return Several(lead, lead, (np.inf,), (lead,), ((),), due, more.about)
         without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
-        gain = {key: t.neg2_log_evidence - lead.neg2_log_evidence for key, t in without.items()}
+        gain = {key: _gain(t, lead) for key, t in without.items()}
         weakest = min(gain, key=lambda key: gain[key])
         if gain[weakest] > due:
             break
@@ -298,7 +305,7 @@ def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
 
 def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[tuple[str, float], ...]:
     """Other families that do as well as a member in its place, and how far they stay behind."""
-    behind = [(t.effect.name, t.neg2_log_evidence - lead.neg2_log_evidence) for t in rivals]
+    behind = [(t.effect.name, _gain(t, lead)) for t in rivals]
     return tuple((name, gap) for name, gap in behind if gap < TIED)
 
 
@@ -320,7 +327,7 @@ def _in_pairs(
                 held.fitted_with(other.effect, start, taken(held, one, ("ordinary",)), ROUGH)
             )
     best = min([alone, *tries], key=lambda t: t.neg2_log_evidence)
-    if alone.neg2_log_evidence - best.neg2_log_evidence < WORTH * due:
+    if _gain(alone, best) < WORTH * due:
         return []
     more = _More(best, {}, {}, base.reduced.model)
     for member in (*best.beside, best.effect):
