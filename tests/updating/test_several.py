@@ -153,7 +153,7 @@ def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
     for where in (HERE, THERE):
         of, x = lump(reduced, where, 1.5)
         alone = two.fitted_with(of(two.where), x, null.fit.x)
-        ends.append(places(_begun_with(two, alone, DUE).sets[-1].own))
+        ends.append(places(_begun_with(two, alone, DUE, lambda text, share: None).sets[-1].own))
     assert ends[0] == ends[1] == ends[2]
 
 

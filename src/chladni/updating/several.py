@@ -22,6 +22,7 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..errors import ModelError
+from ..progress import within
 from .candidates import candidates, repeats
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
@@ -85,13 +86,12 @@ def several(
     unfit : whether the best of them does not fit
     """
     lead, *others = singles
-    progress(f"what {lead.name} leaves", 0.0)
-    search = _begun_with(problem, lead, due)
+    search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4))
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not search.sets):
-            progress(f"what {other.name} leaves", 0.4)
-            search = _better(search, _begun_with(problem, other, due, lead))
+            say = within(progress, 0.4, 0.8)
+            search = _better(search, _begun_with(problem, other, due, say, lead))
     if not search.sets and unfit:
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
@@ -120,11 +120,13 @@ def _better(one: Search, other: Search) -> Search:
 
 
 def _begun_with(
-    problem: UpdatingProblem, lead: HypothesisFit, due: float, best: HypothesisFit | None = None
-) -> Search:
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
+    best: HypothesisFit | None = None,
+) -> Search:  # fmt: skip
     """The sets that grow from one hypothesis, until none more pays or they stay behind the best."""
     current, out, note, seen = lead, list[Several](), "", list[set[int]]()
-    for _ in range(ATTEMPTS):
+    for k in range(ATTEMPTS):
+        progress(f"what {current.name} leaves", k / ATTEMPTS)
         size = len(current.effects) + 1
         if size > MOST:
             break
@@ -134,9 +136,7 @@ def _begun_with(
                 break
             if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
                 break
-            for member in current.effects:
-                more = _sought_anew(problem, more, member)
-            found = _paying(problem, more, price(due, size))
+            found = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
             break
@@ -219,6 +219,15 @@ def _round(
 def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
     """The problem with what was found where a hypothesis has it."""
     return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
+
+
+def _revised(
+    problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float
+) -> Several:
+    """The set with some of its members sought anew, less what does not pay."""
+    for member in members:
+        more = _sought_anew(problem, more, member)
+    return _paying(problem, more, due)
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
@@ -330,7 +339,5 @@ def _in_pairs(
     if _gain(alone, best) < WORTH * due:
         return []
     more = _More(best, {}, {}, base.reduced.model)
-    for member in (*best.beside, best.effect):
-        more = _sought_anew(problem, more, member)
-    found = _paying(problem, more, due)
+    found = _revised(problem, more, best.effects, due)
     return [found] if len(found.gains) > 1 else []
