@@ -20,6 +20,7 @@ from .ties import simplest_first
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not
+LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep a basis of their own, a sixth of a gigabyte each on a tailgate
 
 Say = Callable[[str, float], None]
@@ -37,7 +38,8 @@ def search_round(
     least : gain in -2 ln evidence by rough fits, below which none is followed further
     """
     hypotheses: list[HypothesisFit] = []
-    whole = WHOLE if least is None else RUNNING  # the first round's are still there
+    later = least is not None  # the bases of the first round are still there
+    whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
     for k, c in enumerate(tried):
         progress(f"trying {c.effect.name} {c.effect.text}", 0.8 * k / len(tried))
         fits = _tried(problem, null, c.effect, c.start, c.base)
@@ -45,8 +47,11 @@ def search_round(
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses)
     progress("closing in on the place", 0.8)
-    hypotheses = by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
-    closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
+    ahead, rest = hypotheses[:running], hypotheses[running:]
+    finished = [_finished(problem, t, True) for t in ahead]
+    rest = rest if later else [_finished(problem, t, False) for t in rest]
+    hypotheses = by_family([*finished, *rest])
+    closer = [t for lead in hypotheses[:running] for t in _closer(problem, lead)]
     return simplest_first(by_family([*hypotheses, *closer]))
 
 

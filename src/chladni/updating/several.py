@@ -32,7 +32,7 @@ from .search_round import search_round, taken
 from .ties import TIED
 
 MOST = 3  # effects in one answer
-FITTED = 8  # candidates of a later round that are fitted
+FITTED = 6  # candidates of a later round that are fitted
 WORTH = 0.25  # of the gain due, by rough fits: below it none of a round is followed further
 PAIRED = 4  # families in front that are tried in pairs
 BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
