@@ -19,8 +19,9 @@ from .benched_recording import PLAIN, Recorder
 from .hidden_kinds import CATALOGUED
 from .made_case import KINDS
 from .package_kinds import package_kinds
+from .pair_kinds import PAIRS
 
-SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints")
+SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs")
 Purpose = Literal["tune", "report"]
 PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
 REPORTING = 600  # seeds below tune scales and code, those from here on report
@@ -75,6 +76,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
+    pairs: two effects at once on plate and panel, our fine mesh and CalculiX in turn.
     """
     made = {
         "tailgate": _tailgate,
@@ -83,6 +85,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "frames": _frames,
         "outside": _outside,
         "joints": _joints,
+        "pairs": _pairs,
     }
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
@@ -152,6 +155,12 @@ def _outside(seed: int) -> Iterator[Order]:
 def _joints(seed: int) -> Iterator[Order]:
     for kind, homes in JOINED.items():
         yield from (Order(h, kind, seed, "16 mm" if h == "tailgate" else "fine") for h in homes)
+
+
+def _pairs(seed: int) -> Iterator[Order]:
+    for s, structure in enumerate(SPECIMENS):
+        for k, kind in enumerate(PAIRS):
+            yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:

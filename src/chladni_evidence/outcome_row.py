@@ -1,12 +1,14 @@
 """An answer held against the opened truth: one row of the table."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from .blind_diagnosis import Answer
+from .pair_kinds import AND, members
 
 Row = dict[str, Any]
 NULLS = ("nothing", "calibration")
@@ -37,10 +39,11 @@ VETO = re.compile(r"(\S+) gained .* in -2 ln evidence but left the data no fit s
 def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     """One case.
 
-    ``outcome``: right, wrong, none (nothing named where something was hidden), admitted (it says
-    it does not know), among (one of several it cannot tell, the right one with them), refused,
-    crash. ``by_evidence`` is the outcome had the held-out data no veto. ``plain`` is what
-    calibration alone answers, whose figures stand beside those of the diagnosis.
+    ``outcome``: right, part (of several that were hidden some, and nothing else), wrong, none
+    (nothing named where something was hidden), admitted (it says it does not know), among (one of
+    several it cannot tell, the right one with them), refused, crash. ``by_evidence`` is the outcome
+    had the held-out data no veto. ``plain`` is what calibration alone answers, whose figures stand
+    beside those of the diagnosis.
     """
     d = answer.result
     called, vetoed, place = _called(d), _vetoed(d), _place(d, truth)
@@ -73,9 +76,9 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
 
 
 def _called(d: Row) -> str:
-    """The name given, else the verdict."""
+    """The names given, else the verdict."""
     if d.get("verdict") in NAMED and d.get("effects"):
-        return str(d["effects"][0]["name"])
+        return AND.join(sorted(str(e["name"]) for e in d["effects"]))
     return str(d.get("verdict", ""))
 
 
@@ -97,11 +100,14 @@ def _outcome(answer: Answer, called: str, truth: Row) -> str:
         return "right" if truth["effect"] in NULLS else "none"
     if _is(called, truth):
         return "right" if _channel(answer.result, truth) else "wrong"
+    if not Counter(members(called)) - Counter(members(truth["effect"])):
+        return "part"
     return "among" if any({called, truth["effect"]} <= names for names in among) else "wrong"
 
 
 def _is(called: str, truth: Row) -> bool:
-    return called == truth["effect"] or called in ALSO.get(truth["effect"], ())
+    names = sorted(members(called)), sorted(members(truth["effect"]))
+    return names[0] == names[1] or called in ALSO.get(truth["effect"], ())
 
 
 def _kin(called: str, truth: Row) -> bool:
@@ -121,11 +127,24 @@ def _channel(d: Row, truth: Row) -> bool:
 
 
 def _place(d: Row, truth: Row) -> float | None:
-    """Distance of the place named from the true one [m]."""
-    if "point_m" not in truth or not d.get("effects"):
-        return None
-    point = d["effects"][0]["where"].get("point_m")
-    return None if not point else float(np.linalg.norm(np.subtract(point, truth["point_m"])))
+    """Distance of the place named from the true one [m]; of several the largest.
+
+    One effect is held against the truth whatever its name, one of several against its namesake.
+    """
+    hidden = truth.get("effects") or [{**truth, "effect": None}]
+    away = [
+        min(float(np.linalg.norm(np.subtract(p, t["point_m"]))) for p in known)
+        for t in hidden
+        if "point_m" in t and (known := _points(d, t["effect"]))
+    ]
+    return max(away, default=None)
+
+
+def _points(d: Row, name: str | None) -> list[list[float]]:
+    """Places that were named, of this effect, or of the first."""
+    effects = d.get("effects") or []
+    those = effects[:1] if name is None else [e for e in effects if e["name"] == name]
+    return [e["where"]["point_m"] for e in those if e["where"].get("point_m")]
 
 
 def _gain(d: Row) -> float | None:
@@ -177,13 +196,19 @@ def _ordinary(d: Row, truth: Row) -> Iterator[tuple[str, Row, float]]:
 
 
 def _named(d: Row, truth: Row) -> Iterator[tuple[Row, float]]:
-    """(what is said of the effect, the truth): by its name, or the first of it the value."""
-    if _called(d) != truth["effect"]:
+    """(what is said of an effect, the truth): by its name, or the first of it the value.
+
+    Two of one family are not told apart here.
+    """
+    hidden = Counter(members(truth["effect"]))
+    if Counter(members(_called(d))) != hidden:
         return
-    for k, entry in enumerate(d["effects"][0].get("parameters") or []):
-        true = truth.get(entry["name"], truth.get("value") if k == 0 else None)
-        if true is not None and _is_estimate(entry):
-            yield entry, float(true)
+    for true in truth.get("effects") or [truth]:
+        mine = [e for e in d["effects"] if e["name"] == true["effect"]]
+        for k, entry in enumerate(mine[0].get("parameters") or [] if len(mine) == 1 else []):
+            value = true.get(entry["name"], true.get("value") if k == 0 else None)
+            if value is not None and _is_estimate(entry):
+                yield entry, float(value)
 
 
 def _is_estimate(entry: Row) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from .outcome_row import NULLS, QUANTITIES, Row
 from .outside_kinds import OUTSIDE
 
-OUTCOMES = ("right", "among", "wrong", "none", "admitted", "refused", "crash")
+OUTCOMES = ("right", "part", "among", "wrong", "none", "admitted", "refused", "crash")
 FIGURES = {  # of what is held beside plain calibration: what it is, its factor
     "mass": ("mass off, %", 100.0),
     "E": ("E off, %", 100.0),

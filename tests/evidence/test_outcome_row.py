@@ -27,6 +27,15 @@ def fault():
     return answer("sensor-fault", "measurement fault")
 
 
+def several(*names):
+    return answer(
+        effects=[
+            {"name": name, "where": {"point_m": [0.3 * k, 0.0, 0.0], "channels": []}}
+            for k, name in enumerate(names)
+        ]
+    )
+
+
 def told(effect="point-mass", **more):
     return {**TRUTH, "effect": effect, **more}
 
@@ -58,6 +67,11 @@ def told(effect="point-mass", **more):
             told("duplicated-pair", channel="8:+Z", copy_of="7:+Z"),
             "right",
         ),
+        (several("sensor-mass", "point-mass"), told("point-mass + sensor-mass"), "right"),
+        (several("point-mass", "point-mass"), told("point-mass + point-mass"), "right"),
+        (answer(), told("point-mass + point-mass"), "part"),
+        (several("point-mass", "crack"), told("point-mass + sensor-mass"), "wrong"),
+        (several("point-mass", "crack"), told(), "wrong"),
         (answer(code=2), told(), "refused"),
         (answer(code=1), told(), "crash"),
         (Answer(0, 1.0, 0.1, ""), told(), "crash"),
@@ -198,7 +212,17 @@ def test_tables_add_up():
         row(answer(), told()), row(answer("suspension"), told()), row(answer(), told("rotor")),
         row(answer(), told("nothing")), row(answer(code=2), told()), row(answer(code=1), told()),
     ]  # fmt: skip
-    assert [int(w) for w in table(rows).splitlines()[1].split()[1:9]] == [4, 1, 0, 1, 0, 0, 1, 1]
+    assert [int(w) for w in table(rows).splitlines()[1].split()[1:10]] == [
+        4,
+        1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        1,
+        1,
+    ]
     _, *lines, legend = confusion(rows).splitlines()
     counts = {text.split()[0]: text.split()[1:] for text in lines}
     assert legend == "called 1: crash, 2: point-mass, 3: refused, 4: suspension"
@@ -211,3 +235,15 @@ def test_tables_add_up():
     assert "outside the catalogue: 0 admitted, 1 wrong of 1" in said
     assert "75% of the way" in said
     assert tables([])
+
+
+def test_of_several_the_place_farthest_off_counts():
+    """Each is held against the nearest that has its name."""
+    effects = [
+        {"effect": "point-mass", "point_m": [0.31, 0.0, 0.0]},
+        {"effect": "point-mass", "point_m": [0.0, 0.05, 0.0]},
+    ]
+    truth = told("point-mass + point-mass", effects=effects)
+    truth.pop("point_m")
+    assert row(several("point-mass", "point-mass"), truth)["place_m"] == pytest.approx(0.05)
+    assert row(several("sensor-mass", "crack"), truth)["place_m"] is None

@@ -190,3 +190,39 @@ def test_what_cannot_be_told_apart_is_the_headline(verdict):
     assert "hem-contact" in said
     assert "weigh the structure" in said
     assert sentence(replace(tied, one_of=())) != said
+
+
+LUMP = {"name": "point-mass", "claim": "a lump", "gain": 90.0, "where": {"text": "near grid 9"}}
+FAULT = {"name": "sensor-fault", "gain": 40.0, "where": {"text": "channel 7", "channels": ["7:+Z"]}}
+SENSORS = {"name": "sensor-mass", "gain": 60.0, "where": {"text": "at the 6 sensors"}}
+
+
+def named(*effects, **more):
+    return from_json({"verdict": "missing physics", "effects": list(effects), **more})
+
+
+def test_every_effect_is_said_with_its_place_and_its_gain(tmp_path):
+    """In the sentence, on the page and in the JSON."""
+    found = named(LUMP, SENSORS)
+    said = sentence(found)
+    for word in ("point-mass", "a lump", "near grid 9", "sensor-mass", "at the 6 sensors"):
+        assert word in said
+    assert [e["gain"] for e in diagnosis_json(found)["effects"]] == [90.0, 60.0]
+    loses = "what -2 ln evidence loses without it"
+    assert loses in read(write_page(tmp_path, found, {}, ()))[0]
+    assert loses not in read(write_page(tmp_path, named(LUMP), {}, ()))[0]
+
+
+def test_a_fault_beside_physics_is_no_lack_of_the_model():
+    said = sentence(named(LUMP, FAULT))
+    assert said.index("The model lacks point-mass") < said.index("the recording is at fault")
+    assert "sensor-fault" in said[said.index("the recording is at fault") :]
+
+
+def test_what_is_sure_is_said_beside_what_cannot_be_told_apart():
+    one_of = [["sensor-mass", "mass-patch", "take the sensors off"]]
+    alternatives = [{"name": "mass-patch", "log_evidence": -1.0}]
+    said = sentence(named(LUMP, SENSORS, one_of=one_of, alternatives=alternatives))
+    assert said.startswith("The model lacks point-mass")
+    assert said.index("one of these") < said.index("sensor-mass") < said.index("mass-patch")
+    assert "take the sensors off" in said

@@ -17,7 +17,7 @@ def tried(name, S, becomes="", implausible=""):
         name=name, becomes=lambda x: becomes, implausible=lambda x: implausible
     )
     return SimpleNamespace(
-        neg2_log_evidence=S, effect=effect, fit=SimpleNamespace(of=lambda e: None)
+        neg2_log_evidence=S, effect=effect, name=name, fit=SimpleNamespace(of=lambda e: None)
     )
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from chladni.errors import ModelError
-from chladni.updating import diagnosis
-from chladni.updating.diagnosis import BEHIND, HypothesisFit, _finished, _tried
+from chladni.updating import search_round
+from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import Status
+from chladni.updating.search_round import BEHIND, _finished, _tried
 
 NULL = SimpleNamespace(neg2_log_evidence=100.0, fit=SimpleNamespace(x=np.ones(2)))
 
@@ -50,7 +51,7 @@ def test_what_stays_behind_the_null_begins_there(first, again, starts, end):
 def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running):
     """In the running or not: a hypothesis is judged where it comes to rest."""
     end = SimpleNamespace(neg2_log_evidence=1.0)
-    monkeypatch.setattr(diagnosis, "fitted", lambda *given: end)
+    monkeypatch.setattr(search_round, "fitted", lambda *given: end)
     left = SimpleNamespace(
         neg2_log_evidence=9.0, effects=(), x=np.zeros(1), status=status, data=None
     )

@@ -9,6 +9,7 @@ from chladni.effects.effect import Effect
 from chladni.errors import ModelError
 from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
+from chladni.updating.hypothesis_fit import HypothesisFit
 
 
 class Remade(Effect):
@@ -25,14 +26,14 @@ def test_a_strong_change_is_fitted_on_a_structure_that_has_it(monkeypatch, effec
     monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
     monkeypatch.setattr(renewal, "_on_new_structure", lambda *given: (None, remade))
     prepared = SimpleNamespace(problem=SimpleNamespace())
-    begun = SimpleNamespace(effect=effect, structure="deck")
+    begun = SimpleNamespace(effects=(Effect(), effect), structure="deck")
     assert renewal.renewed(None, prepared, begun).hypothesis.structure == structure
 
 
 def a_hypothesis():
-    fit = SimpleNamespace(effects=(), x=np.zeros(0))
     data = SimpleNamespace(over=lambda model: model)
-    return SimpleNamespace(effect=Effect(), fit=fit, model="narrow", data=data)
+    fit = SimpleNamespace(effects=(), x=np.zeros(0), data=data)
+    return HypothesisFit(Effect(), fit, "narrow")
 
 
 @pytest.mark.parametrize(("error", "model"), [(4e-4, "narrow"), (2e-3, "wide")])
@@ -41,9 +42,7 @@ def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
     found = Accuracy(np.array([10.0]), np.array([error]), np.zeros((3, 1)))
     monkeypatch.setattr(renewal, "_accuracy", lambda problem, hypothesis: found)
     monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
-    fit = a_hypothesis().fit
-    fit.data = a_hypothesis().data
-    monkeypatch.setattr(renewal, "fitted", lambda *given: fit)
+    monkeypatch.setattr(renewal, "fitted", lambda *given: a_hypothesis().fit)
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
     done = renewal.renewed(None, prepared, a_hypothesis())
     assert done.hypothesis.model == model
@@ -62,7 +61,6 @@ def test_is_widened_until_it_serves(monkeypatch):
     monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: "wide")
     kept = a_hypothesis().fit
     monkeypatch.setattr(renewal, "fitted", lambda *given: fits.append(given) or kept)
-    monkeypatch.setattr(renewal, "HypothesisFit", lambda effect, fit, model: a_hypothesis())
     prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
     done = renewal.renewed(None, prepared, a_hypothesis())
     assert len(fits) == 2

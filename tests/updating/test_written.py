@@ -8,6 +8,8 @@ import pytest
 
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary, random_field
+from chladni.effects.orthotropic_material import orthotropic
+from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
@@ -116,3 +118,20 @@ def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
         prepared, Diagnosis(plain, plain, plain, (), "calibration only")
     )
     assert (found.plain is not plain) == kept
+
+
+def test_what_makes_another_material_is_written_before_what_divides_a_part(reduced):
+    """Otherwise a patch would keep the material that the rest has lost."""
+    sheet = orthotropic(reduced.groups, (0,), np.array([1.0, 0, 0]))
+    patch = StiffnessPatch.on(reduced.groups, 0, 1)
+    x = {id(sheet): np.array([0.2, -0.2, 0.0, 0.0]), id(patch): np.array([1.0, -1.5, 0.0, 0.0])}
+
+    def written(*order):
+        fit = SimpleNamespace(effects=order, of=lambda e: x[id(e)])
+        named = HypothesisFit(order[0], fit, None, tuple(order[1:]))
+        return outcome.applied(reduced.structure.assembly, named)
+
+    one, other = written(sheet, patch), written(patch, sheet)
+    assert len(one.parts) == len(other.parts) > 1
+    for mine, its in zip(one.parts, other.parts, strict=True):
+        assert (mine.section.bending.E1, mine.name) == (its.section.bending.E1, its.name)

@@ -8,6 +8,7 @@ there and stays at its prior.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -58,15 +59,28 @@ class Patch:
         A = (P.T * w) @ P + 1e-9 * np.eye(6)
         return np.asarray(np.linalg.solve(A, (P.T * w))[0])
 
+    @cached_property
+    def _blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (m,) in which the rows are not zero, and the rows there (d, k, m)."""
+        columns = np.unique(np.concatenate([rows.indices for rows in self.rows]))
+        return columns, np.stack([rows[:, columns].toarray() for rows in self.rows])
+
+    def _weighted(self, w: np.ndarray) -> sp.csr_array:
+        """The grids' rows by weights (k,), one per direction (d, n)."""
+        columns, blocks = self._blocks
+        (d, _, m), n = blocks.shape, self.rows[0].shape[1]
+        ends = m * np.arange(d + 1)
+        return sp.csr_array(((w @ blocks).ravel(), np.tile(columns, d), ends), shape=(d, n))
+
     def at(self, at: np.ndarray) -> sp.csr_array:
         """Rows at a place of the plane, one per direction (d, n)."""
-        w = sp.csr_array(self.weights(at)[None])
-        return sp.csr_array(sp.vstack([w @ rows for rows in self.rows]))
+        return self._weighted(self.weights(at))
 
     def slope(self, at: np.ndarray, axis: int) -> sp.csr_array:
         """Change of those rows along an axis of the plane (d, n)."""
         e = STEP * self.size * np.eye(2)[axis]
-        return sp.csr_array((self.at(at + e) - self.at(at - e)) / (2 * STEP * self.size))
+        change = self.weights(at + e) - self.weights(at - e)
+        return self._weighted(change / (2 * STEP * self.size))
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,6 +80,7 @@ def _effect(e: NamedEffect) -> dict[str, Any]:
         "name": e.name,
         "claim": e.claim,
         "log_evidence": e.log_evidence,
+        "gain": e.gain,
         "where": _lists(e.where),
         "parameters": [_estimate(p) for p in e.parameters],
     }
@@ -185,6 +186,7 @@ def _read_effect(e: Mapping[str, Any]) -> NamedEffect:
         e.get("log_evidence"),
         _read_location(e.get("where") or {}),
         tuple(_read_estimate(p) for p in e.get("parameters") or ()),
+        e.get("gain"),
     )
 
 

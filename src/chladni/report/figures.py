@@ -108,8 +108,9 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
         for name, q in sides:
             if len(steps := _steps(q, bool(result.effects))) > 1:
                 made[name] = plots.waterfall(folder / f"{name}.png", steps, q.floor)
-    tried: list[NamedEffect | Alternative] = [*result.effects, *result.alternatives]
-    evidence = {h.name: h.log_evidence for h in tried if h.log_evidence is not None}
+    named = {" and ".join(e.name for e in result.effects): e for e in result.effects[:1]}
+    tried: dict[str, NamedEffect | Alternative] = named | {a.name: a for a in result.alternatives}
+    evidence = {k: h.log_evidence for k, h in tried.items() if h.log_evidence is not None}
     if len(evidence) > 1:
         made["evidence"] = plots.evidence_bars(folder / "evidence.png", evidence)
     if result.adequate is not None and result.adequate.statistics:

@@ -34,14 +34,17 @@ def states_table(result: DiagnosisResult) -> list[Block]:
 
 
 def _row(s: StateResult, folder: str) -> tuple[str, ...]:
-    effect = s.result.effects[0] if s.result.effects else None
+    effects = s.result.effects
     fit = s.result.agreement.fitted if s.result.agreement else None
     return (
         s.name or "(no name)",
         s.result.verdict,
-        effect.name if effect else "–",
-        effect.where.text if effect else "–",
-        ", ".join(f"{p.name} = {_size(p)} {p.unit}" for p in effect.parameters) if effect else "–",
+        "; ".join(e.name for e in effects) or "–",
+        "; ".join(e.where.text for e in effects) or "–",
+        "; ".join(
+            ", ".join(f"{p.name} = {_size(p)} {p.unit}" for p in e.parameters) for e in effects
+        )
+        or "–",
         number(fit.nominal) if fit else "–",
         number(fit.after) if fit else "–",
         folder,

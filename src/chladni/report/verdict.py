@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..effects.estimate import Estimate, Location
+from ..effects.registry import families
 from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect, Scores
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
@@ -58,6 +59,8 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
     "stabilisation": ("modes", "Stabilisation diagram of the test."),
     "evidence": ("why", "Log evidence of every explanation tried, relative to the best."),
     "setup": ("test", "Where sensors and shaker sit."),
+    "where_2": ("found", "Where the second effect is."),
+    "where_3": ("found", "Where the third effect is."),
 }
 LEVELS = "levels_"  # figures of modes over levels: with the number of the mode
 _HALF = ("waterfall", "held_out")  # two of them stand side by side
@@ -80,14 +83,9 @@ def sentence(result: DiagnosisResult) -> str:
 def _sentence(result: DiagnosisResult) -> str:
     """The verdict in one sentence."""
     verdict, gain = result.verdict, _gain(result.agreement)
-    names = " and ".join(e.name for e in result.effects)
-    claims = "; ".join(e.claim for e in result.effects if e.claim)
-    places = "; ".join(e.where.text for e in result.effects if e.where.text)
-    what = f"{names}{f' ({claims})' if claims else ''}{f', {places}' if places else ''}"
-    if verdict == "missing physics" and result.one_of:
-        return f"The model lacks one of these, which the data cannot tell apart: {_tied(result)}."
+    what = _each(result.effects)
     if verdict == "missing physics":
-        return f"The model lacks {what}{gain}."
+        return f"{'; and '.join(_lacks(result))}{'' if result.one_of else gain}."
     if verdict == "measurement fault" and result.one_of:
         return f"Recording or model is at fault; the data cannot tell which: {_tied(result)}."
     if verdict == "measurement fault":
@@ -108,6 +106,30 @@ def _sentence(result: DiagnosisResult) -> str:
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."
     return verdict
+
+
+def _each(effects: Sequence[NamedEffect]) -> str:
+    """Effects with what they claim and where."""
+    words = []
+    for e in effects:
+        claim, place = f" ({e.claim})" * bool(e.claim), f", {e.where.text}" * bool(e.where.text)
+        words.append(f"{e.name}{claim}{place}")
+    return "; and ".join(words)
+
+
+def _lacks(result: DiagnosisResult) -> list[str]:
+    """What the model lacks, what is one of several, and which channel is at fault beside it."""
+    tied = result.one_of[0] if result.one_of else ()
+    one = next((e for e in reversed(result.effects) if e.name in tied), None)
+    sure = [e for e in result.effects if e is not one]
+    of_test = {known.name for known in families() if known.effect.kind == "test"}
+    faults = [e for e in sure if e.name in of_test]
+    physics = [e for e in sure if e.name not in of_test]
+    words = [f"The model lacks {_each(physics)}"] if physics or not (tied or faults) else []
+    if tied:
+        begun = "one of" if physics else "The model lacks one of"
+        words.append(f"{begun} these, which the data cannot tell apart: {_tied(result)}")
+    return [*words, f"the recording is at fault as well: {_each(faults)}"] if faults else words
 
 
 def _joints(result: DiagnosisResult) -> list[Block]:
@@ -163,7 +185,7 @@ def sections(
         *([found] if result.screening and result.screening.findings else []),
         Section("States", states_table(result)),
         Section("At a glance", _glance(result)),
-        Section("What was found", _effects(result.effects)),
+        Section("What was found", [*_effects(result.effects), *shown("found")]),
         level_section(result.levels, of_levels),
         Section("Joints at each level", _joints(result)),
         Section("What was calibrated", _calibrated(result)),
@@ -229,6 +251,10 @@ def _spot(place: LeftPlace) -> str:
 
 def _effects(effects: Sequence[NamedEffect]) -> list[Block]:
     blocks: list[Block] = []
+    gains = [(e.name, number(e.gain)) for e in effects if e.gain is not None]
+    if len(effects) > 1 and gains:
+        heads = ("effect", "what -2 ln evidence loses without it, the others fitted again")
+        blocks.append(Table(heads, gains, ("effect",)))
     for effect in effects:
         blocks.append(Text([": ".join(t for t in (effect.name, effect.claim) if t)]))
         rows = [(p.name, _interval(p)) for p in effect.parameters]

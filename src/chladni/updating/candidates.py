@@ -9,7 +9,7 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.joints import Connection
 from ..effects.registry import families
-from ..effects.search_context import Candidate
+from ..effects.search_context import APART, Candidate
 from ..effects.surroundings import ShellGrids, Surroundings
 from ..errors import ModelError
 from .fastener_scan import Loosened, fastener_scores, loosened
@@ -30,13 +30,54 @@ from .scan import (
 WIDE = (0.06, 0.02)  # scales of the poles at which starts are compared
 
 
-def candidates(problem: UpdatingProblem, null: HypothesisFit) -> list[Candidate]:
-    """The most promising of every family, scanned about the nominal and the calibrated model."""
-    context = UpdatingContext(problem, null)
-    free = {e.text for e in problem.base}  # what the user freed is in every fit already
-    return [
-        c for family in families() for c in family.proposed(context) if c.effect.text not in free
+def candidates(
+    problem: UpdatingProblem, null: HypothesisFit, most: int | None = None
+) -> list[Candidate]:
+    """The most promising of every family, scanned about the nominal and the calibrated model.
+
+    Parameters
+    ----------
+    most : so many of them alone, those that score best where they begin
+    """
+    context, found = UpdatingContext(problem, null), [e for e, _ in problem.found]
+    free = {e.text for e in problem.base if e not in found}  # by the user: in every fit already
+    every = [
+        c
+        for family in families()
+        for c in family.proposed(context)
+        if c.effect.text not in free and not repeats(problem, c.effect, c.start)
     ]
+    return every if most is None else _leading(context, every, most)
+
+
+def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
+    """Whether an effect at x is one that was found already, or stands where one was found.
+
+    What is local and alters one place in two ways is one thing that the catalogue does not hold: a
+    patch with sharp edges was a thinning, a crack and a mass, each of which paid.
+    """
+    reach = APART * float(np.linalg.norm(np.ptp(problem.where.grids.point, axis=0)))
+    mine = effect.location(x)
+    for other, at in problem.found:
+        its = other.location(at)
+        if mine.point_m is not None and its.point_m is not None:
+            if np.linalg.norm(np.subtract(mine.point_m, its.point_m)) < reach:
+                return True
+        elif other.name == effect.name and mine.channels == its.channels:
+            whole = effect.remakes_structure and set(effect.parts) & set(other.parts)
+            if mine.channels or mine.text == its.text or whole:
+                return True
+    return False
+
+
+def _leading(context: "UpdatingContext", every: list[Candidate], most: int) -> list[Candidate]:
+    """Those that score best where they begin, each paying for the places that were tried."""
+    price = [2 * float(np.log(c.effect.trials_factor)) for c in every]
+    score = [
+        float(context.scores(c.effect, [c.start]).min()) + _prior(c.effect, c.start) + p
+        for c, p in zip(every, price, strict=True)
+    ]
+    return [every[k] for k in np.argsort(score, kind="stable")[:most]]
 
 
 def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
@@ -75,7 +116,10 @@ class UpdatingContext:
     def bases(self) -> tuple[np.ndarray, ...]:
         """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
         nominal = self.problem.mean()
-        kinds = [e.kind == "ordinary" for e in self.problem.base for _ in e.parameters]
+        found = [e for e, _ in self.problem.found]
+        kinds = [
+            e.kind == "ordinary" or e in found for e in self.problem.base for _ in e.parameters
+        ]
         return nominal, np.where(kinds, self.null_fit.fit.x, nominal)
 
     @property

@@ -4,7 +4,8 @@
 2. scan: every candidate of the catalogue by fast re-analysis about two baselines, u = 0;
 3. fits: the best places of every family, jointly with the ordinary parameters and the scatter;
 4. evidence: Laplace, with 2 ln of the number of places tried; leaders restart the null;
-5. verdict.
+5. verdict;
+6. where an effect is named, or nothing fits: sets of several effects (``several``).
 """
 
 from collections.abc import Callable, Sequence
@@ -16,22 +17,20 @@ import numpy as np
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
+from ..progress import within
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
 from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
-from .map_fit import Status
 from .reduced_model import evaluate
-from .ties import simplest_first
+from .search_round import search_round, taken
+from .several import Several, several
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
 FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
-BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
-RUNNING = 3  # families that are fitted to the end, at rest or not
-WHOLE = 6  # that keep a basis of their own, a sixth of a gigabyte each on a tailgate
 
 Progress = Callable[[str, float], None]
 
@@ -52,6 +51,8 @@ class Diagnosis:
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, where they are too few to name anything
     heard : what data that no fit saw say of the leading effect
+    sets : several effects together, each of which pays, in the order in which the sets grew
+    gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
     """
 
     nominal: HypothesisFit
@@ -64,6 +65,8 @@ class Diagnosis:
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
     heard: HeldOutEvidence | None = None
+    sets: tuple[Several, ...] = ()
+    gains: tuple[float, ...] = ()
 
     @property
     def found(self) -> HypothesisFit | None:
@@ -92,20 +95,27 @@ def diagnose(
     plain = _plain(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = candidates(problem, null)
-    hypotheses: list[HypothesisFit] = []
-    for k, c in enumerate(tried):
-        progress(f"trying {c.effect.name} {c.effect.text}", 0.3 + 0.4 * k / len(tried))
-        fits = _tried(problem, null, c.effect, c.start, c.base)
-        hypotheses = _lighter(problem, _by_family([*hypotheses, *fits]))
-    progress("closing in on the place", 0.7)
-    hypotheses = _by_family([_finished(problem, t, k < RUNNING) for k, t in enumerate(hypotheses)])
-    closer = [t for lead in hypotheses[:RUNNING] for t in _closer(problem, lead)]
-    hypotheses = simplest_first(_by_family([*hypotheses, *closer]), null.neg2_log_evidence)
+    hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), called, unasked(problem))
-    return tested(found, problem)
+    return _searched_beside(problem, found, within(progress, 0.8, 1.0))
+
+
+def _searched_beside(problem: UpdatingProblem, found: Diagnosis, progress: Progress) -> Diagnosis:
+    """The diagnosis tested, with the sets of several effects that explain more than its leader.
+
+    Natural frequencies alone are too few numbers to bear two names.
+    """
+    alone, data = tested(found, problem), found.null.data
+    unfit = alone.verdict == "not in catalogue"
+    many = isinstance(data, Responses) and data.error is not None
+    if not (many and found.hypotheses) or (found.found is None and not unfit):
+        return alone
+    search = several(problem, found.hypotheses, threshold(data), unfit, progress)
+    notes = (*alone.notes, search.note) if search.note else alone.notes
+    return replace(alone, sets=search.sets, notes=notes)
 
 
 def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
@@ -116,7 +126,7 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     fits = adequacy(winner, problem.mass_measurement, problem.labels, damping=problem.damping)
     if fits is None:
         return diagnosis
-    name = winner.effect.name if diagnosis.found else "calibration alone"
+    name = winner.name if diagnosis.found else "calibration alone"
     note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
     if fits.passes:
         return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
@@ -137,7 +147,7 @@ def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> Hypothesis
     data = data.allowing_errors(winner.fit.state, data.error.delta)
     mass = problem.mass_measurement
     fit = fitted(winner.model, winner.fit.effects, data, mass, winner.fit.x, ROUGH)
-    return HypothesisFit(winner.effect, fit, winner.model)
+    return replace(winner, fit=fit)
 
 
 def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
@@ -170,7 +180,7 @@ def verdict(
     """The public verdict."""
     best = hypotheses[0] if hypotheses else None
     if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > threshold(null.data):
-        return "measurement fault" if best.effect.kind == "test" else "missing physics"
+        return "missing physics" if best.physics else "measurement fault"
     changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
     return "calibration only" if changed else "nothing missing"
 
@@ -229,89 +239,6 @@ def _null_starts(problem: UpdatingProblem) -> list[np.ndarray]:
     return [mean + shift * stiff for shift in (0.0, -0.35, 0.35, -0.7, 0.7)]
 
 
-def _tried(
-    problem: UpdatingProblem,
-    null: HypothesisFit,
-    effect: Effect,
-    start: np.ndarray,
-    base: np.ndarray,
-) -> list[HypothesisFit]:
-    """Rough fits; the second begins at the null, where the first has not even come as far as that.
-
-    With the effect idle a hypothesis is the null: one that stays behind it by more than its price
-    has only stopped on the way. A start that is no structure at all (negative stiffness) is none.
-    """
-    out: list[HypothesisFit] = []
-    for x in (base, null.fit.x):
-        if out and out[0].neg2_log_evidence < null.neg2_log_evidence + BEHIND:
-            break
-        with suppress(ModelError):
-            out.append(problem.fitted_with(effect, start, x, ROUGH))
-    return out
-
-
-def _by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
-    """The best hypothesis of every family, best first."""
-    best: dict[str, HypothesisFit] = {}
-    for t in hypotheses:
-        if t.effect.name not in best or t.neg2_log_evidence < best[t.effect.name].neg2_log_evidence:
-            best[t.effect.name] = t
-    return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
-
-
-def _lighter(problem: UpdatingProblem, hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
-    """All families; those far down and at rest keep their fit, not the basis made for it."""
-    out = hypotheses[:WHOLE]
-    for t in hypotheses[WHOLE:]:
-        if t.fit.status is Status.OUT_OF_STEPS:
-            out.append(t)
-            continue
-        fit = replace(t.fit, data=t.data.over(problem.reduced.model))
-        out.append(HypothesisFit(t.effect, fit, problem.reduced.model))
-    return out
-
-
-def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool) -> HypothesisFit:
-    """A hypothesis in the running, or not yet at rest, fitted to the end from where it is."""
-    at_rest = hypothesis.fit.status is not Status.OUT_OF_STEPS
-    if not isinstance(problem.data, Responses) or (at_rest and not running):
-        return hypothesis
-    model, begun = hypothesis.model, hypothesis.fit
-    fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
-    if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
-        return HypothesisFit(hypothesis.effect, fit, model)
-    return hypothesis
-
-
-def _closer(problem: UpdatingProblem, lead: HypothesisFit) -> list[HypothesisFit]:
-    """The leader begun anew about the place it moved to, while it moves."""
-    out: list[HypothesisFit] = []
-    for _ in range(3):
-        again = lead.effect.recentred(lead.fit.of(lead.effect), problem.where)
-        if again is None:
-            break
-        try:
-            hypothesis = problem.fitted_with(*again, _taken(problem, lead, ("ordinary",)))
-        except ModelError:
-            break
-        out.append(hypothesis)
-        if hypothesis.neg2_log_evidence > lead.neg2_log_evidence - 1:
-            break
-        lead = hypothesis
-    return out
-
-
-def _taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
-    """Base parameters at their prior mean, those of these kinds as the leader has them."""
-    x, at = problem.mean(), 0
-    kept = problem.without(lead.effect)
-    for e in problem.base:
-        if e in kept and e.kind in kinds:
-            x[at : at + len(e.parameters)] = lead.fit.of(e)
-        at += len(e.parameters)
-    return x
-
-
 def _restarted(
     problem: UpdatingProblem, null: HypothesisFit, hypotheses: list[HypothesisFit]
 ) -> HypothesisFit:
@@ -319,6 +246,6 @@ def _restarted(
     tries = [null]
     for lead in hypotheses[:2]:
         with suppress(ModelError):
-            start = _taken(problem, lead, ("ordinary", "nuisance"))
+            start = taken(problem, lead, ("ordinary", "nuisance"))
             tries.append(_base_fit(problem, problem.base, [start]))
     return min(tries, key=lambda t: t.neg2_log_evidence)

@@ -21,7 +21,7 @@ from .discrepancy import learned
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .map_fit import beside, unknowns
-from .reduced_model import evaluate
+from .reduced_model import Reduced, evaluate
 from .scan import baseline
 
 BLOCKS = 8  # of neighbouring lines
@@ -53,17 +53,21 @@ class HeldOutEvidence:
 
 
 def held_out_evidence(
-    problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit
-) -> HeldOutEvidence:
+    problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit,
+    about: Reduced | None = None,
+) -> HeldOutEvidence:  # fmt: skip
     """Ask data that the fits did not see.
 
     Parameters
     ----------
     unseen : samples held out, in the shape of ``problem.data.use``
+    null : without the effects that are asked about
+    about : the model whose state errors of form spread from; that of ``null`` unless it is given
     """
+    asked = [e for e in hypothesis.effects if e not in null.effects]
     held = None
     if unseen.any():
-        data = null.data
+        data = null.data.over(about or null.model)
         assert isinstance(data, (Responses, Poles))
         both = data.using(data.use | unseen)
         held = _news(problem, null, both) - _news(problem, hypothesis, both)
@@ -75,7 +79,8 @@ def held_out_evidence(
         predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    sensors = None if hypothesis.effect.channels else gains[0]  # a fault concerns no other channel
+    faults = all(e.channels for e in asked)  # they concern no other channel
+    sensors = None if asked and faults else gains[0]
     return HeldOutEvidence(held, sensors, gains[1])
 
 

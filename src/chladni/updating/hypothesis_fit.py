@@ -19,11 +19,36 @@ ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the
 
 @dataclass(frozen=True, eq=False)
 class HypothesisFit:
-    """One hypothesis after its fit: the effect, the fit, the model it was fitted in."""
+    """One hypothesis after its fit: the effect, the fit, the model it was fitted in.
+
+    ``beside`` are effects that were found before it; the hypothesis is all of them together.
+    """
 
     effect: Effect
     fit: Fit
     model: Reduced
+    beside: tuple[Effect, ...] = ()
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """All that it names."""
+        return (self.effect, *self.beside)
+
+    @property
+    def name(self) -> str:
+        """Their names in words."""
+        return " and ".join(e.name for e in self.effects)
+
+    @property
+    def physics(self) -> bool:
+        """Whether it changes the model, and not the test alone."""
+        return any(e.kind != "test" for e in self.effects)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that it concerns, where it concerns nothing else."""
+        every = [e.channels for e in self.effects]
+        return tuple(c for each in every for c in each) if all(every) else ()
 
     @property
     def data(self) -> Data:
@@ -45,6 +70,7 @@ class UpdatingProblem:
     base : ordinary parameters and nuisances, free in every fit
     nuisance : the nuisances alone
     damping : of the modes that were identified, where responses are compared
+    found : effects of the base that were found, each with its parameters where it was
     """
 
     reduced: ReducedProblem
@@ -55,6 +81,7 @@ class UpdatingProblem:
     setup: Setup
     labels: tuple[str, ...] = ()
     damping: ModalDamping | None = None
+    found: tuple[tuple[Effect, np.ndarray], ...] = ()
 
     @property
     def where(self) -> Surroundings:
@@ -74,9 +101,27 @@ class UpdatingProblem:
             return self
         return replace(self, data=self.data.exactly())
 
+    def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
+        """The same problem with effects in its base, and in its model what they move."""
+        problem = self
+        for effect, x in found:
+            model = problem.reduced.model_for(effect, x)
+            problem = replace(
+                problem, reduced=replace(problem.reduced, model=model),
+                data=problem.data.over(model), base=(*problem.without(effect), effect),
+                found=(*problem.found, (effect, x)),
+            )  # fmt: skip
+        return problem
+
     def mean(self) -> np.ndarray:
-        """Prior mean of the base parameters."""
-        return np.array([p.mean for e in self.base for p in e.parameters])
+        """Prior mean of the base parameters; what was found stands where it was found."""
+        return self.begun(self.base)
+
+    def begun(self, effects: Sequence[Effect]) -> np.ndarray:
+        """The same of some of them."""
+        known = {id(e): x for e, x in self.found}
+        each = [known.get(id(e), np.array([p.mean for p in e.parameters])) for e in effects]
+        return np.concatenate([np.zeros(0), *each])
 
     def fitted_with(
         self, effect: Effect, start: np.ndarray, base: np.ndarray, max_steps: int = 30
@@ -88,11 +133,12 @@ class UpdatingProblem:
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
         fit = fitted(model, [*kept, effect], data, self.mass_measurement, x0, max_steps)
-        return HypothesisFit(effect, fit, model)
+        return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
 
     def without(self, effect: Effect) -> list[Effect]:
-        """The base less what the effect makes superfluous."""
-        return [e for e in self.base if e.text not in effect.replaces]
+        """The base less what the effect makes superfluous; what was found stays."""
+        found = [e for e, _ in self.found]
+        return [e for e in self.base if e in found or e.text not in effect.replaces]
 
 
 def fitted(
@@ -206,16 +252,20 @@ def as_written(
     the likelihood, else they would bend to make up for mesh and joints: on a coarse plate with a
     concealed crack E went to 264 GPa for 210 without it, and to 212 with it.
     """
-    held = hypothesis.effect
-    if held.parameters:
-        x = hypothesis.fit.of(held)
-        unknown = tuple(
-            replace(p, mean=float(v), sd=HELD) for p, v in zip(held.parameters, x, strict=True)
-        )
-        held = replace(held, parameters=unknown)
+    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
     kept = [e for e in hypothesis.fit.effects if e.writable]
     start = np.concatenate([hypothesis.fit.of(e) for e in kept])
-    effects = [held if e is hypothesis.effect else e for e in kept]
+    effects = [held.get(id(e), e) for e in kept]
     model = hypothesis.model
     found = fit(model, effects, hypothesis.data, mass_measurement, start)
-    return HypothesisFit(held, found, model)
+    effect, *beside = held.values()
+    return HypothesisFit(effect, found, model, tuple(beside))
+
+
+def _held(effect: Effect, found: Fit) -> Effect:
+    """An effect that has to stay where it was found."""
+    if not effect.parameters:
+        return effect
+    at = zip(effect.parameters, found.of(effect), strict=True)
+    unknown = tuple(replace(p, mean=float(v), sd=HELD) for p, v in at)
+    return replace(effect, parameters=unknown)

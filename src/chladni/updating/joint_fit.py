@@ -131,7 +131,7 @@ def _of_state(
     one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
 ) -> HypothesisFit:
     fit = replace(one.fit, x=x, covariance=covariance, state=state)
-    return HypothesisFit(one.effect, fit, one.model)
+    return replace(one, fit=fit)
 
 
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:

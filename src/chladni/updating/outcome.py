@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.effect import Effect
 from ..effects.registry import families
 from ..ema.odds import evidence_in_words
 from ..model.assembly import Assembly
@@ -30,7 +31,7 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     found = diagnosis.found
     nothing = diagnosis.verdict == "nothing missing"
     calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.plain)
-    if found is None or found.effect.kind == "test":
+    if found is None or not found.physics:
         return Models(question.assembly, calibrated, calibrated)
     return Models(
         question.assembly, calibrated, applied(question.assembly, diagnosis.written or found)
@@ -38,8 +39,15 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
 
 
 def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
-    """The assembly with the ordinary parameters and the effect of a hypothesis in it."""
-    for effect in hypothesis.fit.effects:
+    """The assembly with the ordinary parameters and the effects of a hypothesis in it.
+
+    What makes another material of a part comes before what divides the part.
+    """
+
+    def turn(effect: Effect) -> int:
+        return 0 if effect not in hypothesis.effects else 1 if effect.remakes_structure else 2
+
+    for effect in sorted(hypothesis.fit.effects, key=turn):
         assembly = effect.apply(assembly, hypothesis.fit.of(effect))
     return assembly
 
@@ -67,9 +75,9 @@ def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScore
 def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
     """Samples the fit never saw; of a fault of one channel, that channel's alone."""
     held = prepared.held
-    if not winner.effect.channels or held.ndim < 2:
+    if not winner.channels or held.ndim < 2:
         return held
-    mine = np.isin(prepared.problem.labels, winner.effect.channels)
+    mine = np.isin(prepared.problem.labels, winner.channels)
     own = held & mine
     return own if own.any() else held
 
@@ -96,14 +104,12 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     held = fitted_scores(prepared, diagnosis)[1]
     together = gain + (heard.held_out or 0.0)
     due = threshold(diagnosis.null.data)
-    against = any(g < -due for g in heard.votes.values())
-    enough = min(gain, together) > due
-    if enough and not against and not held.effect > HARM * held.calibrated:
-        notes = (*diagnosis.notes, f"asked of {lead.effect.name}: {_said(heard)}")
+    if carried(gain, heard, due) and not held.effect > HARM * held.calibrated:
+        notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
     note = (
-        f"{lead.effect.name} gained {gain:.0f} in -2 ln evidence but left the data no fit saw "
-        f"worse explained ({_said(heard)}; held-out Q {held.calibrated:.3g} calibrated, "
+        f"{lead.name} gained {gain:.0f} in -2 ln evidence but left the data no fit saw "
+        f"worse explained ({said(heard)}; held-out Q {held.calibrated:.3g} calibrated, "
         f"{held.effect:.3g} with it), so it is not named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
@@ -116,11 +122,17 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     return tested(refused, problem)
 
 
+def carried(gain: float, heard: HeldOutEvidence, due: float) -> bool:
+    """Whether fitted data and those that no fit saw bear a name that has to gain what is due."""
+    together = gain + (heard.held_out or 0.0)
+    return min(gain, together) > due and not any(g < -due for g in heard.votes.values())
+
+
 def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str) -> Diagnosis:
     """Calibration alone is refuted by some data, and what refuted it is refused by others."""
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = (
-        f"{of}: {evidence_in_words(gain / 2)} for {lead.effect.name} against calibration alone; "
+        f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; "
         "the data that no fit saw speak against it"
     )
     fits = FitTest(False, p, what, lead.effect.text)
@@ -145,7 +157,7 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, plain=prudent) if after <= before else diagnosis
 
 
-def _said(heard: HeldOutEvidence) -> str:
+def said(heard: HeldOutEvidence) -> str:
     """The gains of data that were not fitted, in words."""
     words = [f"{what} {gain:+.0f}" for what, gain in heard.votes.items()]
     return ", ".join(words) + " in 2 ln predictive density" if words else "nothing was held out"

@@ -40,7 +40,7 @@ def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> li
     data = problem.data
     assert isinstance(data, Poles)
     kept = problem.without(effect)
-    idle = np.array([p.mean for e in kept for p in e.parameters])
+    idle = problem.begun(kept)
     sd = np.array([p.sd for p in effect.parameters])
     mean = np.array([p.mean for p in effect.parameters])
     model = problem.reduced.model.split_for(effect, mean)

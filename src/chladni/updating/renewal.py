@@ -54,7 +54,7 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
     were.
     """
     problem = prepared.problem
-    if hypothesis.effect.remakes_structure:
+    if any(e.remakes_structure for e in hypothesis.effects):
         problem, hypothesis = _on_new_structure(question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
     note = _said(found)
@@ -68,7 +68,7 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
         except ModelError as error:  # what the coarse basis could not feel
             note = f"{note}; with what it lacked added to its basis it could not be fitted: {error}"
             break
-        hypothesis = HypothesisFit(hypothesis.effect, fit, model)
+        hypothesis = replace(hypothesis, fit=fit, model=model)
         found = _accuracy(problem, hypothesis)
         note = f"{note}; with what it lacked added to its basis, {found.worst:.2%}"
     return Renewal(hypothesis, note, found.worst)
@@ -89,10 +89,14 @@ def _said(found: Accuracy) -> str:
 def _on_new_structure(
     question: Question, old: UpdatingProblem, hypothesis: HypothesisFit
 ) -> tuple[UpdatingProblem, HypothesisFit]:
-    """A strong change fitted again on a structure that has it already."""
-    effect = hypothesis.effect
-    x = hypothesis.fit.of(effect)
-    changed = replace(question, assembly=effect.apply(question.assembly, x))
+    """A strong change fitted again on a structure that has it already, with all named beside it."""
+    assembly, found = question.assembly, []
+    for effect in hypothesis.effects:
+        x = hypothesis.fit.of(effect)
+        if effect.remakes_structure:
+            assembly, effect = effect.apply(assembly, x), effect.with_reference_state(x)
+        found.append((effect, x))
+    changed = replace(question, assembly=assembly)
     data, f_max = hypothesis.data, old.setup.f_max
     assert isinstance(data, (Responses, Poles))
     model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
@@ -110,4 +114,6 @@ def _on_new_structure(
         f_max,
     )
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
-    return fresh, fresh.fitted_with(effect.with_reference_state(x), x, fresh.mean())
+    (first, start), *beside = found
+    fresh = fresh.holding(beside)
+    return fresh, fresh.fitted_with(first, start, fresh.mean())

@@ -7,13 +7,18 @@ from ..effects.estimate import Estimate, Location
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """Physics that was found missing, or the fault of a channel."""
+    """Physics that was found missing, or the fault of a channel.
+
+    ``log_evidence`` is that of all named effects together; ``gain`` what -2 ln evidence loses
+    without this one, all others fitted again.
+    """
 
     name: str
     claim: str = ""
     log_evidence: float | None = None
     where: Location = field(default_factory=Location)
     parameters: tuple[Estimate, ...] = ()
+    gain: float | None = None
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..effects.effect import Effect
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis, threshold
 from .hypothesis_fit import HypothesisFit
@@ -21,15 +22,24 @@ from .result import (
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 
 
-def named_effect(hypothesis: HypothesisFit) -> NamedEffect:
-    """The effect of a hypothesis, where it is and how large."""
-    effect, x = hypothesis.effect, hypothesis.fit.of(hypothesis.effect)
+def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
+    """The effects that are named, where they are and how large; what gains most comes first."""
+    found = diagnosis.found
+    if found is None:
+        return ()
+    gains = diagnosis.gains or (diagnosis.two_log_bayes_factor(found),)
+    return tuple(_named(found, e, g) for e, g in zip(found.effects, gains, strict=True))
+
+
+def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffect:
+    x = hypothesis.fit.of(effect)
     return NamedEffect(
         effect.name,
         effect.claim,
         -hypothesis.neg2_log_evidence / 2,
         effect.location(x),
         effect.reported(x, hypothesis.fit.sd(effect)),
+        gain,
     )
 
 
@@ -37,6 +47,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
     """Everything that was tried and is not the answer, with the reason; most probable first."""
     found = diagnosis.found
     best = found if found is not None else diagnosis.null
+    named = () if found is None else tuple(e.name for e in found.effects)
     out = [
         Alternative(
             hypothesis.effect.name,
@@ -45,7 +56,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect)),
         )
         for hypothesis in diagnosis.hypotheses
-        if hypothesis is not found
+        if hypothesis is not found and hypothesis.effect.name not in named
     ]
     if found is not None:
         gap = (diagnosis.null.neg2_log_evidence - best.neg2_log_evidence) / 2
@@ -64,12 +75,12 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
             "before anything is named"
         )
-    if hypothesis.effect.becomes(hypothesis.fit.of(hypothesis.effect)) == best.effect.name:
-        return f"as it was fitted it is {best.effect.name} for all these data can tell"
+    if hypothesis.effect.becomes(hypothesis.fit.of(hypothesis.effect)) == best.name:
+        return f"as it was fitted it is {best.name} for all these data can tell"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (
-        f"{evidence_in_words(gap)} for {best.effect.name} against it; leaves "
-        f"{hypothesis.fit.misfit:.0f} of weighted squares, {best.effect.name} "
+        f"{evidence_in_words(gap)} for {best.name} against it; leaves "
+        f"{hypothesis.fit.misfit:.0f} of weighted squares, {best.name} "
         f"{best.fit.misfit:.0f}"
     )
 
@@ -80,8 +91,8 @@ def agreement(
     """The scores, what was held out, and what the leading effect gained."""
     found = diagnosis.found
     last, what = found or diagnosis.null, prepared.what
-    if last.effect.channels:
-        what = f"channel {', '.join(last.effect.channels)} on the lines held out of {what}"
+    if last.channels:
+        what = f"channel {', '.join(last.channels)} on the lines held out of {what}"
     factors = [diagnosis.two_log_bayes_factor(hypothesis) for hypothesis in diagnosis.hypotheses]
     return Agreement(
         fitted,

@@ -33,7 +33,8 @@ def written_Q(
     ----------
     sets : of samples, in the shape of ``prepared.score.use``
     real : (n,) bool       poles of the test that are modes
-    fault : the fault of a channel, taken out of the recording before it is compared
+    fault : what is named; faults of channels among it are taken out of the recording before it is
+        compared
 
     Where the gain is unknown, the mean level over the fitted samples is taken out as well.
     """
@@ -42,8 +43,9 @@ def written_Q(
         return tuple(data.Q(state, use, real) for use in sets)
     n = len(data.a)
     offset = np.zeros(n, complex)
-    if fault is not None and (change := fault.effect.outputs(fault.fit.of(fault.effect))):
-        offset = offset + change.value
+    if fault is not None:
+        changes = (effect.outputs(fault.fit.of(effect)) for effect in fault.effects)
+        offset = offset + sum(change.value for change in changes if change is not None)
     offset = offset + gain_offset(question, prepared, data, replace(state, offset=offset))
     state = replace(state, offset=offset)
     return tuple(data.Q(state, use) for use in sets)

@@ -43,7 +43,8 @@ from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..updating.result_parts import agreement, alternatives, calibrated, named_effect, remainder
+from ..updating.result_parts import agreement, alternatives, calibrated, named_effects, remainder
+from ..updating.several_judged import named_together
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
@@ -141,6 +142,12 @@ def _judged(
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
+    for more in reversed(found.sets):
+        whole = renewed(asked, prepared, more.hypothesis)
+        together, why_not = named_together(prepared, found, more, whole.hypothesis)
+        if together is not None:
+            return replace(together, notes=(*together.notes, whole.note)), whole.distrust
+        found = replace(found, notes=(*found.notes, why_not))
     if found.found is not None:
         lead = renewed(asked, prepared, found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
@@ -224,7 +231,7 @@ def _result(
     weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
     return DiagnosisResult(
         verdict=found.verdict,
-        effects=() if found.found is None else (named_effect(found.found),),
+        effects=named_effects(found),
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
@@ -277,13 +284,13 @@ def _scores(
     """Q of the three decks on fitted and held-out data, the noise, and what nuisances take."""
     winner = found.found or found.null
     sets = prepared.score.use, held_out(prepared, winner)
-    fault = found.found if found.verdict == "measurement fault" else None
+    named = found.found
     nominal = written_Q(asked, prepared, stages.nominal, sets, real)
     calibrated = final = nominal
     if stages.calibrated.model is not stages.nominal:
         final = calibrated = written_Q(asked, prepared, stages.calibrated.model, sets, real)
-    if fault is not None or stages.final is not stages.calibrated:
-        final = written_Q(asked, prepared, stages.final.model, sets, real, fault)
+    if named is not None or stages.final is not stages.calibrated:
+        final = written_Q(asked, prepared, stages.final.model, sets, real, named)
     fits = fitted_scores(prepared, found)
     first, second = (
         (q[0], q[1], q[2], noise_Q(prepared, use, real), fit.calibrated, fit.effect, fit.scatter)

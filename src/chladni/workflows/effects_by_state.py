@@ -20,8 +20,11 @@ def by_state(states: Sequence[StateResult]) -> list[str]:
 
 
 def _sentence(name: str, those: Sequence[tuple[str, NamedEffect]], count: int) -> str:
-    named = ", ".join(repr(state) for state, _ in those)
-    said = f"{name} is in {named}{' only' if len(those) < count else ', in every state'}"
+    having = list(dict.fromkeys(state for state, _ in those))
+    named = ", ".join(map(repr, having))
+    said = f"{name} is in {named}{' only' if len(having) < count else ', in every state'}"
+    if len(having) < len(those):
+        return f"{said}; where it is there twice, its places are not followed from state to state"
     changes = [
         f"from {a!r} to {b!r} {_moved(one, other)}, {_grown(one, other)}"
         for (a, one), (b, other) in pairwise(those)

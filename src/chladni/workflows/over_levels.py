@@ -24,8 +24,8 @@ def over_levels(
         return result
     if result.effects:
         note = (
-            f"modes move with level, which {result.effects[0].name} does not explain: it is that "
-            "of the level that was fitted"
+            f"modes move with level, which {' and '.join(e.name for e in result.effects)} does not "
+            "explain: it is that of the level that was fitted"
         )
         return replace(result, notes=(*result.notes, note))
     kept = () if result.verdict == "nothing missing" else result.calibrated

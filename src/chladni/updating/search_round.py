@@ -1,0 +1,148 @@
+"""One round of a search: candidates fitted, the best of every family followed to where it rests.
+
+The base of the round holds what was found before it, so that a later round asks what an effect
+explains beside the others.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects.effect import Effect
+from ..effects.search_context import Candidate
+from ..errors import ModelError
+from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
+from .likelihood import Responses
+from .map_fit import Status
+from .ties import simplest_first
+
+BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
+RUNNING = 3  # families that are fitted to the end, at rest or not
+LATER = 2  # of them in later rounds
+WHOLE = 6  # that keep a basis of their own, a sixth of a gigabyte each on a tailgate
+
+Say = Callable[[str, float], None]
+
+
+def search_round(
+    problem: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], progress: Say,
+    least: float | None = None,
+) -> list[HypothesisFit]:  # fmt: skip
+    """The best hypothesis of every family, best first.
+
+    Parameters
+    ----------
+    null : the best without any of them
+    least : gain in -2 ln evidence by rough fits, below which none is followed further
+    """
+    hypotheses: list[HypothesisFit] = []
+    later = least is not None  # the bases of the first round are still there
+    whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
+    for k, c in enumerate(tried):
+        progress(f"trying {c.effect.name} {c.effect.text}", 0.8 * k / len(tried))
+        fits = _tried(problem, null, c.effect, c.start, c.base)
+        hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
+    if least is not None and not _gained(null, hypotheses, least):
+        return simplest_first(hypotheses, null.neg2_log_evidence)
+    progress("closing in on the place", 0.8)
+    ahead, rest = hypotheses[:running], hypotheses[running:]
+    finished = [_finished(problem, t, True) for t in ahead]
+    rest = rest if later else [_finished(problem, t, False) for t in rest]
+    hypotheses = by_family([*finished, *rest])
+    closer = [t for lead in hypotheses[:running] for t in _closer(problem, lead)]
+    return simplest_first(by_family([*hypotheses, *closer]), null.neg2_log_evidence)
+
+
+def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
+    """Whether the best gains so much over the null."""
+    best = min((t.neg2_log_evidence for t in hypotheses), default=np.inf)
+    return bool(null.neg2_log_evidence - best > least)
+
+
+def _tried(
+    problem: UpdatingProblem,
+    null: HypothesisFit,
+    effect: Effect,
+    start: np.ndarray,
+    base: np.ndarray,
+) -> list[HypothesisFit]:
+    """Rough fits; the second begins at the null, where the first has not even come as far as that.
+
+    With the effect idle a hypothesis is the null: one that stays behind it by more than its price
+    has only stopped on the way. A start that is no structure at all (negative stiffness) is none.
+    """
+    out: list[HypothesisFit] = []
+    for x in (base, null.fit.x):
+        if out and out[0].neg2_log_evidence < null.neg2_log_evidence + BEHIND:
+            break
+        with suppress(ModelError):
+            out.append(problem.fitted_with(effect, start, x, ROUGH))
+    return out
+
+
+def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
+    """The best hypothesis of every family, best first."""
+    best: dict[str, HypothesisFit] = {}
+    for t in hypotheses:
+        if t.effect.name not in best or t.neg2_log_evidence < best[t.effect.name].neg2_log_evidence:
+            best[t.effect.name] = t
+    return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
+
+
+def _lighter(
+    problem: UpdatingProblem, hypotheses: list[HypothesisFit], whole: int
+) -> list[HypothesisFit]:
+    """All families; those far down and at rest keep their fit, not the basis made for it."""
+    out = hypotheses[:whole]
+    for t in hypotheses[whole:]:
+        if t.fit.status is Status.OUT_OF_STEPS:
+            out.append(t)
+            continue
+        fit = replace(t.fit, data=t.data.over(problem.reduced.model))
+        out.append(replace(t, fit=fit, model=problem.reduced.model))
+    return out
+
+
+def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool) -> HypothesisFit:
+    """A hypothesis in the running, or not yet at rest, fitted to the end from where it is."""
+    at_rest = hypothesis.fit.status is not Status.OUT_OF_STEPS
+    if not isinstance(problem.data, Responses) or (at_rest and not running):
+        return hypothesis
+    model, begun = hypothesis.model, hypothesis.fit
+    fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
+    if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
+        return replace(hypothesis, fit=fit)
+    return hypothesis
+
+
+def _closer(problem: UpdatingProblem, lead: HypothesisFit) -> list[HypothesisFit]:
+    """The leader begun anew about the place it moved to, while it moves."""
+    out: list[HypothesisFit] = []
+    for _ in range(3):
+        again = lead.effect.recentred(lead.fit.of(lead.effect), problem.where)
+        if again is None:
+            break
+        try:
+            hypothesis = problem.fitted_with(*again, taken(problem, lead, ("ordinary",)))
+        except ModelError:
+            break
+        out.append(hypothesis)
+        if hypothesis.neg2_log_evidence > lead.neg2_log_evidence - 1:
+            break
+        lead = hypothesis
+    return out
+
+
+def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
+    """Base parameters at their prior mean, those of these kinds as the leader has them.
+
+    What was found before stands as the leader has it too.
+    """
+    x, at = problem.mean(), 0
+    for e in problem.base:
+        if e in lead.fit.effects and (e.kind in kinds or e in lead.effects):
+            x[at : at + len(e.parameters)] = lead.fit.of(e)
+        at += len(e.parameters)
+    return x

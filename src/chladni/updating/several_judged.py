@@ -1,0 +1,80 @@
+"""Whether several effects may be named together: each must be borne by data that no fit saw.
+
+A second effect beside a first one that is a little off mops up what that leaves. Therefore each is
+asked beside all others, as the first is beside calibration alone; and all together must fit, and
+must be borne by the data held out against calibration alone.
+"""
+
+from dataclasses import replace
+
+from ..effects.effect import Effect
+from ..effects.registry import family
+from .diagnosis import Diagnosis, tested
+from .held_out_evidence import held_out_evidence
+from .hypothesis_fit import HypothesisFit
+from .outcome import carried, judged, said
+from .question import Prepared
+from .several import Several
+
+
+def named_together(
+    prepared: Prepared, alone: Diagnosis, more: Several, whole: HypothesisFit
+) -> tuple[Diagnosis | None, str]:
+    """The diagnosis with a set of effects named; or None, and why the set is not.
+
+    Parameters
+    ----------
+    alone : of the effects that were tried alone
+    whole : the set after its fit was renewed
+    """
+    lost = max(0.0, whole.neg2_log_evidence - more.hypothesis.neg2_log_evidence)
+    notes = [_found(more)]
+    for effect, gain, without in zip(more.own.effects, more.gains, more.without, strict=True):
+        heard = held_out_evidence(prepared.problem, prepared.unseen, without, more.own, more.about)
+        beside = f"{effect.name} beside {without.name}: {said(heard)}"
+        if not carried(gain - lost, heard, more.due):
+            return None, f"{_found(more)}; but data that no fit saw do not bear {beside}"
+        notes.append(f"asked of {beside}")
+    found = replace(
+        alone, hypotheses=(whole, *alone.hypotheses), gains=more.gains, notes=tuple(notes),
+        verdict="missing physics" if whole.physics else "measurement fault",
+    )  # fmt: skip
+    found = tested(found, prepared.problem)
+    if found.found is None:
+        return None, f"{_found(more)}; but {found.notes[-1]}"
+    found = judged(prepared, found)
+    if found.found is None:
+        return None, f"{_found(more)}; but {found.notes[-1]}"
+    return _with_rivals(found, more), ""
+
+
+def _found(more: Several) -> str:
+    """What was found together, and what each gains."""
+    gains = ", ".join(
+        f"{e.name} {g:.0f}" for e, g in zip(more.own.effects, more.gains, strict=True)
+    )
+    return (
+        f"{more.own.name} explain the recording together; beside the others each gains in -2 ln "
+        f"evidence: {gains} ({more.due:.0f} are needed)"
+    )
+
+
+def _with_rivals(found: Diagnosis, more: Several) -> Diagnosis:
+    """The diagnosis with the families that would do in the place of one of the set."""
+    for effect, rivals in zip(more.own.effects, more.rivals, strict=True):
+        if rivals:
+            return _tied(found, effect, rivals)
+    return found
+
+
+def _tied(found: Diagnosis, effect: Effect, rivals: tuple[tuple[str, float], ...]) -> Diagnosis:
+    names = (effect.name, *(name for name, _ in rivals))
+    check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)
+    behind = ", ".join(f"{name} by {gap:.0f}" for name, gap in rivals)
+    note = (
+        f"beside the others {effect.name} is not told apart by these data; behind it in -2 ln "
+        f"evidence: {behind}"
+    )
+    note = f"{note}; what would settle it: {check}" if check else note
+    one_of = (*names, check) if check else names
+    return replace(found, one_of=one_of, notes=(*found.notes, note))

@@ -1,0 +1,269 @@
+"""Several effects at once: each must pay, in whatever order they are found; one alone stays one."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.effects import point_mass, sensor_mass
+from chladni.effects.effect import Effect
+from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.ordinary import ordinary, random_field
+from chladni.effects.point_mass import PointMass
+from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
+from chladni.effects.surroundings import Setup
+from chladni.fem.energy import mass_properties
+from chladni.updating import candidates as scanned
+from chladni.updating import diagnosis as diagnosing
+from chladni.updating import several_judged
+from chladni.updating.candidates import candidates, repeats
+from chladni.updating.diagnosis import Diagnosis, threshold
+from chladni.updating.held_out_evidence import HeldOutEvidence, held_out_evidence
+from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, as_written, fitted
+from chladni.updating.likelihood import Responses
+from chladni.updating.map_fit import MassMeasurement
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.search_round import search_round
+from chladni.updating.several import _begun_with, _More, _paying, several
+from chladni.updating.several_judged import named_together
+
+SENSORS = [1, 7, 57, 63, 25, 39]
+TOP, LINES = 200.0, 30
+HELD = slice(-4, None)  # lines
+FEW = (point_mass.FAMILY, sensor_mass.FAMILY)
+
+
+@pytest.fixture(autouse=True)
+def few_families(monkeypatch):
+    """Two families are enough to go wrong with."""
+    monkeypatch.setattr(scanned, "families", lambda: FEW)
+
+
+def at(reduced, *xy):
+    """Position of the grid next to a place of the plate [m]."""
+    return int(np.argmin(np.linalg.norm(reduced.grids.point[:, :2] - xy, axis=1)))
+
+
+def problem_of(reduced, hidden, mass=0.0):
+    """The plate, seen at six sensors, with effects hidden in it: [(effect, x)]."""
+    rows = reduced.grids.rows[[reduced.grids.position(g) for g in SENSORS]]
+    s = 2 * np.pi * np.linspace(25, TOP, LINES) * (0.08 + 1j)
+    base = (ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.01))
+    shares = tuple(((g, 1.0),) for g in SENSORS)
+    setup = Setup(
+        shares, (SENSORS[1], SENSORS[3]), mass_properties(reduced.structure.assembly)[0], TOP
+    )
+    ones = np.ones((LINES, len(SENSORS), 1), complex)
+    use = np.ones(ones.shape[:2], bool)
+    use[HELD] = False
+    empty = Responses(ones, s, rows, rows[[4]], use)
+    weighed = MassMeasurement(setup.weight + mass, 1e-3 * setup.weight)
+    labels = tuple(f"{g}:+Z" for g in SENSORS)
+    problem = UpdatingProblem(reduced, empty.over(reduced.model), weighed, base, (), setup, labels)
+    hidden = [(of(problem.where), x) for of, x in hidden]
+    article = problem.holding(hidden)
+    state = evaluate(article.reduced.model, article.base, article.mean(), False)
+    noise = np.exp(0.003 * np.random.default_rng(1).normal(size=(2, *ones.shape)).T @ [1, 1j]).T
+    values = article.data.model(state) * noise
+    data = replace(problem.data, values=values)
+    nominal = evaluate(reduced.model, base, problem.mean(), False)
+    return replace(problem, data=data.allowing_errors(nominal))
+
+
+def lump(reduced, where, m):
+    """A mass of m times the median of its prior at a place, as :func:`problem_of` takes it."""
+    k = at(reduced, *where)
+    return (lambda there: PointMass.near(there, k)), np.array([np.log(m), 0.0, 0.0])
+
+
+def null_of(problem):
+    model = problem.reduced.model
+    fit = fitted(model, problem.base, problem.data, problem.mass_measurement, problem.mean())
+    return HypothesisFit(Effect(), fit, model)
+
+
+def singles_of(problem):
+    null = null_of(problem)
+    return search_round(problem, null, candidates(problem, null), lambda text, share: None)
+
+
+def places(hypothesis):
+    """Names and places [cm] of a set, in an order of their own."""
+    where = [e.location(hypothesis.fit.of(e)).point_m for e in hypothesis.effects]
+    return sorted(
+        (e.name, *np.round(p or (0, 0, 0), 2))
+        for e, p in zip(hypothesis.effects, where, strict=True)
+    )
+
+
+HERE, THERE = (0.1, 0.05), (0.3, 0.25)
+DUE = threshold(object.__new__(Responses))
+
+
+@pytest.fixture(scope="module")
+def two(reduced):
+    """Two lumps, one twice the other."""
+    one, other = lump(reduced, HERE, 1.0), lump(reduced, THERE, 2.0)
+    weight = 0.03 * mass_properties(reduced.structure.assembly)[0]
+    return problem_of(reduced, [one, other], 3 * weight)
+
+
+@pytest.fixture(scope="module")
+def found(two):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scanned, "families", lambda: FEW)
+        singles = singles_of(two)
+        return singles, several(two, singles, DUE, False)
+
+
+def test_two_lumps_are_two_each_at_its_place(found):
+    singles, search = found
+    assert len(singles[0].effects) == 1
+    (both,) = search.sets
+    assert [e.name for e in both.own.effects] == ["point-mass", "point-mass"]
+    known = [e.location(both.own.fit.of(e)).point_m[:2] for e in both.own.effects]
+    for where in (HERE, THERE):
+        assert min(np.linalg.norm(np.subtract(p, where)) for p in known) < 0.02
+    assert both.hypothesis.neg2_log_evidence < singles[0].neg2_log_evidence - both.due
+
+
+def test_each_gains_what_the_others_lose_without_it(two, found):
+    both = found[1].sets[-1]
+    assert min(both.gains) > both.due > DUE
+    assert both.gains[0] >= both.gains[1]
+    for gain, without in zip(both.gains, both.without, strict=True):
+        assert gain == pytest.approx(without.neg2_log_evidence - both.own.neg2_log_evidence)
+        assert len(without.effects) == 1
+
+
+def test_each_is_borne_by_lines_that_no_fit_saw(two, found):
+    """Asked beside the other, of what was held out and of folds of what was fitted."""
+    both = found[1].sets[-1]
+    for without in both.without:
+        heard = held_out_evidence(two, ~two.data.use, without, both.own, both.about)
+        assert min(heard.votes.values()) > 0
+        assert len(heard.votes) == 3
+
+
+def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
+    """Begun with either of the two, at its own place, the search ends with both."""
+    ends = [places(found[1].sets[-1].own)]
+    null = null_of(two)
+    for where in (HERE, THERE):
+        of, x = lump(reduced, where, 1.5)
+        alone = two.fitted_with(of(two.where), x, null.fit.x)
+        ends.append(places(_begun_with(two, alone, DUE, lambda text, share: None).sets[-1].own))
+    assert ends[0] == ends[1] == ends[2]
+
+
+def test_one_effect_stays_one(reduced):
+    """Beside the only one that is there nothing pays, and the note says by how much."""
+    weight = 0.03 * mass_properties(reduced.structure.assembly)[0]
+    problem = problem_of(reduced, [lump(reduced, HERE, 1.5)], 1.5 * weight)
+    search = several(problem, singles_of(problem), DUE, False)
+    assert not search.sets
+    assert "are needed" in search.note
+
+
+def test_a_mass_of_sensors_beside_a_lump(reduced):
+    """Two families, the weaker of which stands at known places and is not on the scales."""
+    weight = 0.03 * mass_properties(reduced.structure.assembly)[0]
+    lumped = lump(reduced, THERE, 1.5)
+    hidden = [lumped, (lambda there: masses_of_sensors(there)[0], np.array([0.3]))]
+    problem = problem_of(reduced, hidden, 1.5 * weight)
+    (both,) = several(problem, singles_of(problem), DUE, False).sets
+    assert sorted(e.name for e in both.own.effects) == ["point-mass", "sensor-mass"]
+
+
+def test_what_does_not_pay_goes(two, found):
+    """A third that stands beside the two and does nothing is dropped."""
+    both = found[1].sets[-1]
+    held = two.holding([(e, both.own.fit.of(e)) for e in both.own.effects])
+    held = replace(held, data=both.own.data.over(held.reduced.model))
+    idle = masses_of_sensors(two.where)[0]
+    three = held.fitted_with(idle, np.array([-6.0]), held.mean())
+    left = _paying(two, _More(three, {}, {}, both.about), both.due)
+    assert idle not in left.own.effects
+    assert places(left.own) == places(both.own)
+
+
+def test_what_has_a_place_stands_at_one_of_its_own(two, found):
+    """The same lump again, one beside it, or a spring in its place is none; one elsewhere is."""
+    both = found[1].sets[-1]
+    e = both.own.effect
+    x = both.own.fit.of(e)
+    held = two.holding([(e, x)])
+    assert repeats(held, e, x)
+    k = two.where.grids.position(e.nearest(x))
+    assert repeats(held, PointMass.near(two.where, k), np.zeros(3))
+    assert repeats(held, ExtraSupport.near(two.where, k), np.zeros(5))
+    away = PointMass.near(two.where, at(two.reduced, *HERE))
+    there = PointMass.near(two.where, at(two.reduced, *THERE))
+    held = two.holding([(there, np.zeros(3))])
+    assert not repeats(held, away, np.zeros(3))
+    assert not repeats(held, masses_of_sensors(two.where)[0], np.zeros(1))
+
+
+def test_what_is_written_holds_all_that_was_found(found):
+    """Both stand in the deck as they were found; scatter is gone."""
+    both = found[1].sets[-1]
+    deck = as_written(both.hypothesis, None)
+    assert len(deck.effects) == 2
+    assert [e.name for e in deck.fit.effects] == ["part-scale", "point-mass", "point-mass"]
+    for e, was in zip(deck.effects, both.hypothesis.effects, strict=True):
+        assert deck.fit.of(e) == pytest.approx(both.hypothesis.fit.of(was), abs=5e-3)
+
+
+def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monkeypatch):
+    """A null costs nothing and stays one."""
+    null = SimpleNamespace(data=SimpleNamespace(error=1))
+    fits = SimpleNamespace(passes=True, p=0.5, what="", where="")
+    lead = SimpleNamespace(effect=SimpleNamespace(name="point-mass"))
+    monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
+    monkeypatch.setattr(diagnosing, "adequacy", lambda *given, **more: fits)
+    quiet = Diagnosis(null, null, null, (lead,), "nothing missing")
+    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None)
+    found = diagnosing._searched_beside(problem, quiet, lambda text, share: None)
+    assert (found.verdict, found.sets) == ("nothing missing", ())
+
+
+GOOD, BAD = HeldOutEvidence(50.0, 50.0, 50.0), HeldOutEvidence(-DUE - 9, 50.0, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("heard", "fits", "borne", "named"),
+    [
+        ((GOOD, GOOD), True, True, True),
+        ((GOOD, BAD), True, True, False),  # one of them is refused by data that no fit saw
+        ((GOOD, GOOD), False, True, False),  # together they do not fit
+        ((GOOD, GOOD), True, False, False),  # together they are refused against calibration
+    ],
+)
+def test_all_must_be_borne_by_data_that_no_fit_saw(monkeypatch, found, heard, fits, borne, named):
+    both, answers = found[1].sets[-1], iter(heard)
+    refused = lambda d: replace(d, verdict="not in catalogue", notes=(*d.notes, "no"))  # noqa: E731
+    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: next(answers))
+    monkeypatch.setattr(several_judged, "tested", lambda d, p: d if fits else refused(d))
+    monkeypatch.setattr(several_judged, "judged", lambda p, d: d if borne else refused(d))
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics")
+    prepared = SimpleNamespace(problem=None, unseen=None)
+    answer, why = named_together(prepared, alone, both, both.hypothesis)
+    assert (answer is not None) == named
+    assert bool(why) != named
+    if answer is not None:
+        assert answer.found is both.hypothesis
+        assert answer.gains == both.gains
+
+
+def test_a_renewed_fit_that_lost_the_gain_is_not_named(monkeypatch, found):
+    both = found[1].sets[-1]
+    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
+    fit = both.hypothesis.fit
+    worse = replace(fit, neg2_log_evidence=fit.neg2_log_evidence + min(both.gains))
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics")
+    prepared = SimpleNamespace(problem=None, unseen=None)
+    renewed = replace(both.hypothesis, fit=worse)
+    assert named_together(prepared, alone, both, renewed)[0] is None
