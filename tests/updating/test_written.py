@@ -62,6 +62,8 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
         (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), 2.0, REST),
         (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
         (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
+        (1.9 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), 1.1, LITTLE),  # faint, and serves no better
+        (2.1 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), 1.1, NAMED),
         (1.9 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, LITTLE),
         (2.1 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, REST),  # the data are at odds
     ],

@@ -91,9 +91,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
     The fitted data must carry a name after the fit was renewed.  The others refuse it as surely:
     where they speak against it by the gain that would be needed to name it, where less than that is
-    left of all data together, or where the deck with the effect does harm.  Data that cannot feel
-    the effect are predicted alike without it and have no vote.  Where all data together, or what
-    was fitted by far, still want more than calibration, what is missing is not in the catalogue.
+    left of all data together, or where the deck with the effect does harm: by far, or at all where
+    the fitted data bear the name by less than twice the gain due.  Data that cannot feel the effect
+    are predicted alike without it and have no vote.  Where all data together, or what was fitted by
+    far, still want more than calibration, what is missing is not in the catalogue.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -104,7 +105,9 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     held = fitted_scores(prepared, diagnosis)[1]
     together = gain + (heard.held_out or 0.0)
     due = threshold(diagnosis.null.data)
-    if carried(gain, heard, due) and not held.effect > HARM * held.calibrated:
+    borne = carried(gain, heard, due) and not held.effect > HARM * held.calibrated
+    faint = gain < CONFLICT * due and held.effect > held.calibrated
+    if borne and not faint:
         notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
     note = (
@@ -115,7 +118,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
     refused = replace(diagnosis, verdict=plainly, notes=notes, written=None)
-    if together > due:
+    if together > due and not borne:
         return _unexplained(refused, lead, together, "all data")
     if gain > CONFLICT * due:
         return _unexplained(refused, lead, gain, "what was fitted")
