@@ -21,6 +21,7 @@ LARGE = 20_000  # dofs from which the refined modes are solved for no farther th
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
+SOFTEST = 0.45  # share of a mode's stiffness that a finer mesh may take: twice it leaves some
 FOOTPRINT = 0.5, 0.7  # the same of footprints: as the deck has them, half as wide, or a quarter
 REGIONS = 4  # of joints whose footprints differ by themselves; each is a refined structure solved
 
@@ -128,10 +129,12 @@ def _nowhere(built: Structure) -> sp.csr_array:
 class _ModalChange:
     """What another mesh changes over the modes of the deck MΦ (n, r).
 
-    ``stiffness`` (r, r) of the modal stiffness, ``seen`` (p, r) of the modes where it was measured.
+    ``stiffness`` (r, r) of the modal stiffness λ (r,), ``seen`` (p, r) of the modes where it was
+    measured.
     """
 
     M_phi: np.ndarray
+    lam: np.ndarray
     stiffness: np.ndarray
     seen: np.ndarray
 
@@ -142,10 +145,22 @@ class _ModalChange:
 
     def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
         """The nuisance of this change."""
-        change, V = np.linalg.eigh(self.stiffness)
+        change, V = np.linalg.eigh(self._within_reach())
         unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
         rows = sp.csr_array((self.M_phi @ V).T)
         return kind((unknown,), "every mode", rows=rows, change=change, shapes=self.seen @ V)
+
+    def _within_reach(self) -> np.ndarray:
+        """The change of stiffness, of far too coarse a mesh no more than it can lose twice over.
+
+        It is laid out as linear, and a mode of five shells a wave loses more than there is.
+        """
+        root = np.sqrt(self.lam)
+        share, V = np.linalg.eigh(self.stiffness / np.outer(root, root))
+        if share.min(initial=0.0) > -SOFTEST:
+            return self.stiffness
+        W = root[:, None] * V
+        return np.asarray((W * np.maximum(share, -SOFTEST)) @ W.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +188,7 @@ class _CoarseModes:
         stiffness, seen = np.zeros((len(self.lam),) * 2), np.zeros_like(self.at_places)
         stiffness[np.ix_(own, own)] = (B * lam) @ B.T - np.diag(self.lam[own])
         seen[:, own] = self.places(finer) @ modes.shapes[:, partner] @ B.T - self.at_places[:, own]
-        return _ModalChange(self.M_phi, (stiffness + stiffness.T) / 2, seen)
+        return _ModalChange(self.M_phi, self.lam, (stiffness + stiffness.T) / 2, seen)
 
 
 def modal_discrepancy(

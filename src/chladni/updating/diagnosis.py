@@ -209,9 +209,14 @@ def _random_starts(problem: UpdatingProblem, count: int = 4) -> list[np.ndarray]
 def _base_fit(
     problem: UpdatingProblem, effects: Sequence[Effect], starts: list[np.ndarray]
 ) -> HypothesisFit:
-    """Best fit of these effects alone over several starts."""
-    model = problem.reduced.model
-    fits = [fitted(model, effects, problem.data, problem.mass_measurement, x) for x in starts]
+    """Best fit of these effects alone over several starts; one that is no structure is none."""
+    model, fits = problem.reduced.model, []
+    for k, x in enumerate(starts):
+        try:
+            fits.append(fitted(model, effects, problem.data, problem.mass_measurement, x))
+        except ModelError:
+            if not fits and k == len(starts) - 1:
+                raise
     return HypothesisFit(Effect(), min(fits, key=lambda f: f.neg2_log_evidence), model)
 
 

@@ -56,10 +56,11 @@ def _module(name: str) -> ModuleType:
 
 
 def _read(path: Path | str, kind: str) -> dict[str, Any]:
-    if not Path(path).is_file():
-        raise FileError(f"{path} does not exist")
-    refuse_large(Path(path))
+    if found := Path(path).is_file():
+        refuse_large(Path(path))
     module = _module(kind)
+    if not found:
+        raise FileError(f"{path} does not exist")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's own making
         try:
