@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from chladni.ema import propagation
 from chladni.ema.correlation import mac
 from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mac_significance import best_half, chance_of, effective_channels, likeness
@@ -13,7 +14,7 @@ from chladni.ema.modal_covariance import modal_covariance, thinned
 from chladni.ema.pole_fitting import solve
 from chladni.ema.propagation import propagated
 from chladni.ema.response_variance import frf_variance
-from chladni.ema.shapes import real_shapes, shape_covariance, shape_sd, shapes
+from chladni.ema.shapes import real_shapes, shape_covariance, shape_sd, shape_spread, shapes
 from chladni_evidence.identification_evidence import recording, structure
 
 SEEDS, CHANNELS, MODES = 30, 6, 4
@@ -172,6 +173,17 @@ def test_thinned_lines_lose_little(noise):
         return np.sqrt((c.shared**2).sum(axis=-1) + np.diagonal(c.local, axis1=2, axis2=3))
 
     np.testing.assert_allclose(sd(thin)[whole.inside], sd(full)[whole.inside], rtol=0.2)
+
+
+def test_modes_may_be_taken_one_after_the_other(found, monkeypatch):
+    """So many at a time as memory holds; the standard deviations are roots of the diagonal."""
+    whole, sd = shape_covariance(found[0]), shape_spread(found[0])
+    np.testing.assert_allclose(sd**2, np.trace(whole, axis1=1, axis2=2), rtol=1e-9)
+    monkeypatch.setattr(propagation, "_TOGETHER", 1)
+    np.testing.assert_allclose(shape_covariance(found[0]), whole, rtol=1e-9, atol=1e-30)
+    none = found[0].sel(np.zeros(MODES, bool))
+    assert len(shape_spread(none)) == 0
+    assert shape_sd(none).shape == (CHANNELS, 0)
 
 
 def test_no_covariance_is_said(found):

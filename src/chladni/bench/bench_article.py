@@ -30,6 +30,9 @@ class BenchArticle:
     masses : (n_out,)           of each sensor [kg]; 0: as its type weighs
     gains : (n_out,)            factor on every channel that nobody knows of (miswired, mistyped)
     output_labels, input_label  as 412:+Z
+    base : (r,)                 on a shaker table: load of a unit acceleration of the supports on
+                                the modes [√kg]; none elsewhere
+    carried, mounts_carried : (n_out,), (n_out, 3)  what outputs and mounts do when nothing deforms
     """
 
     name: str
@@ -46,6 +49,9 @@ class BenchArticle:
     laws: tuple[LocalForce, ...] = ()
     masses: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    base: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    carried: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    mounts_carried: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         r, n = len(self.frequency), len(self.output_labels)
@@ -57,10 +63,17 @@ class BenchArticle:
         due = {"damping": (r,), "outputs": (n, r), "mounts": (n, 3, r), "drive": (6, r),
                "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r),
                "gains": (n,), "masses": (n,)}  # fmt: skip
+        if self.on_table:
+            due |= {"base": (r,), "carried": (n,), "mounts_carried": (n, 3)}
         for name, shape in due.items():
             if (found := np.shape(getattr(self, name))) != shape:
                 raise ShapeError(f"{name} is {found}, modes, labels and laws say {shape}")
             object.__setattr__(self, name, readonly(getattr(self, name)))
+
+    @property
+    def on_table(self) -> bool:
+        """Whether its supports are moved, in place of a force."""
+        return len(self.base) > 0
 
     @property
     def elastic(self) -> np.ndarray:
@@ -73,4 +86,5 @@ class BenchArticle:
         """The article whose modes are Φ Q, Q (r, r) orthogonal."""
         parts = ("outputs", "mounts", "drive", "hangers", "sites")
         seen = {part: getattr(self, part) @ Q for part in parts}
+        seen["base"] = self.base @ Q if self.on_table else self.base
         return replace(self, name=name, frequency=frequency, damping=damping, **seen)

@@ -36,7 +36,7 @@ class BenchTest:
     excitation : burst-random, stepped-sine, multisine or hammer
     band : [Hz]
     level : N; of the coil's force the rms while a burst or multisine lasts, of the measured force
-        the amplitude of a sine, of a blow its peak
+        the amplitude of a sine, of a blow its peak; on a shaker table m/s² of it in place of N
     resolution : distance of lines of burst random and multisine [Hz]
     averages : bursts, periods of a multisine, blows
     sweeps : of a stepped sine
@@ -102,7 +102,7 @@ class Channels:
 
 def channels_of(rig: BenchRig, rng: np.random.Generator) -> Channels:
     """The sensors of a test with the sensitivities they happen to have."""
-    kind, gauge, n = rig.setup.accelerometer, rig.setup.gauge, len(rig.article.outputs)
+    kind, gauge, n = rig.setup.accelerometer, rig.reference, len(rig.article.outputs)
     stated = np.r_[gauge.sensitivity, np.full(n, kind.sensitivity)]
     true = stated * np.r_[1.0, rig.article.gains * drawn_gains(kind, n, rng)]
     return Channels(true, stated, np.abs(true) * np.r_[gauge.noise, np.full(n, kind.noise)])
@@ -126,7 +126,7 @@ def level_for(rig: BenchRig, excitation: Kind, band: tuple[float, float]) -> flo
         rows = np.abs(m.c[1:] * m.b[:, 0])[:, np.abs(m.poles) < 2 * np.pi * band[1]]
         return float(2 * ROOM * front.volts / (width * rows.sum(axis=1).max() * kind.sensitivity))
     rms = pink_rms(f, H)
-    volts = rms * np.r_[rig.setup.gauge.sensitivity, np.full(len(rms) - 1, kind.sensitivity)]
+    volts = rms * np.r_[rig.reference.sensitivity, np.full(len(rms) - 1, kind.sensitivity)]
     return float(ROOM_RANDOM * front.volts / volts.max())
 
 
@@ -148,7 +148,8 @@ def record(
     ModelError
         If a hammer is to hit an article with a shaker, or a shaker is to drive one without.
     """
-    if (test.excitation == "hammer") != (rig.setup.shaker is None):
+    driven = rig.article.on_table or rig.setup.shaker is not None
+    if (test.excitation == "hammer") == driven:
         raise ModelError("a hammer hits an article without a shaker, anything else needs one")
     rate = sampling_rate(test.band[1])
     channels = channels or channels_of(rig, rng)
@@ -169,7 +170,7 @@ def record(
     found = estimate(time, EstimateSettings(excitation=kind, band=test.band))  # type: ignore[arg-type]
     named = {name: int(c) for name, c in zip(time.channels, over, strict=True) if c}
     return BenchRecording(
-        rig.article.name, test, found.frf, found.averages, time if keep_time else None,
+        rig.article.name, test, rig.called(found.frf), found.averages, time if keep_time else None,
         time_record_of(rig, blocks[:1], rate), named,
         added_damping=found.added_damping, truth=rig.frf(found.frf.frequency), notes=found.notes,
     )  # fmt: skip

@@ -1,9 +1,11 @@
 """Article, accelerometers, cords, stinger, gauge and shaker as one system, by its poles."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..dynamics.frf import FRF
+from ..errors import ModelError
 from .accelerometers import AccelerometerType, shown
 from .bench_article import BenchArticle
 from .cords import INNER, Cord, cord_matrices, cords_for
@@ -44,7 +46,8 @@ class BenchRig:
     """Outputs: the force as the gauge feels it [N], every accelerometer [m/s²], every opening [m].
 
     Its inputs: what drives (force of the coil, or of the hammer) [N], the sources of the room where
-    it is loud, then a force at every site.
+    it is loud, then a force at every site. On a shaker table the first of both is its acceleration
+    [m/s²].
     """
 
     article: BenchArticle
@@ -55,6 +58,18 @@ class BenchRig:
     def measured(self) -> PoleModel:
         """Force and accelerations."""
         return self.model.outputs(slice(0, 1 + len(self.article.outputs)))
+
+    @property
+    def reference(self) -> ForceGauge:
+        """What feels the drive: a force gauge, or an accelerometer on the table."""
+        kind = self.setup.accelerometer
+        if self.article.on_table:
+            return ForceGauge(0.0, 0.0, kind.sensitivity, kind.noise)
+        return self.setup.gauge
+
+    def called(self, frf: FRF) -> FRF:
+        """Its quantity: motion over the table's motion, or acceleration over force."""
+        return replace(frf, quantity="transmissibility") if self.article.on_table else frf
 
     @property
     def of_room(self) -> PoleModel:
@@ -91,8 +106,16 @@ class _Matrices:
 
 
 def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRig:
-    """Couple all that is on the bench, and find its poles."""
+    """Couple all that is on the bench, and find its poles.
+
+    Raises
+    ------
+    ModelError
+        If an article on a shaker table is to have a shaker beside, or local forces.
+    """
     setup = setup or BenchSetup()
+    if article.on_table and (setup.shaker is not None or article.laws):
+        raise ModelError("a shaker table moves the supports: no shaker and no local forces beside")
     r = len(article.frequency)
     usual = cords_for(article.weight, len(article.hangers), setup.rubber)
     cords = usual if setup.cords is None else setup.cords
@@ -109,7 +132,11 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     m.M += mounts.T @ (np.repeat(each, 3)[:, None] * mounts)
     _hang(m, over(article.hangers), cords, r)
     load, P, through = np.zeros((n, 1)), [np.zeros((1, n)) for _ in range(3)], np.ones((1, 1))
-    if setup.shaker is not None:
+    if article.on_table:
+        load = over(article.base[None]).T
+        carried = np.repeat(each, 3) * article.mounts_carried.ravel()
+        load -= (carried @ mounts)[:, None]
+    elif setup.shaker is not None:
         load[-1], through = 1.0, np.zeros((1, 1))
         P = _shake(m, over(article.drive), setup.shaker)
     else:
@@ -125,6 +152,8 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     push = np.hstack([load, room, sites.T])
     whole = np.zeros((len(at), push.shape[1]))
     whole[0, 0] = through[0, 0]
+    if article.on_table:
+        whole[1 : 1 + len(felt), 0] = article.carried
     model = by_poles((m.M, m.C, m.K), push, (at, speed, force), whole)
     return BenchRig(article, setup, _through_sensors(model, setup, len(article.outputs)))
 

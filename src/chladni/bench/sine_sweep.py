@@ -110,7 +110,7 @@ def _averaged(rig: BenchRig, f: np.ndarray, found: np.ndarray) -> FRF:
         (np.einsum("sfo,sf->fo", Y, F.conj()) / n)[:, :, None],
         (np.abs(Y) ** 2).mean(axis=0), float(n),
     )  # fmt: skip
-    return estimated(s, rig.article.output_labels, (rig.article.input_label,))
+    return rig.called(estimated(s, rig.article.output_labels, (rig.article.input_label,)))
 
 
 def _clipping(amplitude: np.ndarray, limit: float) -> np.ndarray:

@@ -1,19 +1,24 @@
 """Covariance of numbers that are made of each identified mode by itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from .identification import Identified
+from .modal_covariance import ModalCovariance
 
 _STEP = 1e-5  # of a mode's residues and pole, for slopes of what is made of them
+_TOGETHER = 10_000_000  # slopes held at once
+
+Made = Callable[[Identified], np.ndarray]
 
 
-def propagated(identified: Identified, made: Callable[[Identified], np.ndarray]) -> np.ndarray:
+def propagated(identified: Identified, made: Made) -> np.ndarray:
     """Covariance (r, k, k) of k real numbers that are made of each mode's own pole and residues.
 
-    J C Jᵀ with J by central differences.
+    J C Jᵀ with J by central differences. Where the numbers are a shape, whose sign is free, it is
+    held.
 
     Parameters
     ----------
@@ -24,26 +29,61 @@ def propagated(identified: Identified, made: Callable[[Identified], np.ndarray])
     ValueError
         If the identification holds no covariance.
     """
-    C = identified.covariance
-    if C is None:
+    parts = []
+    for J, C in _parts(identified, made):
+        own = _by_channel(J)
+        through = J @ _root(C)
+        local = np.einsum("rkci,rcij,rlcj->rkl", own, C.local, own, optimize=True)
+        parts.append(through @ through.transpose(0, 2, 1) + local)
+    return np.concatenate(parts) if parts else np.zeros((0, 0, 0))
+
+
+def standard_deviations(identified: Identified, made: Made) -> np.ndarray:
+    """The roots of its diagonal (r, k), without the rest."""
+    parts = []
+    for J, C in _parts(identified, made):
+        own = _by_channel(J)
+        variance = ((J @ _root(C)) ** 2).sum(axis=2)
+        parts.append(variance + np.einsum("rkci,rcij,rkcj->rk", own, C.local, own, optimize=True))
+    found = np.concatenate(parts) if parts else made(identified)
+    return np.asarray(np.sqrt(np.maximum(found, 0.0)))
+
+
+def _parts(identified: Identified, made: Made) -> Iterator[tuple[np.ndarray, ModalCovariance]]:
+    """Slopes and covariance of some modes after the other, as many as fit into memory."""
+    if identified.covariance is None:
         raise ValueError("this identification holds no covariance of its modes")
-    J = _slopes(identified, made)
-    n_c = C.local.shape[1]
+    if not identified.order:
+        return
+    k = made(identified).shape[1]
+    step = max(1, _TOGETHER // (k * (2 + 2 * identified.lower.size)))
+    for first in range(0, identified.order, step):
+        one = identified.sel(slice(first, first + step))
+        assert one.covariance is not None
+        yield _slopes(one, made), one.covariance
+
+
+def _root(C: ModalCovariance) -> np.ndarray:
+    """Of pole and residues of every mode (r, 2 + 2 n_c, m)."""
     root = np.concatenate([C.pole[:, None], C.shared], axis=1)
-    root = root.reshape(len(root), 2 + 2 * n_c, -1)
-    through = J @ root
-    own = J[:, :, 2:].reshape(*J.shape[:2], n_c, 2)
-    return np.asarray(
-        through @ through.transpose(0, 2, 1)
-        + np.einsum("rkci,rcij,rlcj->rkl", own, C.local, own, optimize=True)
-    )
+    return root.reshape(len(root), -1, root.shape[-1])
 
 
-def _slopes(identified: Identified, made: Callable[[Identified], np.ndarray]) -> np.ndarray:
+def _by_channel(J: np.ndarray) -> np.ndarray:
+    """Slopes of the residues (r, k, n_c, 2)."""
+    return J[:, :, 2:].reshape(*J.shape[:2], -1, 2)
+
+
+def _slopes(identified: Identified, made: Made) -> np.ndarray:
     """d made / d(Re p, Im p, Re R, Im R channel by channel) of every mode (r, k, 2 + 2 n_c)."""
-    p, R = identified.poles, identified.residues
-    n_c = R[0].size if len(R) else 0
-    columns = []
+    p, R, due = identified.poles, identified.residues, made(identified)
+
+    def held(moved: Identified) -> np.ndarray:
+        found = made(moved)
+        return found * np.where((found * due).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+
+    n_c = R[0].size
+    J = np.empty((*due.shape, 2 + 2 * n_c))
     for at in range(2 + 2 * n_c):
         turn = 1j if at % 2 else 1.0
         if at < 2:
@@ -55,5 +95,5 @@ def _slopes(identified: Identified, made: Callable[[Identified], np.ndarray]) ->
             unit[at // 2 - 1] = 1.0
             by = turn * h[:, None, None] * unit.reshape(R.shape[1:])
             moved = [replace(identified, residues=R + sign * by) for sign in (1, -1)]
-        columns.append((made(moved[0]) - made(moved[1])) / (2 * h[:, None]))
-    return np.stack(columns, axis=2)
+        J[:, :, at] = (held(moved[0]) - held(moved[1])) / (2 * h[:, None])
+    return J

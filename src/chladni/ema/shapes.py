@@ -12,7 +12,7 @@ from ..dofs import parse
 from ..dynamics.modes import ModalModel
 from ..errors import LabelError
 from .identification import Identified
-from .propagation import propagated
+from .propagation import propagated, standard_deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +67,7 @@ def shape_covariance(identified: Identified) -> np.ndarray:
     ValueError
         If the identification holds no covariance.
     """
-    due = real_shapes(identified).T
-
-    def made(moved: Identified) -> np.ndarray:
-        found = real_shapes(moved).T
-        return found * np.where((found * due).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-
-    return propagated(identified, made)
+    return propagated(identified, lambda moved: real_shapes(moved).T)
 
 
 def shape_sd(identified: Identified) -> np.ndarray:
@@ -84,17 +78,19 @@ def shape_sd(identified: Identified) -> np.ndarray:
     ValueError
         If the identification holds no covariance.
     """
-    due = shapes(identified).values.T
 
     def made(moved: Identified) -> np.ndarray:
         found = shapes(moved).values.T
-        overlap = (found * due.conj()).real.sum(axis=1, keepdims=True)
-        found = found * np.where(overlap < 0, -1.0, 1.0)
         return np.concatenate([found.real, found.imag], axis=1)
 
-    variance = np.maximum(np.diagonal(propagated(identified, made), axis1=1, axis2=2), 0.0)
-    real, imag = np.split(np.sqrt(variance), 2, axis=1)
+    real, imag = np.split(standard_deviations(identified, made), 2, axis=1)
     return np.asarray((real + 1j * imag).T)
+
+
+def shape_spread(identified: Identified) -> np.ndarray:
+    """Rms length by which noise moves each unit shape, √tr C (r,): 1 - MAC is its square."""
+    sd = standard_deviations(identified, lambda moved: real_shapes(moved).T)
+    return np.asarray(np.linalg.norm(sd, axis=1))
 
 
 def shapes(identified: Identified) -> MeasuredShapes:

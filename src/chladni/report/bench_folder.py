@@ -16,7 +16,7 @@ from ..io.uff.estimate_stamp import stamp
 from ..io.uff.write_time import write_time_uff
 from ..io.uff.write_uff import write_uff
 from ..output import write_json, write_text
-from ..workflows.virtual_test import BenchResult
+from ..workflows.virtual_test import BenchResult, level_unit
 
 Files = list[tuple[str, str]]
 CLEAR = 0.04  # of a cord's frequency to either side: two of its half-bandwidths
@@ -32,9 +32,12 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
     names = file_names(found.recordings)
     files: Files = [("case/case.toml", "a case with these recordings")]
     nodes = found.outputs.nodes | found.inputs.nodes  # as the user believes
+    unit = level_unit(found.inputs)
     for name, r in zip(names, found.recordings, strict=True):
         write_uff(place / f"{name}.uff", r.frf, nodes, stamp(r.averages, r.added_damping))
-        files.append((f"case/{name}.uff", f"FRFs of article {r.article}, {r.test.level:.3g} N"))
+        files.append(
+            (f"case/{name}.uff", f"FRFs of article {r.article}, {r.test.level:.3g} {unit}")
+        )
         if r.time is not None:
             write_time_uff(place / f"{name}_time.uff", r.time, nodes)
             files.append((f"case/{name}_time.uff", "its time data, for chladni test"))
@@ -47,9 +50,10 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
 def file_names(recordings: tuple[BenchRecording, ...]) -> list[str]:
     """article_A, with the level where there are several of one article."""
     count = Counter(r.article for r in recordings)
+    unit = ["" if r.frf.quantity == "transmissibility" else "N" for r in recordings]
     return [
-        f"article_{r.article}" + f"_{r.test.level:.3g}N" * (count[r.article] > 1)
-        for r in recordings
+        f"article_{r.article}" + f"_{r.test.level:.3g}{u}" * (count[r.article] > 1)
+        for r, u in zip(recordings, unit, strict=True)
     ]
 
 
@@ -63,7 +67,8 @@ def _sensors(found: BenchResult) -> str:
     masses = np.where(found.outputs.mass > 0, found.outputs.mass, usual)
     for row in _rows(found.outputs, "output", masses):
         write(row)
-    write(_rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[0])
+    if not found.inputs.base[0]:  # its label says all there is to a table
+        write(_rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[0])
     return text.getvalue()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..bench.bench_recording import BenchRecording
 from ..dynamics.frf import UNIT
-from ..workflows.virtual_test import BenchResult
+from ..workflows.virtual_test import BenchResult, level_unit
 from .blocks import Block, Facts, PageParts, Picture, Section, Table
 from .words import number
 
@@ -25,14 +25,15 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
         path = folder / "schedule.png"
         lines = np.array([(x.frequency, x.delay, x.measure) for x in found.schedule])
         f, delay, measure = lines.T
-        bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient)
+        drive = _drive(found)
+        bench_plots.sine_schedule(path, f, delay, measure, first.force, first.transient, drive)
         blocks.append(Picture(path, "The schedule; force and transient of every line of article "
                               f"{first.article}, all sweeps (largest transient of any channel, "
                               "antiresonances included)."))  # fmt: skip
         files.append((path.name, "the schedule of the stepped sine"))
     if first.sample is not None:
-        blocks.append(Picture(_time(folder / "time.png", first), "One block as the front end "
-                              "recorded it."))  # fmt: skip
+        path = _time(folder / "time.png", first, _drive(found))
+        blocks.append(Picture(path, "One block as the front end recorded it."))
         files.append(("time.png", "one block of time data"))
     k = _typical(first)
     path = folder / "frf.png"
@@ -41,7 +42,7 @@ def bench_page(folder: Path, found: BenchResult) -> PageParts:
     name = f"{frf.outputs[k]} from {frf.inputs[0]}, article {first.article}"
     bench_plots.frf_over_coherence(
         path, frf.frequency, frf.values[:, k, 0], first.truth[:, k], coherence, name,
-        UNIT["accelerance"],
+        UNIT.get(frf.quantity, ""),
     )  # fmt: skip
     blocks.append(Picture(path, "An FRF as it was estimated, and as an ideal front end with ideal "
                           "sensors at the same places would have it."))  # fmt: skip
@@ -60,7 +61,7 @@ def bench_json(found: BenchResult) -> dict[str, Any]:
         "recordings": [
             {
                 "article": r.article,
-                "level_n": r.test.level,
+                f"level_{'m_s2' if found.inputs.base[0] else 'n'}": r.test.level,
                 "lines": len(r.frf.frequency),
                 "averages": r.averages,
                 "coherence_median": None
@@ -110,7 +111,13 @@ def _table(found: BenchResult) -> Table:
         over = ", ".join(f"{k} ({n})" for k, n in r.overloads.items()) or "none"
         rows.append((r.article, number(r.test.level, 3), number(gamma, 6),
                      number(100 * float(np.median(error)), 2), over))  # fmt: skip
-    heads = ("article", "level [N]", "coherence", "off the ideal FRF [%]", "overloaded")
+    heads = (
+        "article",
+        f"level [{level_unit(found.inputs)}]",
+        "coherence",
+        "off the ideal FRF [%]",
+        "overloaded",
+    )
     caption = "Medians over lines and channels; overloads with blocks or lines they happened in."
     return Table(heads, rows, ("article", "overloaded"), caption)
 
@@ -121,13 +128,19 @@ def _typical(r: BenchRecording) -> int:
     return int(np.argsort(size)[len(size) // 2])
 
 
-def _time(path: Path, r: BenchRecording) -> Path:
+def _drive(found: BenchResult) -> str:
+    """What drives, with its unit."""
+    what = "base" if found.inputs.base[0] else "force"
+    return f"{what} [{level_unit(found.inputs)}]"
+
+
+def _time(path: Path, r: BenchRecording, drive: str) -> Path:
     from ..view import bench_plots
 
     record = r.sample
     assert record is not None
     t = np.arange(record.force.shape[2]) / record.rate
-    signals: dict[str, Any] = {"force [N]": record.force[0, 0]}
+    signals: dict[str, Any] = {drive: record.force[0, 0]}
     for k in range(min(_SHOWN, len(record.outputs))):
         signals[f"{record.outputs[k]} [m/s²]"] = record.response[0, k]
     return bench_plots.time_histories(path, t, signals, f"Article {r.article}, {r.test.excitation}")

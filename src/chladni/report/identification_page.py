@@ -9,7 +9,7 @@ from ..ema.correlation import auto_mac
 from ..ema.identification import evaluate
 from ..ema.level_table import level_tables
 from ..ema.mode_indicators import cmif, mif
-from ..ema.shapes import driven_shapes, shapes
+from ..ema.shapes import driven_shapes, shape_spread, shapes
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_poles
 from ..workflows.identify import Identification, RecordingModes
@@ -69,7 +69,10 @@ def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, 
 def _table(r: RecordingModes) -> Table:
     m = r.modes.sel(r.firm)
     phase, seen = shapes(m).collinearity, r.diagram.seen(m)
-    columns = (m.frequency, m.frequency_sd, 100 * m.damping, 100 * m.damping_sd, phase, seen)
+    spread = 100 * shape_spread(m)
+    columns = (
+        m.frequency, m.frequency_sd, 100 * m.damping, 100 * m.damping_sd, phase, spread, seen,
+    )  # fmt: skip
     rows = [
         (
             str(k + 1),
@@ -78,14 +81,16 @@ def _table(r: RecordingModes) -> Table:
             number(z, 3),
             number(sz, 2),
             f"{c:.3f}",
+            number(v, 2),
             f"{100 * s:.0f}",
         )
-        for k, (f, sf, z, sz, c, s) in enumerate(zip(*columns, strict=True))
+        for k, (f, sf, z, sz, c, v, s) in enumerate(zip(*columns, strict=True))
     ]
-    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "of the orders [%]")
+    heads = ("mode", "Hz", "± Hz", "damping [%]", "± %", "MPC", "shape ± %", "of the orders [%]")
     caption = (
         f"Residual over noise: {number(r.modes.chi, 3)} (1: only noise is left). MPC: 1 where all "
-        "channels move in phase. Of the orders: in how many of the richer ones of the "
+        "channels move in phase. Shape: what noise moves it by, of its own length. Of the orders: "
+        "in how many of the richer ones of the "
         "stabilisation diagram, another method's, the pole stands."
     )
     struck, weak = r.modes.frequency[r.struck], int((~r.firm & ~r.struck).sum())

@@ -4,7 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 from ..ema.level_table import level_tables
-from ..ema.shapes import shapes
+from ..ema.shapes import shape_spread, shapes
 from ..planning import Plan, summary
 from ..studies.parameter_study import ParameterStudy
 from ..updating.detectable import Detectable
@@ -88,6 +88,7 @@ def _recording(r: RecordingModes) -> dict[str, Any]:
         "firm": r.firm,
         "struck_out": r.struck,
         "mpc": shapes(m).collinearity if m.order else [],
+        "shape_spread": shape_spread(m),
         "share_of_orders": r.diagram.seen(m),
         "chi": m.chi,
         "outputs": m.outputs,

@@ -16,8 +16,9 @@ def sine_schedule(
     measure: np.ndarray,
     force: np.ndarray,
     transient: np.ndarray,
+    drive: str = "force [N]",
 ) -> Path:
-    """Cycles waited and measured, force held and transient left, line by line (n,)."""
+    """Cycles waited and measured, drive held and transient left, line by line (n,)."""
     figure = Figure(figsize=(8.2, 6.0), layout="constrained")
     top, middle, low = figure.subplots(3, 1, sharex=True)
     top.step(frequency, delay, where="post", color=TEST, lw=1.3, label="waited")
@@ -25,7 +26,7 @@ def sine_schedule(
     top.set(ylabel="cycles", yscale="log")
     top.legend(ncols=2, **LEGEND)
     middle.plot(frequency, force.T, color=AFTER, lw=0.8)
-    middle.set(ylabel="force [N]", yscale="log")
+    middle.set(ylabel=drive, yscale="log")
     low.plot(frequency, 100 * np.maximum(transient, 1e-12), ".", ms=2, color=BEFORE)
     low.set(ylabel="transient left [%]", yscale="log", xscale="log", xlabel="frequency [Hz]")
     minutes = ((delay + measure) / frequency).sum() / 60

@@ -74,7 +74,9 @@ def benched(
 ) -> BenchArticle:
     """The article by its modes at all places of the test, its damping drawn.
 
-    Dashpots and losses of materials add to the damping what they dissipate in each mode by itself.
+    Where the inputs are the motion of the base it stands on a shaker table, by modes of held
+    supports, and hangs on nothing. Dashpots and losses of materials add to the damping what they
+    dissipate in each mode by itself.
     """
     built = structure(assembly)
     found = solved(built, ABOVE * f_max)
@@ -84,9 +86,11 @@ def benched(
         built, np.repeat(places.grids, 3), np.repeat(places.points, 3, axis=0),
         np.tile(np.eye(3), (n, 1)),
     )  # fmt: skip
-    drive = _drive(built, inputs)
-    hung = _hung(built, hangers)
-    loads = sp.vstack([drive[:3], hung]).T.toarray()
+    on_table = bool(inputs.base[0])
+    drive = sp.csr_array((6, built.T.shape[1])) if on_table else _drive(built, inputs)
+    hung = _hung(built, () if on_table else hangers)
+    base = inputs.loads(built)[:1] if on_table else sp.csr_array((0, built.T.shape[1]))
+    loads = sp.vstack([base if on_table else drive[:3], hung]).T.toarray()
     whole = with_residual_vectors(built.system, found.modes, loads, node_points(built))
     phi, r = whole.shapes, len(whole)
     zeta = np.full(r, REST)
@@ -95,8 +99,10 @@ def benched(
     return BenchArticle(
         name="A", weight=mass_properties(assembly)[0], frequency=whole.frequency, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
-        hangers=(hung @ phi).reshape(len(hangers), 3, r), output_labels=outputs.labels,
-        input_label=inputs.labels[0], masses=outputs.mass,
+        hangers=(hung @ phi).reshape(-1, 3, r), output_labels=outputs.labels,
+        input_label=inputs.labels[0], masses=outputs.mass, base=(base @ phi).ravel(),
+        carried=places.directions @ inputs.directions[0],
+        mounts_carried=np.tile(inputs.directions[0], (n, 1)),
     )  # fmt: skip
 
 

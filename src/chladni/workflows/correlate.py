@@ -120,13 +120,12 @@ def _likeness(
     if not len(pairs):
         return ()
     psi, covariance = real_shapes(found), shape_covariance(found)
+    near = [np.flatnonzero(np.abs(f_model / f_model[i] - 1) < CLOSE) for i in pairs.model]
+    found_of = zip(pairs.model, pairs.test, pairs.mac, near, strict=True)
     return tuple(
-        likeness(
-            phi, psi[:, j], covariance[j], int(i),
-            np.flatnonzero(np.abs(f_model / f_model[i] - 1) < CLOSE),
-        )
-        for i, j in zip(pairs.model, pairs.test, strict=True)
-    )  # fmt: skip
+        replace(likeness(phi, psi[:, j], covariance[j], int(i), close), mac=float(value))
+        for i, j, value, close in found_of
+    )
 
 
 def _paired_shapes(

@@ -122,13 +122,14 @@ def virtual_test(
     Raises
     ------
     FileError
-        If the case names no sensors or no place that is driven, or its base moves.
+        If the case names no sensors or no place that is driven; if its base moves and a hammer,
+        local forces or time data are asked for.
     LabelError
         If an effect, a local force or an excitation has no such name.
     """
     settings = settings or BenchSettings()
     _known(settings)
-    _places_known(case)
+    _places_known(case, settings)
     with threadpool_limits(1):
         return _tested(case, settings, progress)
 
@@ -149,16 +150,24 @@ def _known(settings: BenchSettings) -> None:
         raise LabelError(f"levels {settings.levels} must be factors above zero")
 
 
-def _places_known(case: Case) -> None:
+def _places_known(case: Case, settings: BenchSettings) -> None:
     for what, dofs in (("sensor", case.outputs), ("driven place", case.inputs)):
         if not dofs.labels:
             raise FileError(
                 f"{case.path} names no {what}; give them in sensors.csv ([test] sensors), as "
                 "chladni plan writes it"
             )
-        if dofs.base.any():
-            raise FileError(f"{case.path}: a moving base is no test of this bench; it drives by "
-                            "a shaker or a hammer")  # fmt: skip
+    if case.outputs.base.any():
+        raise FileError(f"{case.path}: the base is what drives a shaker table, no sensor of it")
+    if not case.inputs.base[0]:
+        return
+    amiss = {
+        "--excitation hammer": settings.excitation == "hammer",
+        "--local": bool(settings.local), "--time": settings.keep_time,
+    }  # fmt: skip
+    if words := [word for word, asked in amiss.items() if asked]:
+        raise FileError(f"{case.path} moves its supports by a shaker table, on which there is no "
+                        f"{', '.join(words)}")  # fmt: skip
 
 
 def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchResult:
@@ -166,7 +175,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     progress("modes", 0.0)
     band = settings.band or _band(case)
     setup = BenchSetup(rubber=settings.rubber, room=settings.room)
-    if settings.excitation == "hammer":
+    if settings.excitation == "hammer" or case.inputs.base[0]:
         setup = replace(setup, shaker=None)
     scatter = fitted()
     nominal, truth = _article(case, settings, setup, band, scatter, rng)
@@ -211,7 +220,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
 def _tapped(case: Case, settings: BenchSettings, mass: float) -> tuple[float, ...]:
     """Frequencies at which the cords are heard to ring [Hz]."""
     cords = cords_for(mass, len(case.setup.hangers))
-    return () if settings.rubber else tuple(c.frequency for c in cords)
+    return () if settings.rubber or case.inputs.base[0] else tuple(c.frequency for c in cords)
 
 
 def _run(
@@ -282,16 +291,24 @@ def _drawn(
     ]
 
 
+def level_unit(inputs: MeasuredDofs) -> str:
+    """Of a test's level: force, or acceleration of a shaker table."""
+    return "m/s²" if inputs.base[0] else "N"
+
+
 def _notes(case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]) -> list[str]:
     out = [*case.said("bench")]
-    if not case.setup.hangers:
+    table, unit = bool(case.inputs.base[0]), level_unit(case.inputs)
+    if table and case.setup.hangers:
+        out.append("A table moves the supports: the article stands on it, cords are not used.")
+    if not table and not case.setup.hangers:
         out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
     for r in recordings:
-        out += [f"{r.article}, level {r.test.level:.3g} N: {said}" for said in r.notes]
+        out += [f"{r.article}, level {r.test.level:.3g} {unit}: {said}" for said in r.notes]
         if r.overloads:
             worst = ", ".join(f"{name} ({n})" for name, n in sorted(r.overloads.items()))
-            out.append(f"Overload in article {r.article} at {r.test.level:.3g} N: {worst}; lower "
-                       "the level (--level)")  # fmt: skip
+            out.append(f"Overload in article {r.article} at {r.test.level:.3g} {unit}: {worst}; "
+                       "lower the level (--level)")  # fmt: skip
     if len(case.inputs.labels) > 1:
         out.append(f"One shaker at a time: {case.inputs.labels[0]} was driven, "
                    f"{', '.join(case.inputs.labels[1:])} not.")  # fmt: skip

@@ -1,0 +1,133 @@
+"""A plate held along an edge on a virtual shaker table: transmissibilities as theory has them."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import chladni
+from chladni.bench.accelerometers import AccelerometerType
+from chladni.bench.article_scatter import fitted
+from chladni.bench.bench_recording import BenchTest, record
+from chladni.bench.bench_rig import BenchSetup, bench_rig
+from chladni.bench.front_end import FrontEnd
+from chladni.bench.shaker import Shaker
+from chladni.cli.app import application
+from chladni.errors import FileError, ModelError
+from chladni.io.nastran import write_assembly
+from chladni.io.tables.write_tables import write_npz
+from chladni.workflows.benched_article import benched, true_places
+from chladni_specimens.plates import plate
+
+PLACES = [(0.09, 0.05), (0.12, 0.2), (0.24, 0.0), (0.3, 0.05), (0.3, 0.175)]
+PERFECT = AccelerometerType(
+    mass=0.0, resonance=1e7, noise=0.0, gain_sd=0.0, tilt_sd=0.0, place_sd=0.0
+)
+QUIET = FrontEnd(bits=52, noise=0.0, volts=1e6)
+BAND = (15.0, 300.0)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """A clamped plate whose table and five sensors were recorded once."""
+    folder = tmp_path_factory.mktemp("table")
+    made = plate(0.3, 0.2, 8, 6, 1.2e-3)
+    edge = np.flatnonzero(made.points[:, 0] == 0)
+    made = replace(made, supports=np.array([(k, c) for k in edge for c in range(1, 7)]))
+    write_assembly(made, folder / "plate.bdf")
+    away = np.linalg.norm(made.points[None, :, :2] - np.array(PLACES)[:, None], axis=2)
+    labels = [f"{made.ids[k]}:+Z" for k in away.argmin(axis=1)]
+    model = chladni.load_model(folder / "plate.bdf", "SI")
+    frf = chladni.frf(model, labels, ["base:+Z"], np.linspace(*BAND, 400)).frfs[0]
+    write_npz(folder / "once.npz", frf)
+    (folder / "case.toml").write_text(
+        '[model]\ndeck = "plate.bdf"\nunits = "SI"\ndamping = 0.01\n'
+        '[test]\nrecordings = ["once.npz"]\n[band]\nfit = [15.0, 300.0]\n'
+    )
+    return chladni.load_case(folder)
+
+
+@pytest.fixture(scope="module")
+def article(case):
+    """On the table, with the damping of the case."""
+    rng = np.random.default_rng(565)
+    places = true_places(case.assembly, case.outputs, case.inputs, PERFECT, rng)
+    made = benched(case.assembly, case.outputs, case.inputs, (), places, BAND[1], fitted(), rng)
+    return replace(made, damping=np.full(len(made.frequency), 0.01))
+
+
+def setup(**changes):
+    return BenchSetup(**{"accelerometer": PERFECT, "shaker": None, "front_end": QUIET, **changes})
+
+
+def test_the_rig_has_the_transmissibility_of_the_model(case, article):
+    """Modes, residual vectors and what the base carries make up X/ξ'' of the whole model."""
+    due = case.frfs[0]
+    assert due.quantity == "transmissibility"
+    H = bench_rig(article, setup()).frf(due.frequency)
+    assert_allclose(H, due.values[:, :, 0], atol=2e-4 * np.abs(due.values).max())
+
+
+def test_heavy_sensors_ride_on_the_table_as_well(case, article):
+    """A sensor's mass is carried by the base, too: as a point mass of the deck would be."""
+    from chladni.effects.points import with_masses
+
+    grids = [int(g.partition(":")[0]) for g in case.outputs.labels]
+    heavy = with_masses(case.assembly, tuple(grids), 0.02)
+    rng = np.random.default_rng(565)
+    places = true_places(heavy, case.outputs, case.inputs, PERFECT, rng)
+    other = benched(heavy, case.outputs, case.inputs, (), places, 2 * BAND[1], fitted(), rng)
+    other = replace(other, damping=np.full(len(other.frequency), 1e-9))
+    light = replace(article, damping=np.full(len(article.frequency), 1e-9))
+    f = np.array([3.0, 5.0, 20.0, 25.0])  # about the first mode, at 11 Hz
+    due = bench_rig(other, setup()).frf(f)
+    found = bench_rig(light, setup(accelerometer=replace(PERFECT, mass=0.02))).frf(f)
+    assert_allclose(found, due, rtol=3e-3, atol=2e-3)
+    assert np.abs(found / bench_rig(light, setup()).frf(f) - 1).max() > 0.02
+
+
+def test_a_recording_is_that_of_the_rig(article):
+    rig = bench_rig(article, setup())
+    test = BenchTest("multisine", BAND, 1.0, 0.5, averages=3)
+    found = record(rig, test, np.random.default_rng(1))
+    assert found.frf.quantity == "transmissibility"
+    assert found.frf.inputs == ("base:+Z",)
+    assert_allclose(found.frf.values[:, :, 0], found.truth, atol=1e-3 * np.abs(found.truth).max())
+
+
+def test_what_a_table_has_not(case, article):
+    with pytest.raises(ModelError, match="no shaker and no local forces beside"):
+        bench_rig(article, setup(shaker=Shaker()))
+    with pytest.raises(ModelError, match="a hammer hits"):
+        record(
+            bench_rig(article, setup()), BenchTest("hammer", BAND, 1.0), np.random.default_rng(1)
+        )
+    for words in ({"excitation": "hammer"}, {"local": ("clearance",)}, {"keep_time": True}):
+        asked = chladni.workflows.virtual_test.BenchSettings(**words)
+        with pytest.raises(FileError, match="shaker table, on which there is no --"):
+            chladni.workflows.virtual_test.virtual_test(case, asked)
+
+
+def test_the_command_leaves_a_case_that_identifies(case, tmp_path):
+    run = CliRunner().invoke(
+        application(),
+        ["bench", str(case.path), "--excitation", "stepped-sine", "--seed",
+         "565", "--out", str(tmp_path / "b")],
+    )  # fmt: skip
+    assert run.exit_code == 0, run.output
+    assert "level [m/s²]" in run.output
+    said = json.loads((tmp_path / "b/bench.json").read_text())
+    assert said["input"] == "base:+Z"
+    assert said["recordings"][0]["level_m_s2"] > 0
+    left = chladni.load_case(tmp_path / "b/case")
+    assert [f.quantity for f in left.frfs] == ["transmissibility"]
+    found = chladni.identify(left).recordings[0]
+    truth = json.loads((tmp_path / "b/sealed/truth.json").read_text())
+    f = np.array(truth["frequency_hz"]["A"])
+    mine = found.poles.frequency
+    assert len(mine) >= 3
+    nearest = f[np.abs(f[:, None] / mine - 1).argmin(axis=0)]
+    assert_allclose(mine[:3], nearest[:3], rtol=0.15)  # five sensors of 5 g on 190 g of plate
