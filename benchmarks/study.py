@@ -1,10 +1,12 @@
 """A parameter study on one worker and on several: samples a second, and the efficiency.
 
-    python benchmarks/study.py [WORKERS ...]        # 1 and 2
+    python benchmarks/study.py [tailgate] [WORKERS ...]        # a panel; 1 and 2
 
-A folded panel, ten modes of every sample. "alone" computes the samples in one process without
-Dask; efficiency is its time over workers times their time, from the first sample that is back, so
-that the start of the workers, given beside it, is not in it.
+A folded panel, or the tailgate at 32 mm; ten modes of every sample. "alone" computes the samples in
+one process without Dask; efficiency is its time over workers times their time, from the first
+sample that is back, so that the start of the workers, given beside it, is not in it. "work" is the
+processor time of a sample alone over that of all processes with workers: what the efficiency could
+be at most, and on a machine that has other things to do the only one of the two that says anything.
 """
 
 import os
@@ -15,41 +17,61 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
+import psutil
 
 from chladni.studies import StudySettings
 from chladni.studies.parameter_study import study
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.plates import folded_panel
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.tailgate import tailgate
 
-RANGES = ("t=90%:110%", "E=95%:105%", "rho=95%:105%")
-SAMPLES = 120
+PANEL = ("t=90%:110%", "E=95%:105%", "rho=95%:105%"), 120
+TAILGATE = ("t of inner=90%:110%", "E of hem adhesive=50%:200%"), 24
 
 
-def timed(model, workers):
-    """(seconds until the first sample, seconds for each that follows) by the clock on the wall."""
+def worked():
+    """Processor time of this process and all it started so far, which are still there [s]."""
+    me = psutil.Process()
+    times = [p.cpu_times() for p in (me, *me.children(recursive=True))]
+    return sum(t.user + t.system for t in times)
+
+
+def timed(model, ranges, samples, workers):
+    """Seconds until the first sample; of each that follows, by the clock and of the processors."""
     ticks = []
     begin = time.perf_counter()
-    settings = StudySettings(samples=SAMPLES)
-    study(
-        model, RANGES, settings, workers=workers,
-        progress=lambda what, share: ticks.append(time.perf_counter() - begin),
-    )  # fmt: skip
-    back = np.array(ticks[2:])  # the first two are said before anything is back
-    return back[0], (back[-1] - back[0]) / (len(back) - 1)
+
+    def told(what, share):
+        if len(ticks) in (1 + workers, samples):
+            ticks.append((time.perf_counter() - begin, worked()))
+        else:
+            ticks.append((time.perf_counter() - begin, 0.0))
+
+    settings = StudySettings(samples=samples)
+    study(model, ranges, settings, workers=workers, progress=told)
+    first, last = 1 + workers, samples  # two are said before any is back; not each worker's first
+    count = last - first
+    return ticks[2][0], *((b - a) / count for a, b in zip(ticks[first], ticks[last], strict=True))
 
 
 def main():
     """Print the table."""
-    model = Model(Path("panel"), folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3))
-    print(f"{len(model.structure.system.dofs)} degrees of freedom, {SAMPLES} samples\n")
-    print("| workers | first sample after [s] | samples a second | efficiency |")
-    print("|---|---|---|---|")
-    first, alone = timed(model, 1)
-    print(f"| alone | {first:.1f} | {1 / alone:.2f} | 1 |", flush=True)
-    for workers in map(int, sys.argv[1:] or ("2",)):
-        first, each = timed(model, workers)
-        print(f"| {workers} | {first:.1f} | {1 / each:.2f} | {alone / (workers * each):.2f} |")
+    words = sys.argv[1:]
+    if "tailgate" in words:
+        made, (ranges, samples) = tailgate(TailgateDesign(size=0.032)), TAILGATE
+    else:
+        made, (ranges, samples) = folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3), PANEL
+    model = Model(Path("specimen"), made)
+    print(f"{len(model.structure.system.dofs)} degrees of freedom, {samples} samples\n")
+    print("| workers | first sample after [s] | samples a second | efficiency | work |")
+    print("|---|---|---|---|---|")
+    first, alone, own = timed(model, ranges, samples, 1)
+    print(f"| alone | {first:.1f} | {1 / alone:.2f} | 1 | 1 |", flush=True)
+    for workers in map(int, [w for w in words if w != "tailgate"] or ("2",)):
+        first, each, work = timed(model, ranges, samples, workers)
+        share = alone / (workers * each)
+        print(f"| {workers} | {first:.1f} | {1 / each:.2f} | {share:.2f} | {own / work:.2f} |")
 
 
 if __name__ == "__main__":

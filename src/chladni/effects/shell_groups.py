@@ -81,7 +81,7 @@ class ShellGroups:
         out = {}
         for name, pair in component_matrices(self.structure.assembly).items():
             beams = [A[m:] if name == "Q66" else 0 * A[m:] for A in (self.linear, self.cubic)]
-            A, B = (np.concatenate(both) for both in zip(pair, beams, strict=True))
+            A, B = (_stacked(*both) for both in zip(pair, beams, strict=True))
             out[name] = A, B
         return out
 
@@ -147,7 +147,7 @@ def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
     """
     shells, beams = _shells(structure.assembly), _beams(structure.assembly)
     linear, cubic, mass, nodes, centre, area, of = (
-        np.concatenate(pair) for pair in zip(shells, beams, strict=True)
+        _stacked(*pair) for pair in zip(shells, beams, strict=True)
     )
     first = group_of_shells(shells.centre, shells.part, shells.area, most)
     second = group_of_shells(beams.centre, beams.part, beams.area, most)
@@ -164,6 +164,11 @@ def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
         structure, linear, cubic, mass, nodes, group, middle, extent,
         np.bincount(group, weight, minlength=n), part,
     )  # fmt: skip
+
+
+def _stacked(of_shells: np.ndarray, of_beams: np.ndarray) -> np.ndarray:
+    """Both kinds, the matrices of a large sheet not copied where there is no beam."""
+    return np.concatenate([of_shells, of_beams]) if len(of_beams) else of_shells
 
 
 class _Elements(NamedTuple):
