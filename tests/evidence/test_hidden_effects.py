@@ -17,6 +17,7 @@ from chladni_evidence.hidden_kinds import (
     thinning,
 )
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
+from chladni_evidence.pair_kinds import APART, PAIRS, together
 from chladni_evidence.part_scatter import WELDS, scattered
 from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
 from chladni_specimens.forms import FORMS
@@ -200,3 +201,25 @@ def test_modes_another_code_was_not_asked_for_are_ours(monkeypatch):
     both = article_modes(a, rows, rows[:1], 130.0, "calculix")
     np.testing.assert_allclose(both.frequency[6:], ours.frequency[6:])
     np.testing.assert_array_equal(both.shapes, ours.shapes)
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_two_at_once_are_each_what_it_is_alone(site, kind):
+    """What they weigh adds up, on the balance and off it; two places lie apart."""
+    alone = {}
+
+    def sized(name, seed):
+        hidden = CATALOGUED[name](site, np.random.default_rng(seed), 1.0)
+        alone[len(alone)] = hidden
+        return hidden, 0.1 * len(alone), 1.0
+
+    made, told, least = together(site, kind, 7, sized)
+    used = list(alone.values()) if len(alone) == 2 else [alone[0], alone[len(alone) - 1]]
+    assert least == pytest.approx(0.1)
+    assert [t["effect"] for t in told] == kind.split(" + ")
+    assert made.unweighed == pytest.approx(sum(h.unweighed for h in used))
+    added = [mass_properties(h.article)[0] - site.mass for h in used]
+    assert mass_properties(made.article)[0] - site.mass == pytest.approx(sum(added))
+    places = [t["point_m"] for t in told if "point_m" in t]
+    if len(places) == 2:
+        assert np.linalg.norm(np.subtract(*places)) > APART * site.size

@@ -10,8 +10,10 @@ from chladni.errors import FileError
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
 from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.page import write_page, write_sections
+from chladni.report.states_table import states_table
 from chladni.report.verdict import HEADING, sentence
 from chladni.view import plots
+from chladni.workflows.diagnosis_result import StateResult
 
 EVIL = '<script>alert("x")</script>'
 DIAGNOSIS = {
@@ -226,3 +228,11 @@ def test_what_is_sure_is_said_beside_what_cannot_be_told_apart():
     assert said.startswith("The model lacks point-mass")
     assert said.index("one of these") < said.index("sensor-mass") < said.index("mass-patch")
     assert "take the sensors off" in said
+
+
+def test_a_state_shows_all_its_effects():
+    with_states = replace(RESULT, states=(StateResult("empty", named(LUMP, SENSORS)),))
+    (table,) = states_table(with_states)
+    row = " ".join(table.rows[0])
+    for word in ("point-mass", "sensor-mass", "near grid 9", "at the 6 sensors"):
+        assert word in row

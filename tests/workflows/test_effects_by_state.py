@@ -32,3 +32,9 @@ def test_what_is_in_some_states_only_is_said_to_be():
     said = by_state([state("a"), state("b", mass(0.1, 0.02)), state("c", fault)])
     assert said == ["point-mass is in 'b' only", "sensor-fault is in 'c' only"]
     assert by_state([state("a"), state("b")]) == []
+
+
+def test_two_of_a_family_in_one_state_are_not_taken_for_one_that_moves():
+    (said,) = by_state([state("a", mass(0.1, 0.02), mass(0.4, 0.05)), state("b", mass(0.1, 0.02))])
+    assert said.startswith("point-mass is in 'a', 'b', in every state; ")
+    assert "it moves" not in said
