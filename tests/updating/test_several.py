@@ -17,6 +17,7 @@ from chladni.fem.energy import mass_properties
 from chladni.updating import candidates as scanned
 from chladni.updating import diagnosis as diagnosing
 from chladni.updating import several_judged
+from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.candidates import candidates, repeats
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence, held_out_evidence
@@ -255,6 +256,28 @@ def test_all_must_be_borne_by_data_that_no_fit_saw(monkeypatch, found, heard, fi
     if answer is not None:
         assert answer.found is both.hypothesis
         assert answer.gains == both.gains
+
+
+@pytest.mark.parametrize(
+    ("alone", "together", "named"),
+    [(0.009, 0.011, False), (0.009, 0.4, True), (0.02, 0.011, True)],
+)
+def test_a_set_does_not_fit_by_a_hair_what_one_effect_does_not(
+    monkeypatch, found, alone, together, named
+):
+    """More parameters lower what is left of anything."""
+    both = found[1].sets[-1]
+    test = FitTest(together >= LEAST, together, "", "")
+    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
+    monkeypatch.setattr(several_judged, "tested", lambda d, p: replace(d, adequacy=test))
+    monkeypatch.setattr(several_judged, "judged", lambda p, d: d)
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    before = FitTest(alone >= LEAST, alone, "", "")
+    single = Diagnosis(
+        null, null, null, (found[0][0],), "missing physics", ("it fits",), adequacy=before
+    )
+    prepared = SimpleNamespace(problem=None, unseen=None)
+    assert (named_together(prepared, single, both, both.hypothesis)[0] is not None) == named
 
 
 def test_a_renewed_fit_that_lost_the_gain_is_not_named(monkeypatch, found):

@@ -9,12 +9,15 @@ from dataclasses import replace
 
 from ..effects.effect import Effect
 from ..effects.registry import family
+from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
 from .outcome import carried, judged, said
 from .question import Prepared
 from .several import Several
+
+PLAINLY = 0.05  # p of a set where one effect alone did not fit
 
 
 def named_together(
@@ -40,12 +43,22 @@ def named_together(
         verdict="missing physics" if whole.physics else "measurement fault",
     )  # fmt: skip
     found = tested(found, prepared.problem)
-    if found.found is None:
+    if found.found is None or not _fits_beyond(alone.adequacy, found.adequacy):
         return None, f"{_found(more)}; but {found.notes[-1]}"
     found = judged(prepared, found)
     if found.found is None:
         return None, f"{_found(more)}; but {found.notes[-1]}"
     return _with_rivals(found, more), ""
+
+
+def _fits_beyond(alone: FitTest | None, together: FitTest | None) -> bool:
+    """Whether a set fits where one effect alone did not: not just across the same limit.
+
+    More parameters lower what is left of anything, so that p just above the limit says nothing.
+    """
+    if alone is None or together is None or alone.passes:
+        return True
+    return together.p >= PLAINLY
 
 
 def _found(more: Several) -> str:
