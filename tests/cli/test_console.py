@@ -1,6 +1,7 @@
 """What a command says, where to; how it ends when it is ended, and what it leaves."""
 
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -40,6 +41,11 @@ def code_of(command):
     return caught.value.exit_code
 
 
+def spoken(stderr: str) -> list[str]:
+    """Lines of standard error, without those of a run that takes long on a busy machine."""
+    return [line for line in stderr.splitlines() if not re.match(r"\[\d+ s\] .*, \d+ %$", line)]
+
+
 def test_tables_are_said_with_all_their_numbers():
     table = Table(("part", "Hz"), [("a", "1.5"), ("longer", "22")], words=("part",))
     assert table_lines(table) == ["part     Hz", "a       1.5", "longer   22"]
@@ -54,7 +60,7 @@ def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
     plain = call("modes", deck, "--out", out)
     done = call("modes", deck, "--verbose", "--log", log, "--out", out)
     assert done.exit_code == plain.exit_code == 0
-    assert plain.stderr == ""
+    assert spoken(plain.stderr) == []
     assert "reading the model" in done.stderr
     assert done.stdout == plain.stdout
     text = log.read_text()
@@ -136,7 +142,7 @@ def test_who_reads_may_leave(deck, tmp_path):
     words = [*MAIN, "modes", str(deck), "--out", str(tmp_path / "out")]
     done = subprocess.run(words, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
     os.close(write)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.returncode, spoken(done.stderr)) == (0, [])
     assert (tmp_path / "out" / "modes.json").exists()
 
 
@@ -153,8 +159,8 @@ def test_a_full_disk_is_a_sentence_and_the_earlier_results_stay(deck, tmp_path):
     words = [*MAIN, "modes", str(deck), "--count", "1", "--out", str(out)]
     done = subprocess.run(words, capture_output=True, text=True, preexec_fn=small, check=False)
     assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("chladni: ")
-    assert done.stderr.count("\n") == 1
+    (said,) = spoken(done.stderr)
+    assert said.startswith("chladni: ")
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
 
 
