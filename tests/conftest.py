@@ -1,5 +1,6 @@
 """What all tests share: the recordings beside the checkout, counted work in place of seconds."""
 
+import gc
 import sys
 from pathlib import Path
 
@@ -20,7 +21,10 @@ def recordings() -> Path:
 
 @pytest.fixture
 def work():
-    """Calls of Python functions that an action takes: its speed, on any machine however busy."""
+    """Calls of Python functions that an action takes: its speed, on any machine however busy.
+
+    What other tests left behind is not finalised meanwhile: it would be counted.
+    """
 
     def counted(action):
         calls = [0]
@@ -29,11 +33,14 @@ def work():
             calls[0] += event == "call"
 
         before = sys.getprofile()
+        gc.collect()
+        gc.disable()
         sys.setprofile(see)
         try:
             action()
         finally:
             sys.setprofile(before)
+            gc.enable()
         return calls[0]
 
     return counted
