@@ -166,7 +166,7 @@ class Responses:
 
     def stacked(self, z: np.ndarray) -> np.ndarray:
         """Columns of residuals (n, k) of k complex deviations over their spread (k, n_f, ...)."""
-        picked = z[:, self.use].reshape(len(z), -1).T
+        picked = z[:, self.use].reshape(len(z), self.use.sum() * z.shape[-1]).T
         columns = np.concatenate([picked.real, picked.imag])
         return columns if self.known is None else self.known.whitened(columns)
 
