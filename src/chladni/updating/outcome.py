@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..ema.odds import evidence_in_words
@@ -12,7 +13,7 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, threshold, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
-from .likelihood import Poles
+from .likelihood import Poles, Responses
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 
@@ -148,7 +149,8 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """Calibration as it is answered with where nothing is named: the null as a deck can hold it.
 
     Plain calibration would bend E, rho and t to make up for mesh and joints. Where errors of the
-    model are so large that the prudent values fit worse than the deck as it was given, it stays.
+    model are so large that the prudent values fit worse than the deck as it was given, with its
+    mesh error or as it is written, it stays.
     """
     null = diagnosis.null
     prudent = as_written(null, prepared.problem.mass_measurement)
@@ -157,7 +159,30 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     given = _as_given(prepared.problem, null)
     data = prepared.score.over(null.model)
     before, after = (data.Q(state, data.use) for state in (given, prudent.fit.state))
-    return replace(diagnosis, plain=prudent) if after <= before else diagnosis
+    if after > before or _on_its_deck(prudent, data) > _given_deck(prepared.problem, null, data):
+        return diagnosis
+    return replace(diagnosis, plain=prudent)
+
+
+def _on_its_deck(fitted: HypothesisFit, data: Responses | Poles) -> float:
+    """Q of the deck as it is written: what its mesh hides is not in it."""
+    x, at = fitted.fit.x.copy(), 0
+    for e in fitted.fit.effects:
+        if isinstance(e, MeshError):
+            x[at : at + len(e.parameters)] = 0.0
+        at += len(e.parameters)
+    return data.Q(evaluate(fitted.model, fitted.fit.effects, x, False), data.use)
+
+
+def _given_deck(problem: UpdatingProblem, null: HypothesisFit, data: Responses | Poles) -> float:
+    """The same of the deck as it was given."""
+    kept = [e for e in problem.base if e.kind == "ordinary" or e.writable]
+    kept = [e for e in kept if not isinstance(e, MeshError)]
+    x = [
+        np.array([p.nominal for p in e.parameters]) if e.kind == "ordinary" else null.fit.of(e)
+        for e in kept
+    ]
+    return data.Q(evaluate(null.model, kept, np.concatenate([np.zeros(0), *x]), False), data.use)
 
 
 def said(heard: HeldOutEvidence) -> str:
