@@ -89,7 +89,8 @@ def _connected(address: str) -> Any:
 
     try:
         return Client(address, timeout=PATIENCE)
-    except (OSError, ValueError, TypeError, RuntimeError) as error:
+    # an assertion where the loop of an earlier client is just ending
+    except (OSError, ValueError, TypeError, RuntimeError, AssertionError) as error:
         why = " ".join(str(error).split()) or type(error).__name__
         raise FileError(
             f"no Dask scheduler answers at {address!r} ({why[:120]}); give its address as "
