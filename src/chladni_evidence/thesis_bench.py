@@ -13,7 +13,7 @@ from scipy.linalg import eig
 from threadpoolctl import threadpool_limits
 
 from chladni.bench.accelerometers import AccelerometerType
-from chladni.bench.article_scatter import DAMPING, Scatter, fitted, scattered_article
+from chladni.bench.article_scatter import DAMPING, drawn_article, fitted
 from chladni.bench.bench_article import BenchArticle
 from chladni.bench.bench_recording import (
     BenchRecording,
@@ -33,6 +33,7 @@ from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent
 from chladni.workflows.benched_article import benched, true_places
+from chladni.workflows.virtual_test import ABOVE_BAND
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.skin import Skin
 from chladni_specimens.tailgate.tailgate import tailgate
@@ -45,7 +46,6 @@ HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis h
 CORD_SD = 0.01  # of a cord's frequency from article to article: figure 19 shows a few tenths of Hz
 HELD = 0.1  # of a cord's length that hands at its lowest part leave free
 CORD_BAND = (18.0, 34.0)  # [Hz], about the cords' resonances and the first mode
-DIFFER = 1.5  # articles differ in modes up to so many times the highest line, as in `chladni bench`
 FACTORS = (0.5, 2.0)  # of the level, beside the level itself (figure 24)
 Held = Literal["free", "held", "rubber"]
 WAYS: tuple[Held, ...] = ("free", "held", "rubber")
@@ -141,7 +141,8 @@ def _tested(
     progress: Progress,
 ) -> ThesisTest:  # fmt: skip
     band = (stages[0].low, stages[-1].high)
-    articles = _articles(subject.article, fitted(), DIFFER * band[1], rng)
+    scatter, differ = fitted(), ABOVE_BAND * band[1]
+    articles = tuple(drawn_article(subject.article, scatter, name, differ, rng) for name in "ABC")
     rings = np.array([np.array(THESIS) * np.exp(CORD_SD * rng.normal()) for _ in articles])
     rigs = [rig_on_cords(a, f) for a, f in zip(articles, rings, strict=True)]
     channels = channels_of(rigs[0], rng)
@@ -174,19 +175,6 @@ def _about_cords(
     return tuple(
         swept(rig_on_cords(a, f, way), test, lines, rng, channels=channels)
         for a, f in zip(articles, rings, strict=True)
-    )
-
-
-def _articles(
-    nominal: BenchArticle, scatter: Scatter, within: float, rng: np.random.Generator
-) -> tuple[BenchArticle, ...]:
-    """A, B and C: modes, damping and weight of their own."""
-    return tuple(
-        replace(
-            scattered_article(nominal, scatter, name, within, rng),
-            weight=nominal.weight * float(np.exp(scatter.weight * rng.normal())),
-        )
-        for name in "ABC"
     )
 
 

@@ -3,7 +3,7 @@
 Echaniz Granado (2015), tables 4, 5 and 6: three tailgates weighed, fourteen modes identified.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import eigh
@@ -78,6 +78,14 @@ def fitted() -> Scatter:
 def drawn_damping(s: Scatter, r: int, rng: np.random.Generator) -> np.ndarray:
     """Damping ratios of the modes of a structure, before its articles differ (r,)."""
     return np.asarray(s.damping * np.exp(s.damping_of_modes * rng.normal(size=r)))
+
+
+def drawn_article(
+    nominal: BenchArticle, s: Scatter, name: str, within: float, rng: np.random.Generator
+) -> BenchArticle:
+    """Another article with modes, damping and weight of its own (:func:`scattered_article`)."""
+    other = scattered_article(nominal, s, name, within, rng)
+    return replace(other, weight=nominal.weight * float(np.exp(s.weight * rng.normal())))
 
 
 def scattered_article(

@@ -21,12 +21,12 @@ from ..model.properties import Isotropic, Part, ShellSection, SolidSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
-from .ordinary import SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
+from .ordinary import OF_FIELDS, SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
 from .shell_groups import ShellGroups
 
 UNITS = {
-    **dict.fromkeys(("E", "E1", "E2", "G12"), "Pa"),
-    **{"rho": "kg/m3", "t": "m", "wall": "of the deck's"},
+    **OF_FIELDS,
+    **dict.fromkeys(("E1", "E2", "G12"), "Pa"),
     **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
 }
 SD = {**SPREAD, "nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS

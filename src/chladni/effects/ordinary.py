@@ -22,7 +22,7 @@ from .effect import ChannelChange, Effect, FieldChange, Parameter
 from .shell_groups import ShellGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
-UNITS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
+OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
 SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
 _AREAS = ("area", "I1", "I2", "I12", "J")  # what goes with the wall of a thin tube
 
@@ -57,7 +57,7 @@ def ordinary(
     names = tuple(parts[k].name for k in positions)
     nominal = value(parts[positions[0]], quantity)
     sd = SPREAD[quantity] if sd is None else sd
-    parameter = Parameter(quantity, UNITS[quantity], 0.0, sd, nominal, step=0.1)
+    parameter = Parameter(quantity, OF_FIELDS[quantity], 0.0, sd, nominal, step=0.1)
     inside = np.isin(groups.part, positions).astype(float)
     return PartScale(
         (parameter,), f"{quantity} of {', '.join(names)}", names,

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import alike
 from ..fem.locate import Share
 from ..geometry.beam_lines import lines
 from ..geometry.facets import point_normals, tangents, unit
@@ -118,8 +119,7 @@ def _across_beams(
     taken = set(assembly.shells.nodes.ravel().tolist())
     found: list[tuple[int, np.ndarray, int, np.ndarray]] = []
     ends, beam = nodes.ravel(), np.repeat(np.arange(len(nodes)), 2)
-    order = np.argsort(ends, kind="stable")
-    for at in np.split(order, np.flatnonzero(np.diff(ends[order])) + 1) if len(ends) else []:
+    for at in alike(ends):
         row, has = int(ends[at[0]]), list[np.ndarray]()
         for k in beam[at] if row not in taken else []:
             for d in tangents(way[k]):

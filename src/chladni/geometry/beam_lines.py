@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..arrays import alike
 from ..model.assembly import Assembly, Average, RigidBody
 from .cells import components
 from .facets import unit
@@ -21,9 +22,7 @@ def connected_rows(nodes: np.ndarray) -> Iterator[np.ndarray]:
     at, column = np.unique(nodes, return_inverse=True)
     corners = column.reshape(nodes.shape)
     piece = components(corners, len(at))[corners[:, 0]]
-    order = np.argsort(piece, kind="stable")
-    found = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
-    yield from sorted(found, key=lambda rows: int(rows[0]))
+    yield from sorted(alike(piece), key=lambda rows: int(rows[0]))
 
 
 def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
@@ -60,9 +59,8 @@ def lines(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     way = unit(points[nodes[:, 1]] - points[nodes[:, 0]])
     ends = nodes.T.ravel()  # of beam k % m
     away = np.concatenate([way, -way])  # from the end into the beam
-    order = np.argsort(ends, kind="stable")
     met = [np.zeros((0, 2), dtype=int)]
-    for at in np.split(order, np.flatnonzero(np.diff(ends[order])) + 1):
+    for at in alike(ends):
         i, j = np.nonzero(np.triu(away[at] @ away[at].T < -STRAIGHT, 1))
         met.append(np.column_stack([at[i] % m, at[j] % m]))
     return components(np.concatenate(met), m)

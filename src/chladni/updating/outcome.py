@@ -1,5 +1,6 @@
 """The verdict on held-out data, and the structures it speaks of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, threshold, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
-from .likelihood import Poles, Responses
+from .likelihood import Poles
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 
@@ -156,33 +157,23 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     prudent = as_written(null, prepared.problem.mass_measurement)
     if diagnosis.verdict == "nothing missing":
         return replace(diagnosis, plain=prudent)
-    given = _as_given(prepared.problem, null)
-    data = prepared.score.over(null.model)
-    before, after = (data.Q(state, data.use) for state in (given, prudent.fit.state))
-    if after > before or _on_its_deck(prudent, data) > _given_deck(prepared.problem, null, data):
+    problem, data = prepared.problem, prepared.score.over(null.model)
+    decks = (problem.base, _given(problem, null)), (prudent.fit.effects, prudent.fit.x)
+
+    def Q(effects: Sequence[Effect], x: np.ndarray) -> float:
+        return data.Q(evaluate(null.model, effects, x, False), data.use)
+
+    before, after = (Q(effects, x) for effects, x in decks)
+    bare_before, bare_after = (Q(effects, _mesh_idle(effects, x)) for effects, x in decks)
+    if after > before or bare_after > bare_before:
         return diagnosis
     return replace(diagnosis, plain=prudent)
 
 
-def _on_its_deck(fitted: HypothesisFit, data: Responses | Poles) -> float:
-    """Q of the deck as it is written: what its mesh hides is not in it."""
-    x, at = fitted.fit.x.copy(), 0
-    for e in fitted.fit.effects:
-        if isinstance(e, MeshError):
-            x[at : at + len(e.parameters)] = 0.0
-        at += len(e.parameters)
-    return data.Q(evaluate(fitted.model, fitted.fit.effects, x, False), data.use)
-
-
-def _given_deck(problem: UpdatingProblem, null: HypothesisFit, data: Responses | Poles) -> float:
-    """The same of the deck as it was given."""
-    kept = [e for e in problem.base if e.kind == "ordinary" or e.writable]
-    kept = [e for e in kept if not isinstance(e, MeshError)]
-    x = [
-        np.array([p.nominal for p in e.parameters]) if e.kind == "ordinary" else null.fit.of(e)
-        for e in kept
-    ]
-    return data.Q(evaluate(null.model, kept, np.concatenate([np.zeros(0), *x]), False), data.use)
+def _mesh_idle(effects: Sequence[Effect], x: np.ndarray) -> np.ndarray:
+    """The same parameters without what the mesh hides: no deck has it in it."""
+    idle = [np.full(len(e.parameters), isinstance(e, MeshError)) for e in effects]
+    return np.where(np.concatenate([np.zeros(0, bool), *idle]), 0.0, x)
 
 
 def said(heard: HeldOutEvidence) -> str:
@@ -205,6 +196,11 @@ def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
 
 def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> State:
     """The deck's own values, mesh error and gain as the fit found them, no scatter."""
+    return evaluate(null.model, problem.base, _given(problem, null), False)
+
+
+def _given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
+    """The same as parameters of the base."""
     x, at = problem.mean(), 0
     for e in problem.base:
         n = len(e.parameters)
@@ -213,7 +209,7 @@ def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> State:
         elif e.writable:
             x[at : at + n] = null.fit.of(e)
         at += n
-    return evaluate(null.model, problem.base, x, False)
+    return x
 
 
 def _states(

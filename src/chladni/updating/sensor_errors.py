@@ -111,12 +111,11 @@ def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.n
 
 
 def whitening(errors: SensorErrors, data: Lines, state: State) -> Whitening:
-    """As the errors spread over the residuals of a state (over their spread, in use)."""
+    """As the errors spread over the residuals of a state, which are not whitened yet."""
     H, scale = data.model(state), data.std() * LN10
-    by_output = [_in_use(data, z) for z in _of_outputs(errors.outputs, data, state, H, scale)]
     n_out = H.shape[1]
     channel = np.tile(np.broadcast_to(np.arange(n_out)[:, None], H.shape)[data.use].ravel(), 2)
-    V = np.stack(by_output, axis=1)
+    V = data.stacked(_of_outputs(errors.outputs, data, state, H, scale))
     columns, less = [], []
     for k in np.unique(channel):
         at = np.flatnonzero(channel == k)
@@ -125,38 +124,36 @@ def whitening(errors: SensorErrors, data: Lines, state: State) -> Whitening:
         less.append(share)
     own = sp.csc_array(sp.hstack(columns)) if columns else sp.csc_array((len(V), 0))
     own_less = np.concatenate([*less, np.zeros(0)])
-    by_input = [_in_use(data, z) for z in _of_inputs(errors.inputs, data, state, H, scale)]
-    common = np.stack(by_input, axis=1) if by_input else np.zeros((len(V), 0))
+    common = data.stacked(_of_inputs(errors.inputs, data, state, H, scale))
     return Whitening(own, own_less, *_orthonormal(_less(own, own_less, common)))
 
 
 def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
     """|d ln H|² that is to be expected of them (n_f, n_out, n_in)."""
     H = data.model(state)
-    one = np.ones_like(H.real)
-    out = np.zeros(H.shape)
-    for z in _of_outputs(errors.outputs, data, state, H, one):
-        out += np.abs(z) ** 2
-    for z in _of_inputs(errors.inputs, data, state, H, one):
-        out += np.abs(z) ** 2
-    return out
+    one = np.ones(H.shape)
+    both = (
+        _of_outputs(errors.outputs, data, state, H, one),
+        _of_inputs(errors.inputs, data, state, H, one),
+    )
+    return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
 
 
 def _of_outputs(
     errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
-) -> list[np.ndarray]:
-    """What one standard deviation of each error of an output does to its residuals (five of H)."""
+) -> np.ndarray:
+    """What one standard deviation of each error of an output does to its deviation (5, *H)."""
     _, phi_i, d = data.modal(state)
     out = [errors.gain / scale]
     for modal, carried in zip(errors.modal, errors.carried, strict=True):
         G = np.einsum("or,fr,ir->foi", modal @ state.phi, d, phi_i, optimize=True)
         out.append((data.s[:, None, None] ** data.power * G + carried) / (H * scale))
-    return out
+    return np.stack(out)
 
 
 def _of_inputs(
     errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
-) -> list[np.ndarray]:
+) -> np.ndarray:
     """The same of each input, zero where another drives; of a moving base its gain alone."""
     phi_o, phi_i, d = data.modal(state)
     out = []
@@ -167,13 +164,7 @@ def _of_inputs(
             G = np.einsum("or,fr,r->fo", phi_o, d, modal @ state.phi, optimize=True)
             z = (data.s[:, None] ** data.power * G)[..., None] / (H * scale)
             out.append(z * one)
-    return out
-
-
-def _in_use(data: Lines, z: np.ndarray) -> np.ndarray:
-    """Real and imaginary part in the order of the residuals (n,)."""
-    picked = z[data.use].ravel()
-    return np.concatenate([picked.real, picked.imag if np.iscomplexobj(z) else 0 * picked.real])
+    return np.stack(out)
 
 
 def _grid(rows: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from typing import Any, get_args
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..bench.article_scatter import Scatter, fitted, scattered_article
+from ..bench.article_scatter import Scatter, drawn_article, fitted
 from ..bench.bench_article import BenchArticle
 from ..bench.bench_recording import (
     BenchRecording,
@@ -283,11 +283,7 @@ def _drawn(
     if settings.exact:
         return [replace(nominal, name=NAMES[k]) for k in range(settings.articles)]
     return [
-        replace(
-            scattered_article(nominal, scatter, NAMES[k], within_hz, rng),
-            weight=nominal.weight * float(np.exp(scatter.weight * rng.normal())),
-        )
-        for k in range(settings.articles)
+        drawn_article(nominal, scatter, NAMES[k], within_hz, rng) for k in range(settings.articles)
     ]
 
 
