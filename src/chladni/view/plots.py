@@ -52,7 +52,8 @@ def frf(
     lower.set(xlabel="frequency [Hz]", ylabel="phase [deg]", ylim=(-185, 185))
     lower.set_yticks([-180, -90, 0, 90, 180])
     upper.set_title(title, loc="left", **TITLE)
-    upper.legend(loc="upper right", ncols=min(3, len(curves)), **LEGEND)
+    above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}  # a peak may stand in any corner
+    upper.legend(ncols=min(3, len(curves)), **above, **LEGEND)
     return save(figure, path)
 
 
