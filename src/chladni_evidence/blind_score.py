@@ -74,8 +74,8 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
     unchanged_cases(place, seals)
     due = hash_of(place.seals)
     for name in seals.truths:
-        _answers(place.answer(name))
         given = read_json(place.answer(name), "")
+        _answers(given, place.answer(name))
         if (given.get("seals"), given.get("files")) != (due, seals.files[name]):
             raise FileError(
                 f"{place.answer(name)} was not given to the case as it is published: it is older "
@@ -96,7 +96,8 @@ def _answers_hold(place: BlindFolder, seals: Seals) -> None:
 def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
     found = []
     for name in seals.truths:
-        answer, plain = _answers(place.answer(name))
+        path = place.answer(name)
+        answer, plain = _answers(read_json(path, ""), path)
         truth = opened_truth(place, seals, name)
         try:
             judged = row(answer, truth, plain)
@@ -108,9 +109,8 @@ def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
     return found
 
 
-def _answers(path: Path) -> tuple[Answer, Answer | None]:
+def _answers(given: Row, path: Path) -> tuple[Answer, Answer | None]:
     """Of the diagnosis, and of plain calibration where it was asked."""
-    given = read_json(path, "")
     try:
         plain = given.get("calibrate")
         return Answer(**given["diagnose"]), Answer(**plain) if plain else None
