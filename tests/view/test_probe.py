@@ -43,6 +43,18 @@ def test_another_machine_or_version_is_asked_again(monkeypatch):
     assert probe.window() is None
 
 
+def test_a_limit_on_address_space_leaves_vtk_alone(monkeypatch):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(probe, "opens", lambda name: True)
+    monkeypatch.setattr(resource, "getrlimit", lambda what: (int(1e15), int(1e15)))
+    assert 1e14 < probe.address_space_left() < 1e15  # what is taken is taken off
+    assert probe.window()
+    probe.window.cache_clear()
+    monkeypatch.setattr(resource, "getrlimit", lambda what: (int(1e9), int(1e9)))
+    assert probe.window() is None
+    assert "ulimit" in probe.advice()[0]
+
+
 def test_a_wish_overrides_and_a_wrong_one_is_refused(monkeypatch):
     monkeypatch.setenv("CHLADNI_GRAPHICS", "egl")
     assert probe.window() == probe.WINDOWS["egl"]

@@ -24,6 +24,10 @@ ADVICE = (
     "Pictures are drawn with matplotlib; for smoothly shaded ones install a graphics library "
     "(Debian, Ubuntu: apt-get install libosmesa6, or libegl1 libgl1-mesa-dri)."
 )
+ROOM = 1.5e9  # bytes of address space that VTK and its pictures take, with half as much to spare
+CRAMPED = (
+    "Pictures are drawn with matplotlib: the limit on address space (ulimit -v) leaves VTK no room."
+)
 _CHILD = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
@@ -42,6 +46,8 @@ def window() -> str | None:
                 f"CHLADNI_GRAPHICS is {wish!r}; there are {', '.join(WINDOWS)}, matplotlib"
             )
         return WINDOWS.get(wish)
+    if address_space_left() < ROOM:
+        return None  # VTK ends the process where it gets no memory
     store = cache_folder() / "graphics.json"
     known, key = _read(store), _machine()
     if key not in known:
@@ -51,6 +57,18 @@ def window() -> str | None:
             return None  # a busy machine is no reason to remember "nothing works"
         _keep(store, known)
     return known[key]
+
+
+def address_space_left() -> float:
+    """Bytes that a limit (``ulimit -v``) leaves this process; infinite where there is none."""
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except (ImportError, OSError):  # not on this system
+        return float("inf")
+    return float("inf") if limit == resource.RLIM_INFINITY else float(limit - taken)
 
 
 def opens(window_class: str, seconds: float = 60.0) -> bool:
@@ -72,8 +90,10 @@ def prepare() -> bool:
 
 
 def advice() -> list[str]:
-    """What to install for better pictures; nothing where VTK works or matplotlib was wished for."""
-    return [] if os.environ.get("CHLADNI_GRAPHICS") or window() else [ADVICE]
+    """What would make for better pictures; nothing where VTK works or matplotlib was wished for."""
+    if os.environ.get("CHLADNI_GRAPHICS") or window():
+        return []
+    return [CRAMPED if address_space_left() < ROOM else ADVICE]
 
 
 def cache_folder() -> Path:
