@@ -221,7 +221,7 @@ def _mean_normal(deck: Assembly) -> np.ndarray:
     for corner in range(4):
         np.add.at(total, deck.shells.nodes[:, corner], n)
         np.add.at(count, deck.shells.nodes[:, corner], 1)
-    return np.asarray(np.linalg.norm(total, axis=1) / np.maximum(count, 1))
+    return np.linalg.norm(total, axis=1) / np.maximum(count, 1)
 
 
 def _label(grid: int, direction: np.ndarray) -> str:

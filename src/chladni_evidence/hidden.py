@@ -76,7 +76,7 @@ class Site:
         x = np.diff(self.article.points[ends], axis=0)
         u, v = (t[0] for t in tangents(x / np.linalg.norm(x)))
         angle = 0.0 if rng is None else rng.uniform(0, 2 * np.pi)
-        return np.asarray(np.cos(angle) * u + np.sin(angle) * v)
+        return np.cos(angle) * u + np.sin(angle) * v
 
     def up(self, row: int) -> np.ndarray:
         """How a cord pulls at a point: along the normal of a sheet; a frame of tubes lies flat."""

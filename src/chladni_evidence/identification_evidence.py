@@ -40,7 +40,7 @@ class Known:
         """-ω² Σ φ φ_d / (ω_r² - ω² + 2iζω_rω) (n_f, n)."""
         w, size = 2 * np.pi * f[:, None], np.abs(self.poles)
         h = -(w**2) / (size**2 - w**2 - 2j * self.poles.real * w)
-        return np.asarray(h @ (self.shapes * self.shapes[0]).T)
+        return h @ (self.shapes * self.shapes[0]).T
 
     @property
     def inside(self) -> np.ndarray:

@@ -55,7 +55,7 @@ def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
     def stiffness(s: np.ndarray) -> np.ndarray:
         each = k / len(rows) * (1 + relaxed * s * tau / (1 + s * tau))
-        return np.asarray(each[:, None, None] * np.eye(len(rows)))
+        return each[:, None, None] * np.eye(len(rows))
 
     weights = np.eye(len(rows))[:, :, None] * n
     truth = {

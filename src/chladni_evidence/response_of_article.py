@@ -30,7 +30,7 @@ class Coupling:
 def seen(modes: ArticleModes, foot: Footing, directions: np.ndarray) -> np.ndarray:
     """Mode shapes (k, r) at places along directions."""
     motion = np.einsum("kc,kcir->kir", foot.weights, modes.at(foot.rows))
-    return np.asarray(np.einsum("kir,ki->kr", motion, directions))
+    return np.einsum("kir,ki->kr", motion, directions)
 
 
 def accelerance(
@@ -53,7 +53,7 @@ def accelerance(
     d = s[:, None] ** 2 + 2 * zeta * w * s[:, None] + w**2
     tied = [(np.einsum("nki,kir->nr", c.weights, modes.at(c.rows)), c.stiffness) for c in couplings]
     if not tied and not modes.loss.any():
-        return np.asarray((phi_out / d[:, None, :]) @ phi_in.T * s[:, None, None] ** 2)
+        return (phi_out / d[:, None, :]) @ phi_in.T * s[:, None, None] ** 2
     out = []
     for k in range(0, len(s), LINES_AT_ONCE):
         part = slice(k, k + LINES_AT_ONCE)

@@ -174,21 +174,21 @@ def _peak(f: np.ndarray, H: np.ndarray) -> float:
 
 def means(recordings: tuple[BenchRecording, ...]) -> np.ndarray:
     """Mean FRF of the articles (n_f, n_out)."""
-    return np.asarray(np.mean([r.frf.values[:, :, 0] for r in recordings], axis=0))
+    return np.mean([r.frf.values[:, :, 0] for r in recordings], axis=0)
 
 
 def on_lines(f: np.ndarray, grid: np.ndarray, H: np.ndarray) -> np.ndarray:
     """Complex H (n_grid, n_out) at lines f, linear between those of the grid."""
     k = np.clip(np.searchsorted(grid, f) - 1, 0, len(grid) - 2)
     t = ((f - grid[k]) / (grid[k + 1] - grid[k]))[:, None]
-    return np.asarray((1 - t) * H[k] + t * H[k + 1])
+    return (1 - t) * H[k] + t * H[k + 1]
 
 
 def decibels(test: ThesisTest) -> np.ndarray:
     """20 log of the mean FRF by bursts over that by stepped sine (n_f, n_out)."""
     f = test.stepped[0].frf.frequency
     random = on_lines(f, test.bursts[0].frf.frequency, means(test.bursts))
-    return np.asarray(20 * np.log10(np.abs(random / means(test.stepped))))
+    return 20 * np.log10(np.abs(random / means(test.stepped)))
 
 
 def _between(test: ThesisTest) -> tuple[np.ndarray, np.ndarray]:

@@ -50,7 +50,7 @@ class ArticleIdentified:
 def used_lines(frequency: np.ndarray) -> np.ndarray:
     """Lines of the band without the cords' (n_f,) bool."""
     inside = (BAND[0] <= frequency) & (frequency <= BAND[1])
-    return np.asarray(inside & ((frequency < CORDS[0]) | (frequency > CORDS[1])))
+    return inside & ((frequency < CORDS[0]) | (frequency > CORDS[1]))
 
 
 def article_identified(recording: BenchRecording, rings: np.ndarray) -> ArticleIdentified:
@@ -80,7 +80,7 @@ def doubled(found: Identified) -> np.ndarray:
     peak = np.linalg.norm(psi, axis=0) / half
     together = np.abs(found.frequency[:, None] - found.frequency) < half[:, None] + half
     weaker = peak[:, None] < peak
-    return np.asarray((together & weaker & (mac(psi, psi) > SAME)).any(axis=1))
+    return (together & weaker & (mac(psi, psi) > SAME)).any(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ def paired(found: tuple[ArticleIdentified, ...]) -> ModesOfArticles:
 
 def spread(x: np.ndarray) -> np.ndarray:
     """(largest - smallest) / mean of every row (r,): "highest difference" of tables 5 and 6."""
-    return np.asarray(np.ptp(x, axis=1) / x.mean(axis=1))
+    return np.ptp(x, axis=1) / x.mean(axis=1)
 
 
 def errors(found: Identified, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

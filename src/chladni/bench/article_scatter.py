@@ -77,7 +77,7 @@ def fitted() -> Scatter:
 
 def drawn_damping(s: Scatter, r: int, rng: np.random.Generator) -> np.ndarray:
     """Damping ratios of the modes of a structure, before its articles differ (r,)."""
-    return np.asarray(s.damping * np.exp(s.damping_of_modes * rng.normal(size=r)))
+    return s.damping * np.exp(s.damping_of_modes * rng.normal(size=r))
 
 
 def drawn_article(

@@ -80,7 +80,7 @@ class BenchArticle:
         """True for modes that are no rigid motion (r,)."""
         none = np.zeros((0, len(self.frequency)))
         modal = ModalModel(self.frequency, self.damping, none, np.zeros((0, 2), int))
-        return np.asarray(~rigid_modes(modal))
+        return ~rigid_modes(modal)
 
     def turned(self, frequency: np.ndarray, damping: np.ndarray, Q: np.ndarray, name: str) -> Self:
         """The article whose modes are Φ Q, Q (r, r) orthogonal."""

@@ -88,7 +88,7 @@ class BenchRig:
     def frf(self, frequency: np.ndarray) -> np.ndarray:
         """Acceleration per force as an ideal front end would find it (n_f, n_out)."""
         H = self.measured.response(2j * np.pi * np.asarray(frequency))[:, :, 0]
-        return np.asarray(H[:, 1:] / H[:, :1])
+        return H[:, 1:] / H[:, :1]
 
 
 @dataclass(eq=False)

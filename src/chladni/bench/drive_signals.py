@@ -28,14 +28,14 @@ def pink_rms(f: np.ndarray, H: np.ndarray) -> np.ndarray:
     """Rms of what H (n_f, ...) answers to pink noise of rms 1 over the band of f (n_f,) [Hz]."""
     density = 1 / f / np.trapezoid(1 / f, f)
     power = density.reshape(-1, *[1] * (H.ndim - 1)) * np.abs(H) ** 2
-    return np.asarray(np.sqrt(np.trapezoid(power, f, axis=0)))
+    return np.sqrt(np.trapezoid(power, f, axis=0))
 
 
 def _in_time(lines: np.ndarray, n: int, finer: int) -> np.ndarray:
     """n · finer samples of a block whose spectrum over n samples is ``lines``."""
     spectrum = np.zeros(n * finer // 2 + 1, complex)
     spectrum[: len(lines)] = lines
-    return np.asarray(np.fft.irfft(spectrum, n * finer))
+    return np.fft.irfft(spectrum, n * finer)
 
 
 def burst(
@@ -53,7 +53,7 @@ def burst(
     x = _in_time(lines, n, finer)
     t = np.arange(n * finer) / (n * finer)
     edge = np.clip(np.minimum(t, ON - t) / FADE, 0.0, 1.0)
-    return np.asarray(x / x.std() * (0.5 - 0.5 * np.cos(np.pi * edge)))
+    return x / x.std() * (0.5 - 0.5 * np.cos(np.pi * edge))
 
 
 def multisine(
@@ -66,7 +66,7 @@ def multisine(
     odd = np.arange(n // 2 + 1) % 2 == 1
     phases = np.exp(2j * np.pi * rng.uniform(size=n // 2 + 1))
     x = _in_time(pink_lines(n, rate, band) * odd * phases, n, finer)
-    return np.asarray(x / x.std())
+    return x / x.std()
 
 
 def blow(n: int, rate: float, f_max: float, rng: np.random.Generator, finer: int = 1) -> np.ndarray:
@@ -75,4 +75,4 @@ def blow(n: int, rate: float, f_max: float, rng: np.random.Generator, finer: int
     t = np.arange(n * finer) * h - LEAD * n / rate
     size = np.exp(UNEVEN * rng.normal())
     inside = (t > 0) & (t < width)
-    return np.asarray(np.where(inside, size * np.sin(np.pi * np.clip(t, 0, width) / width), 0.0))
+    return np.where(inside, size * np.sin(np.pi * np.clip(t, 0, width) / width), 0.0)

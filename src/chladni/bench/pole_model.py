@@ -44,7 +44,7 @@ class PoleModel:
         one, other = 0.5 / (s - self.poles), 0.5 / (s - self.poles.conj())
         H = np.einsum("sk,ok,ki->soi", one, self.c, self.b, optimize=True)
         H += np.einsum("sk,ok,ki->soi", other, self.c.conj(), self.b.conj(), optimize=True)
-        return np.asarray(H + self.d)
+        return H + self.d
 
     def outputs(self, rows: slice | np.ndarray) -> Self:
         """Some of the outputs."""
@@ -106,7 +106,7 @@ class PoleFilter:
         s = np.asarray(s, complex)[:, None]
         one = 0.5 * self.weights / (s - self.poles)
         other = 0.5 * self.weights.conj() / (s - self.poles.conj())
-        return np.asarray((one + other).sum(axis=1))
+        return (one + other).sum(axis=1)
 
 
 def filtered(model: PoleModel, low_pass: PoleFilter) -> PoleModel:

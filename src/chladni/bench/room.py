@@ -19,7 +19,7 @@ def room_loads(article: BenchArticle) -> np.ndarray:
     """Forces of the sources on the modes (r, SOURCES), each with weights of its own everywhere."""
     rows = np.concatenate([article.outputs, article.hangers.reshape(-1, article.outputs.shape[1])])
     weights = np.random.default_rng(SEED).normal(size=(len(rows), SOURCES))
-    return np.asarray(rows.T @ weights / np.sqrt(len(rows)))
+    return rows.T @ weights / np.sqrt(len(rows))
 
 
 def room_density(room: PoleModel, rms: float, band: tuple[float, float]) -> float:
@@ -38,4 +38,4 @@ def room_density(room: PoleModel, rms: float, band: tuple[float, float]) -> floa
 
 def room_samples(density: float, rate: float, n: int, rng: np.random.Generator) -> np.ndarray:
     """White noise of every source (SOURCES, n) [N], sampled at a rate."""
-    return np.asarray(density * np.sqrt(rate / 2) * rng.normal(size=(SOURCES, n)))
+    return density * np.sqrt(rate / 2) * rng.normal(size=(SOURCES, n))

@@ -50,7 +50,7 @@ class Stinger:
     def restraint(self) -> np.ndarray:
         """What holds (a way across, the slope that way) at its end (2, 2) [N/m, N, N m]."""
         EI, L = self.E * np.pi * self.diameter**4 / 64, self.length
-        return np.asarray(EI / L**3 * np.array([[12, -6 * L], [-6 * L, 4 * L**2]]))
+        return EI / L**3 * np.array([[12, -6 * L], [-6 * L, 4 * L**2]])
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def _clipping(amplitude: np.ndarray, limit: float) -> np.ndarray:
     (2/π)(asin δ + δ √(1 - δ²)), δ = limit / amplitude (Gelb and Vander Velde 1968, section 2.3).
     """
     d = np.minimum(limit / np.maximum(amplitude, 1e-300), 1.0)
-    return np.asarray(2 / np.pi * (np.arcsin(d) + d * np.sqrt(1 - d**2)))
+    return 2 / np.pi * (np.arcsin(d) + d * np.sqrt(1 - d**2))
 
 
 class _ExactSweep:
@@ -156,7 +156,7 @@ class _ExactSweep:
             return 0.0
         H = self.room.response(np.array([2j * np.pi * line.frequency]))[0]
         e = rng.normal(size=(2, H.shape[1])) * self.density * np.sqrt(line.frequency / line.measure)
-        return np.asarray(H @ (e[0] + 1j * e[1]))
+        return H @ (e[0] + 1j * e[1])
 
     def response(self, line: SineLine, drive: float) -> tuple[np.ndarray, np.ndarray]:
         """What is measured of the steady answer and of the transient (channels,), phase of sin."""
@@ -224,4 +224,4 @@ def _fitted(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Complex amplitude (channels,) of x = Re Y e^{i angle} + constant, by least squares."""
     A = np.column_stack([np.cos(angle), -np.sin(angle), np.ones_like(angle)])
     a = np.linalg.lstsq(A, x.T, rcond=None)[0]
-    return np.asarray(a[0] + 1j * a[1])
+    return a[0] + 1j * a[1]

@@ -160,7 +160,7 @@ class _ModalChange:
         if share.min(initial=0.0) > -SOFTEST:
             return self.stiffness
         W = root[:, None] * V
-        return np.asarray((W * np.maximum(share, -SOFTEST)) @ W.T)
+        return (W * np.maximum(share, -SOFTEST)) @ W.T
 
 
 @dataclass(frozen=True, eq=False)

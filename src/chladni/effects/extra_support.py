@@ -65,7 +65,7 @@ class ExtraSupport(MovableAttachment):
 
     def pushes(self, x: np.ndarray) -> np.ndarray:
         """Its direction in the basic frame (3,)."""
-        return np.asarray(_tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)]))
+        return _tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)])
 
     def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
         """About the grid it moved to, pushing as it did."""

@@ -123,7 +123,7 @@ class MovableAttachment(Effect):
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
         assert self.patch is not None
-        return np.asarray(self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane)
+        return self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The strength; the place stands in ``location``."""

@@ -34,7 +34,7 @@ class Quadric:
         """The point (3,) [m] that has the coordinates u (2,) [m]."""
         near = u * min(1.0, self.reach / max(float(np.linalg.norm(u)), 1e-300))
         h = float(_quadric(near[None])[0] @ self.bend)
-        return np.asarray(self.origin + u @ self.axes + h * self.normal)
+        return self.origin + u @ self.axes + h * self.normal
 
 
 def _quadric(u: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ class SheetPatch(Effect):
         """q at points X (n,), averaged over a group of variance ``blur``."""
         d2 = ((X - self.at(x)) ** 2).sum(axis=1)
         R2 = self.radius_at(x) ** 2
-        return np.asarray(R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur))))
+        return R2 / (R2 + blur) * np.exp(-d2 / (2 * (R2 + blur)))
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """The logarithm over the groups; its slope by central differences of a scalar formula."""

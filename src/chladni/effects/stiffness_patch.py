@@ -44,7 +44,7 @@ class StiffnessPatch(SheetPatch):
     def log(self, x: np.ndarray) -> np.ndarray:
         """ln(1 - β q) over the groups."""
         q = self.bump(x, self.centre, self.variance)
-        return np.asarray(np.log1p(-lost(x[0]) * q) * self.inside)
+        return np.log1p(-lost(x[0]) * q) * self.inside
 
     @classmethod
     def begun(cls, amount: float) -> float:

@@ -33,7 +33,7 @@ class ThicknessDistribution(SheetPatch):
     def log(self, x: np.ndarray) -> np.ndarray:
         """ln(1 - α q) over the groups."""
         q = self.bump(x, self.centre, self.variance)
-        return np.asarray(np.log1p(-thinning(x[0]) * q) * self.inside)
+        return np.log1p(-thinning(x[0]) * q) * self.inside
 
     @classmethod
     def begun(cls, amount: float) -> float:

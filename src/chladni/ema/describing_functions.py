@@ -12,13 +12,13 @@ from scipy.special import gamma
 
 def cubic(A: np.ndarray, k3: float) -> np.ndarray:
     """κ = 3/4 k3 A² of a spring with f = k3 x³."""
-    return np.asarray(0.75 * k3 * A**2 + 0j)
+    return 0.75 * k3 * A**2 + 0j
 
 
 def gap_spring(A: np.ndarray, k: float, gap: float) -> np.ndarray:
     """κ = k (1 - 2/π (asin u + u √(1 - u²))), u = gap/A, of a spring with play ±gap, 0 within."""
     u = np.minimum(gap / A, 1.0)
-    return np.asarray(k * (1 - 2 / np.pi * (np.arcsin(u) + u * np.sqrt(1 - u**2))) + 0j)
+    return k * (1 - 2 / np.pi * (np.arcsin(u) + u * np.sqrt(1 - u**2))) + 0j
 
 
 def slider(A: np.ndarray, k: float, slip: float) -> np.ndarray:
@@ -28,7 +28,7 @@ def slider(A: np.ndarray, k: float, slip: float) -> np.ndarray:
     4 k slip (A - slip) are dissipated a cycle (Jenkins 1962; k slip is μN).
     """
     psi = np.arccos(1 - 2 * np.minimum(slip / A, 1.0))
-    return np.asarray(k / np.pi * (psi - np.sin(2 * psi) / 2 + 1j * np.sin(psi) ** 2))
+    return k / np.pi * (psi - np.sin(2 * psi) / 2 + 1j * np.sin(psi) ** 2)
 
 
 def micro_slip(A: np.ndarray, c: float, n: float) -> np.ndarray:
@@ -42,9 +42,9 @@ def micro_slip(A: np.ndarray, c: float, n: float) -> np.ndarray:
     m = 2 * n + 2
     wallis = np.sqrt(np.pi) / 2 * gamma((m + 1) / 2) / gamma(m / 2 + 1)
     lost = 8 / np.pi * wallis * (n + 1) / (n + 2)
-    return np.asarray(c * A**n * (-lost + 4j / np.pi * n / (n + 2)))
+    return c * A**n * (-lost + 4j / np.pi * n / (n + 2))
 
 
 def drag(A: np.ndarray, b: float, n: float) -> np.ndarray:
     """κ = i b Aⁿ: loss that grows with amplitude and no change of stiffness (n = 1: air drag)."""
-    return np.asarray(1j * b * A**n)
+    return 1j * b * A**n

@@ -166,7 +166,7 @@ def _alike(a: Identified, b: Identified) -> np.ndarray:
     """Whether modes of two levels are of one shape, as far as their channels tell (r_a, r_b)."""
     if (a.outputs, a.inputs) != (b.outputs, b.inputs) or len(a.outputs) * len(a.inputs) < 3:
         return np.ones((a.order, b.order), bool)
-    return np.asarray(mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE)
+    return mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE
 
 
 Seen = tuple[float, float, float, float, float]

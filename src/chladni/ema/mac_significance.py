@@ -123,7 +123,7 @@ def best_half(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     kept = np.where(left, psi, 0.0)
     above = (phi @ kept) ** 2
     below = ((phi**2) @ left) * (kept**2).sum(axis=0)
-    return np.asarray(np.minimum(above / np.maximum(below, 1e-300), 1.0))
+    return np.minimum(above / np.maximum(below, 1e-300), 1.0)
 
 
 def _best_half_with_chance(

@@ -113,4 +113,4 @@ def _inverse_root(H: np.ndarray) -> np.ndarray:
     d = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     value, vector = np.linalg.eigh(d[:, None] * H * d)
     keep = np.where(value > _SINGULAR * value[-1], 1 / np.sqrt(np.maximum(value, 1e-300)), 0.0)
-    return np.asarray(d[:, None] * vector * keep)
+    return d[:, None] * vector * keep

@@ -25,4 +25,4 @@ def mif(frf: FRF) -> np.ndarray:
     phase = H.imag if DERIVATIVES[frf.quantity] % 2 else H.real
     size = np.abs(H)
     whole = np.maximum((size**2).sum(axis=(1, 2)), 1e-300)
-    return np.asarray(1 - (np.abs(phase) * size).sum(axis=(1, 2)) / whole)
+    return 1 - (np.abs(phase) * size).sum(axis=(1, 2)) / whole

@@ -46,7 +46,7 @@ def standard_deviations(identified: Identified, made: Made) -> np.ndarray:
         variance = ((J @ _root(C)) ** 2).sum(axis=2)
         parts.append(variance + np.einsum("rkci,rcij,rkcj->rk", own, C.local, own, optimize=True))
     found = np.concatenate(parts) if parts else made(identified)
-    return np.asarray(np.sqrt(np.maximum(found, 0.0)))
+    return np.sqrt(np.maximum(found, 0.0))
 
 
 def _parts(identified: Identified, made: Made) -> Iterator[tuple[np.ndarray, ModalCovariance]]:

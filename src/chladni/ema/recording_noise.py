@@ -66,7 +66,7 @@ def sample_noise(identified: Identified, frf: FRF, s: np.ndarray) -> np.ndarray:
     near = np.clip(np.searchsorted(own, f), 0, len(own) - 1)
     lines = np.pi * np.median(identified.damping) * f / np.median(np.diff(own))
     per_line = np.minimum(sd[near], 1.0) * max(identified.chi, 1.0)
-    return np.asarray(per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10)
+    return per_line / np.sqrt(np.maximum(lines, 1.0))[:, None, None] / LN10
 
 
 def _channel(
@@ -87,7 +87,7 @@ def _pairs(z: np.ndarray) -> np.ndarray:
 
 def _taken(columns: np.ndarray, z: np.ndarray) -> np.ndarray:
     """z_r times each pole's term and its conjugate, from the columns of :func:`basis` (n, r)."""
-    return np.asarray(columns[:, 0::2] * z.real + columns[:, 1::2] * z.imag)
+    return columns[:, 0::2] * z.real + columns[:, 1::2] * z.imag
 
 
 def _moved(second: np.ndarray, R: np.ndarray) -> np.ndarray:

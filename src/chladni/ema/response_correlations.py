@@ -108,4 +108,4 @@ def _transformed(r: np.ndarray, rate: float) -> np.ndarray:
     What noise adds at lag zero is a constant, which the residual terms of the fit take.
     """
     w = window("exponential", len(r), DECAY)
-    return np.asarray(np.fft.rfft(r * w[:, None, None], axis=0) / rate)
+    return np.fft.rfft(r * w[:, None, None], axis=0) / rate

@@ -76,7 +76,7 @@ def left_variance(rest: np.ndarray, H: np.ndarray, used: np.ndarray) -> np.ndarr
     b2 = _median_square(square, size, faint=True)
     over = np.maximum(square - _MEDIAN * b2, 0) / np.maximum(size, 1e-300) ** 2
     a2 = np.maximum(_median_square(over, size, faint=False), _PRECISE**2)
-    return np.asarray(a2 * np.abs(H) ** 2 + b2)
+    return a2 * np.abs(H) ** 2 + b2
 
 
 def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndarray:
@@ -87,7 +87,7 @@ def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndar
     held = np.isfinite(picked)
     alone = np.where(held.any(axis=0), 0.0, 1.0)  # a dead channel has no scatter
     picked = np.where(alone > 0, 0.0, picked)
-    return np.asarray(np.nanmedian(picked, axis=0) / _MEDIAN)
+    return np.nanmedian(picked, axis=0) / _MEDIAN
 
 
 def moving_mean(x: np.ndarray, lines: int) -> np.ndarray:

@@ -142,12 +142,12 @@ class _Mixture:
 
     def squares(self, psi: np.ndarray) -> np.ndarray:
         """ψᵀ C⁻¹ ψ (r,)."""
-        return np.asarray(np.einsum("ir,rij,jr->r", psi, self.inverse, psi))
+        return np.einsum("ir,rij,jr->r", psi, self.inverse, psi)
 
     def total(self, squares: np.ndarray) -> np.ndarray:
         """ln L of squares (..., r)."""
         n = self.inverse.shape[1]
-        return np.asarray((-n / 2 * np.log(squares) - self.log_det / 2).sum(axis=-1))
+        return (-n / 2 * np.log(squares) - self.log_det / 2).sum(axis=-1)
 
     def likelihood(self, psi: np.ndarray) -> float:
         """ln L."""

@@ -42,7 +42,7 @@ class MeasuredShapes:
 
 def constants(identified: Identified) -> np.ndarray:
     """A_r = 2i Im(p_r) R_r, [1/kg] of a receptance (r, n_out, n_in); real of a normal mode."""
-    return np.asarray(identified.residues * (2j * identified.poles.imag)[:, None, None])
+    return identified.residues * (2j * identified.poles.imag)[:, None, None]
 
 
 def driven_shapes(identified: Identified) -> np.ndarray:
@@ -56,7 +56,7 @@ def driven_shapes(identified: Identified) -> np.ndarray:
 def real_shapes(identified: Identified) -> np.ndarray:
     """The same (n_out, r), turned so that they are as real as they can be, of unit norm."""
     psi = _turned(driven_shapes(identified).T).T.real
-    return np.asarray(psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300))
+    return psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300)
 
 
 def shape_covariance(identified: Identified) -> np.ndarray:
@@ -90,7 +90,7 @@ def shape_sd(identified: Identified) -> np.ndarray:
 def shape_spread(identified: Identified) -> np.ndarray:
     """Rms length by which noise moves each unit shape, √tr C (r,): 1 - MAC is its square."""
     sd = standard_deviations(identified, lambda moved: real_shapes(moved).T)
-    return np.asarray(np.linalg.norm(sd, axis=1))
+    return np.linalg.norm(sd, axis=1)
 
 
 def shapes(identified: Identified) -> MeasuredShapes:

@@ -51,7 +51,7 @@ class Stabilisation:
         half = np.maximum(found.damping * found.frequency, 1e-3 * found.frequency)
         near = np.abs(self.frequency[:, None] - found.frequency) < half
         held = [near[self.states == n].any(axis=0) for n in rich]
-        return np.asarray(np.mean(held, axis=0))
+        return np.mean(held, axis=0)
 
 
 def stabilisation(
@@ -111,7 +111,7 @@ def prominence(found: Identified) -> np.ndarray:
     np.fill_diagonal(matrix, 0)
     rest = matrix @ R + (1 / (at - p.conj())) @ R.conj()
     rest += found.lower.ravel() / at**2 + found.upper.ravel()
-    return np.asarray(own / np.maximum(np.linalg.norm(rest, axis=1), 1e-300))
+    return own / np.maximum(np.linalg.norm(rest, axis=1), 1e-300)
 
 
 def ghosts(found: Identified, diagram: Stabilisation) -> np.ndarray:

@@ -71,4 +71,4 @@ def subspace(data: PoleData, order: int) -> Subspace:
 def _even(data: PoleData) -> np.ndarray:
     """Factors (n_c,) that give every channel the same noise."""
     w = np.sqrt((data.w**2).mean(axis=0))
-    return np.asarray(w / max(float(w.max(initial=0.0)), 1e-300))
+    return w / max(float(w.max(initial=0.0)), 1e-300)

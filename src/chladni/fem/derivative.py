@@ -272,7 +272,7 @@ def _mean(assembly: Assembly, position: int) -> Average:
 def _distance(assembly: Assembly, mean: Average) -> np.ndarray:
     nodes = [n for n, _, _ in mean.terms]
     arm = assembly.points[nodes] - assembly.points[mean.reference]
-    return np.asarray(np.linalg.norm(arm, axis=1))
+    return np.linalg.norm(arm, axis=1)
 
 
 def _plain(assembly: Assembly, mean: Average) -> None:

@@ -228,7 +228,7 @@ def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:
     T[:, 0] = np.stack([c * c, s * s, c * s], axis=1)
     T[:, 1] = np.stack([s * s, c * c, -c * s], axis=1)
     T[:, 2] = np.stack([-2 * c * s, 2 * c * s, c * c - s * s], axis=1)
-    return np.asarray(T.swapaxes(1, 2) @ Q @ T)
+    return T.swapaxes(1, 2) @ Q @ T
 
 
 def _chunks(geo: ShellGeometry) -> Iterator[Rows]:

@@ -40,7 +40,7 @@ def damped(B: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """
     share = weight / weight.sum(axis=1, keepdims=True)
     mean = (share[:, :, None, None, None] * B).sum(axis=1, keepdims=True)
-    return np.asarray(mean + VARYING_SPIN * (B - mean))
+    return mean + VARYING_SPIN * (B - mean)
 
 
 def corner_twist(geo: ShellGeometry) -> np.ndarray:
@@ -55,4 +55,4 @@ def corner_twist(geo: ShellGeometry) -> np.ndarray:
         B[:, i, :, :2] = omega[:, i].reshape(-1, 4, 2)
         B[:, i, i, 5] = -1
     J = 2 * geo.area[:, None] if three else corner_jacobians(geo.corners)
-    return np.asarray(np.sqrt(J)[:, :, None] * B.reshape(len(geo), 4, 24) @ to_element(geo))
+    return np.sqrt(J)[:, :, None] * B.reshape(len(geo), 4, 24) @ to_element(geo)

@@ -126,7 +126,7 @@ def _unit(v: np.ndarray) -> np.ndarray:
 
 
 def _cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:

@@ -36,18 +36,18 @@ def invert(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def gradients(inverse: np.ndarray) -> np.ndarray:
     """∂N/∂x and ∂N/∂y at the Gauss points (m, 4, 2, 4)."""
-    return np.asarray(inverse @ _SLOPES)
+    return inverse @ _SLOPES
 
 
 def corner_slopes(corners: np.ndarray) -> np.ndarray:
     """∂N_l/∂x and ∂N_l/∂y at each of the four corners (m, 4 corners, 2, 4) [1/m]."""
     _, inverse = invert(_CORNER_SLOPES @ corners[:, None])
-    return np.asarray(inverse @ _CORNER_SLOPES)
+    return inverse @ _CORNER_SLOPES
 
 
 def corner_jacobians(corners: np.ndarray) -> np.ndarray:
     """Jacobian of the unit square at each corner (m, 4), the area of a parallelogram [m²]."""
-    return np.asarray(4 * invert(_CORNER_SLOPES @ corners[:, None])[0])
+    return 4 * invert(_CORNER_SLOPES @ corners[:, None])[0]
 
 
 def symmetric(grad: np.ndarray) -> np.ndarray:

@@ -69,30 +69,30 @@ class SectionArrays:
         """S (Z_s + 3 Z_r) S δt/t, the change of S for δt (m, 4) at the corners [N/m]."""
         Z = self.shear_flexibility + 3 * _diagonal(self.residual_flexibility)
         ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
-        return np.asarray(self.S @ Z @ self.S * ratio[:, None, None, None])
+        return self.S @ Z @ self.S * ratio[:, None, None, None]
 
     def shear_by_bending(self, geo: ShellGeometry, dQb: np.ndarray) -> np.ndarray:
         """S diag(Z_r dQ_ii/Q_ii) S, the change of S for dQb of the bending material [N/m]."""
         Q, dQ = (_pair(turned(q, geo.turn)) for q in (self.Qb, np.asarray(dQb)))
         change = np.where(Q > 0, dQ / np.where(Q > 0, Q, 1), 0.0)[:, None]
-        return np.asarray(self.S @ _diagonal(self.residual_flexibility * change) @ self.S)
+        return self.S @ _diagonal(self.residual_flexibility * change) @ self.S
 
     def shear_by_modulus(self, relative: np.ndarray | float) -> np.ndarray:
         """S Z_s S dG/G, the change of S for a relative change of the transverse moduli [N/m]."""
         change = np.broadcast_to(relative, (len(self),))[:, None, None, None]
-        return np.asarray(self.S @ self.shear_flexibility @ self.S * change)
+        return self.S @ self.shear_flexibility @ self.S * change
 
     def drill_by_thickness(
         self, geo: ShellGeometry, t: np.ndarray, change: np.ndarray
     ) -> np.ndarray:
         """ds = s δt/t (m, 2) [N/m]."""
         ratio = mean_thickness(geo, np.broadcast_to(change, t.shape)) / mean_thickness(geo, t)
-        return np.asarray(self.drill * ratio[:, None])
+        return self.drill * ratio[:, None]
 
     def drill_by_membrane(self, dQm: np.ndarray) -> np.ndarray:
         """ds = s dQ_66/Q_66 (m, 2) [N/m]."""
         G, dG = self.Qm[:, 2, 2], np.broadcast_to(dQm, (len(self), 3, 3))[:, 2, 2]
-        return np.asarray(self.drill * np.divide(dG, G, np.zeros_like(G), where=G > 0)[:, None])
+        return self.drill * np.divide(dG, G, np.zeros_like(G), where=G > 0)[:, None]
 
 
 def section_arrays(
@@ -153,12 +153,12 @@ def modulus_derivative(material: Material, name: str) -> np.ndarray:
     Q = material.plane_stress()
     if name == "E" and isinstance(material, Isotropic):
         own_G = np.diag([0, 0, material.shear_modulus if material.G is not None else 0.0])
-        return np.asarray((Q - own_G) / material.E)
+        return (Q - own_G) / material.E
     dC = np.zeros((3, 3))
     if name == "nu" and isinstance(material, Isotropic):
         dC[0, 1] = dC[1, 0] = -1 / material.E
         dC[2, 2] = 2 / material.E if material.G is None else 0.0
-        return np.asarray(-Q @ dC @ Q)
+        return -Q @ dC @ Q
     E1, E2, nu12, G12 = _engineering(material)
     if name == "E1":
         dC[0, 0], dC[0, 1] = -1 / E1**2, nu12 / E1**2
@@ -171,14 +171,14 @@ def modulus_derivative(material: Material, name: str) -> np.ndarray:
     else:
         raise ModelError(f"no modulus {name!r}; there are E, nu, E1, E2, nu12, G12")
     dC[1, 0] = dC[0, 1]
-    return np.asarray(-Q @ dC @ Q)
+    return -Q @ dC @ Q
 
 
 def rotated(Z: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Rᵀ Z R (m, 2, 2): a tensor of the material axes in the element frame."""
     c, s = np.cos(turn), np.sin(turn)
     R = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
-    return np.asarray(R.swapaxes(1, 2) @ Z @ R)
+    return R.swapaxes(1, 2) @ Z @ R
 
 
 def mean_thickness(geo: ShellGeometry, t: np.ndarray) -> np.ndarray:

@@ -112,7 +112,7 @@ class _Footprints:
         if np.ptp(weight) <= 1e-9 * np.abs(weight).max():
             return np.asarray(self.points[body.reference])
         at = self.points[[row for row, _, _ in body.terms]]
-        return np.asarray(weight @ at / weight.sum())
+        return weight @ at / weight.sum()
 
     def _is_area(self, rows: Sequence[int], other: int) -> bool:
         on_shells = [self._first[r + 1] > self._first[r] for r in rows]

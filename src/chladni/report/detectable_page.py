@@ -71,4 +71,4 @@ def _of_shells(model: Model, found: Detectable) -> np.ndarray:
     """Smallest mass of the place nearest to each shell (m,) [kg]."""
     middle = model.assembly.points[model.assembly.shells.nodes].mean(axis=1)
     near = cKDTree(found.points).query(middle, min(3, len(found.points)))[1]
-    return np.asarray(found.mass[near].reshape(len(middle), -1).mean(axis=1))
+    return found.mass[near].reshape(len(middle), -1).mean(axis=1)

@@ -90,7 +90,7 @@ def _power_law(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
 def _standardised(U: np.ndarray, y: np.ndarray) -> np.ndarray:
     A, b = U - U.mean(axis=0), y - y.mean()
     slope, *_ = np.linalg.lstsq(A, b, rcond=None)
-    return np.asarray(slope * A.std(axis=0) / b.std())
+    return slope * A.std(axis=0) / b.std()
 
 
 def _indices(

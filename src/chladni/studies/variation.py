@@ -50,8 +50,8 @@ class Variation:
     def value(self, u: np.ndarray) -> np.ndarray:
         """Values at u in [0, 1]."""
         if self.log:
-            return np.asarray(self.low * (self.high / self.low) ** u)
-        return np.asarray(self.low + (self.high - self.low) * u)
+            return self.low * (self.high / self.low) ** u
+        return self.low + (self.high - self.low) * u
 
     def applied(self, assembly: Assembly, value: float) -> Assembly:
         """The assembly with this value in place of the deck's."""

@@ -134,7 +134,7 @@ class Discrepancy:
     def whitened(self, r: np.ndarray) -> np.ndarray:
         """C^-½ r of residuals or of columns of slopes (n, ...)."""
         less = 1 - 1 / np.sqrt(1 + self.delta**2 * self.s)
-        return np.asarray(r - (self.U * less) @ (self.U.T @ r))
+        return r - (self.U * less) @ (self.U.T @ r)
 
     def log_det(self) -> float:
         """Ln det C."""
@@ -144,7 +144,7 @@ class Discrepancy:
 def prior(delta: np.ndarray | float) -> np.ndarray:
     """-2 ln of the prior density of ln δ."""
     z = (np.log(delta) - np.log(MEDIAN)) / LOG_SD
-    return np.asarray(z**2 + np.log(2 * np.pi * LOG_SD**2))
+    return z**2 + np.log(2 * np.pi * LOG_SD**2)
 
 
 def discrepancy(data: Lines, state: State) -> Discrepancy:
@@ -176,7 +176,7 @@ def curvature(data: Lines, state: State) -> np.ndarray:
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
     sd = every.std() * np.log(10) * USUAL
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0) + data.wrong(state)
-    return np.asarray(BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2))
+    return BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2)
 
 
 def columns(data: Lines, state: State, about: Form) -> np.ndarray:

@@ -71,7 +71,7 @@ def loosened(reduced: ReducedProblem) -> tuple[Loosened, ...]:
 def _rest(flexibility: np.ndarray) -> np.ndarray:
     """1 - b P⁻¹ bᵀ, symmetric, between ``LEAST`` and one."""
     w, V = np.linalg.eigh(np.eye(len(flexibility)) - (flexibility + flexibility.T) / 2)
-    return np.asarray((V * np.clip(w, LEAST, 1.0)) @ V.T)
+    return (V * np.clip(w, LEAST, 1.0)) @ V.T
 
 
 def fastener_scores(

@@ -81,7 +81,7 @@ class Responses:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in)."""
         phi_o, phi_i, d = self.modal(state)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
-        return np.asarray(self.s[:, None, None] ** self.power * H + self.direct)
+        return self.s[:, None, None] ** self.power * H + self.direct
 
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).

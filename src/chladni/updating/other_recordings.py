@@ -62,12 +62,12 @@ def measured_spread(
     delta = np.array([np.zeros(values.shape), *(_apart(values, H) for H in alike)])
     variance = (np.abs(delta - delta.mean(axis=0)) ** 2).sum(axis=0) / len(alike)
     own = _averaged(variance)
-    return np.asarray(np.sqrt((own + own.mean(axis=(1, 2), keepdims=True)) / 2))
+    return np.sqrt((own + own.mean(axis=(1, 2), keepdims=True)) / 2)
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """log10(b / a), phase wrapped."""
-    return np.asarray(np.log(b / a) / LN10)
+    return np.log(b / a) / LN10
 
 
 def _averaged(x: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def _averaged(x: np.ndarray) -> np.ndarray:
     total = np.cumsum(np.concatenate([np.zeros((1, *x.shape[1:])), x]), axis=0)
     k, half = np.arange(len(x)), WINDOW // 2
     low, high = np.maximum(k - half, 0), np.minimum(k + half + 1, len(x))
-    return np.asarray((total[high] - total[low]) / (high - low)[:, None, None])
+    return (total[high] - total[low]) / (high - low)[:, None, None]
 
 
 def spread_note(

@@ -29,7 +29,7 @@ def price_spurious(share: float) -> float:
 def price_missed(visibility: np.ndarray) -> np.ndarray:
     """Price of unpaired modes, by visibility relative to the strongest (m,)."""
     share = np.clip(1 + np.log10(np.maximum(visibility, 1e-9)) / SEEN, 0, 1)
-    return np.asarray(HARDLY + MISSED * share)
+    return HARDLY + MISSED * share
 
 
 def paired(

@@ -28,7 +28,7 @@ def draws(effect: Effect, count: int) -> np.ndarray:
     """Sobol points of an effect's prior (count, n_p); count is a power of two."""
     u = qmc.Sobol(len(effect.parameters), seed=1).random(count)
     mean, sd = (np.array([getattr(p, q) for p in effect.parameters]) for q in ("mean", "sd"))
-    return np.asarray(mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3)))
+    return mean + sd * norm.ppf(np.clip(u, 1e-3, 1 - 1e-3))
 
 
 def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> list[np.ndarray]:

@@ -205,7 +205,7 @@ def _held_sensors(question: Question) -> np.ndarray:
 
 def _training(f: np.ndarray, low: float, high: float, held: np.ndarray) -> np.ndarray:
     """Lines and channels that are fitted (n_f, n_out)."""
-    return np.asarray(np.outer((f >= low) & (f <= high), ~held))
+    return np.outer((f >= low) & (f <= high), ~held)
 
 
 def _left_out(
@@ -215,7 +215,7 @@ def _left_out(
     f = data.s.imag / (2 * np.pi)
     outside = (f >= band[0]) & (f <= band[1])
     held = outside[:, None] | (sensors[None, :] & ((f >= reach[0]) & (f <= reach[1]))[:, None])
-    return np.asarray(held & ~data.use)
+    return held & ~data.use
 
 
 def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ class Baseline:
 
     def score(self, residuals: np.ndarray) -> np.ndarray:
         """rᵀ C⁻¹ r of every column (n, m) -> (m,)."""
-        return np.asarray((residuals**2).sum(axis=0) - ((self.Z @ residuals) ** 2).sum(axis=0))
+        return (residuals**2).sum(axis=0) - ((self.Z @ residuals) ** 2).sum(axis=0)
 
     def with_mass(self, r: np.ndarray, added: np.ndarray | float) -> np.ndarray:
         """The data's residuals (n_data, m) with the row of the scales below them."""

@@ -107,7 +107,7 @@ class Whitening:
 def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.ndarray:
     """R less what lies along each column, by its share."""
     along = U.T @ r
-    return np.asarray(r - U @ (less[:, None] * along if along.ndim > 1 else less * along))
+    return r - U @ (less[:, None] * along if along.ndim > 1 else less * along)
 
 
 def whitening(errors: SensorErrors, data: Lines, state: State) -> Whitening:

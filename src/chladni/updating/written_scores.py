@@ -58,7 +58,7 @@ def gain_offset(
     none = np.zeros(len(data.a), complex)
     if question.gain_known:
         return none
-    return np.asarray(none - data.deviation(state)[prepared.score.use].real.mean())
+    return none - data.deviation(state)[prepared.score.use].real.mean()
 
 
 def seen(

@@ -207,7 +207,7 @@ def _modes(
 def firm(modal: Identified) -> np.ndarray:
     """Poles known to 2 % in frequency and to half their damping: (r,) bool."""
     known = modal.frequency_sd < 0.02 * modal.frequency
-    return np.asarray(known & (modal.damping_sd < 0.5 * modal.damping))
+    return known & (modal.damping_sd < 0.5 * modal.damping)
 
 
 def without_window(found: Identified, added: float) -> Identified:

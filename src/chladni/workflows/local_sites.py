@@ -60,5 +60,5 @@ def _rms(rig: BenchRig, test: BenchTest) -> np.ndarray:
     H = rig.measured.response(s)[:, :, 0]
     x = np.abs(H[:, 1:] / (s**2)[:, None])
     if test.excitation == "stepped-sine":
-        return np.asarray(test.level * (x / np.abs(H[:, :1])).max(axis=0) / np.sqrt(2))
-    return np.asarray(test.level * pink_rms(f, x))
+        return test.level * (x / np.abs(H[:, :1])).max(axis=0) / np.sqrt(2)
+    return test.level * pink_rms(f, x)

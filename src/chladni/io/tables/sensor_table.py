@@ -142,7 +142,7 @@ def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
         length = float(np.linalg.norm(text))
         if not np.isfinite(length) or length == 0:
             raise FileError(f"{where}: nx, ny, nz = {named(text.tolist())} is no direction")
-        return np.asarray(text / length)
+        return text / length
     way = text.rpartition(":")[2].strip().upper()
     if way == "N":
         return None
@@ -150,4 +150,4 @@ def direction(text: str | np.ndarray, where: str) -> np.ndarray | None:
     axis = way.lstrip("+-")
     if axis not in COMPONENTS[:3]:
         raise FileError(f"{where}: direction {text!r}; write +X, -X, +Y, -Y, +Z, -Z or n")
-    return np.asarray(sign * np.eye(3)[COMPONENTS.index(axis)])
+    return sign * np.eye(3)[COMPONENTS.index(axis)]
