@@ -105,6 +105,7 @@ class Crack(Effect):
     """
 
     name = "crack"
+    elastic = True
     claim = "bending stiffness is lost along a line: a crack, a bead ground off, a bend annealed"
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))

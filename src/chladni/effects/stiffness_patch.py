@@ -29,6 +29,7 @@ class StiffnessPatch(SheetPatch):
     """E(x) = E0 (1 - β q(x)), β = 0.9 / (1 + e^-x): membrane and bending alike, always positive."""
 
     name = "stiffness-patch"
+    elastic = True
     claim = "the sheet is softer here than the deck says, and no lighter"
     quantity = "E"
     scanned = -1.0

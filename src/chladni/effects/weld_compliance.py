@@ -46,6 +46,7 @@ class WeldCompliance(Effect):
     """
 
     name = "weld-compliance"
+    elastic = True
     claim = "a weld or a fastener is softer than the deck has it"
     rounds = 1  # a weld that is gone may free a mode of its own
 

@@ -36,12 +36,13 @@ class ModalDamping:
     ratio: np.ndarray
     sd: np.ndarray
 
+    def of(self, keep: np.ndarray) -> "ModalDamping":
+        """Some of the modes (n,) bool."""
+        return ModalDamping(self.frequency[keep], self.ratio[keep], self.sd[keep])
+
     def above(self, frequency: float) -> "ModalDamping":
         """The modes above a frequency [Hz]: what swings on cords is damped by them."""
-        return self._of(self.frequency > frequency)
-
-    def _of(self, keep: np.ndarray) -> "ModalDamping":
-        return ModalDamping(self.frequency[keep], self.ratio[keep], self.sd[keep])
+        return self.of(self.frequency > frequency)
 
     def tested(self) -> tuple[float, FitStatistic]:
         """Chance that one structure is damped as unevenly upwards as this, and its statistic.
@@ -57,6 +58,21 @@ class ModalDamping:
         median, low, high = np.quantile(own[:, 0], (0.5, 0.005, 0.995))
         row = FitStatistic("uneven damping", float(seen[0]), float(median), float(low), float(high))
         return float(p.min()), row
+
+    def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
+        """Chance that damping follows a share (n,) of the modes by scatter alone; its statistic.
+
+        The component of ln ζ along the share, both less their means.
+        """
+        along = share - share.mean()
+        along = along / max(float(np.linalg.norm(along)), 1e-300)
+        rng = np.random.default_rng(20250105)
+        scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
+        own = (np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))) @ along
+        seen = float(np.log(self.ratio) @ along)
+        median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
+        row = FitStatistic("damping where it gives", seen, float(median), float(low), float(high))
+        return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
 
     def said(self) -> tuple[str, str, tuple[float, ...]]:
         """What stands out, where, and at which frequencies [Hz]."""
@@ -87,4 +103,4 @@ def modal_damping(identified: Identified, low: float, high: float) -> ModalDampi
     if keep.any():
         keep &= share > STRONG * np.median(share[keep])
     sd = identified.damping_sd / np.where(keep, identified.damping, 1.0)
-    return ModalDamping(f, identified.damping, sd)._of(keep & (sd < UNSURE))
+    return ModalDamping(f, identified.damping, sd).of(keep & (sd < UNSURE))

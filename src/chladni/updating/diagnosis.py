@@ -24,6 +24,7 @@ from .discrepancy import MEDIAN
 from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
+from .lossy_place import heard_of_damping
 from .reduced_model import evaluate
 from .search_round import search_round, taken
 from .several import Several, several
@@ -127,6 +128,7 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     if fits is None:
         return diagnosis
     name = winner.name if diagnosis.found else "calibration alone"
+    fits = heard_of_damping(fits, winner, problem.damping)
     note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
     if fits.passes:
         return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))

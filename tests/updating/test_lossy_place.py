@@ -1,0 +1,85 @@
+"""What gives and dissipates is told from what only gives, by which modes are damped."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from chladni.effects.crack import LineFinder, crack
+from chladni.updating.adequacy import LEAST, FitTest
+from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
+from chladni.updating.hypothesis_fit import HypothesisFit
+from chladni.updating.lossy_place import heard_of_damping, softened
+from chladni.updating.reduced_model import evaluate
+
+FITS = FitTest(True, 0.4, "it fits", "everywhere")
+
+
+def cracked(reduced, x):
+    """A line of shells of the plate that lost some of its bending stiffness, as if fitted."""
+    lines = LineFinder.of(reduced.groups.structure.assembly)
+    middle = int(np.argmin(np.linalg.norm(lines.middle - [0.13, 0.12, 0], axis=1)))
+    effect, x = crack(reduced.groups, lines.drawn(np.array([middle]), (3.0,))[0], 1), np.array([x])
+    model = reduced.model_for(effect, x)
+    fitted = SimpleNamespace(effects=(effect,), x=x, state=evaluate(model, [effect], x, False))
+    return HypothesisFit(effect, fitted, model)
+
+
+@pytest.fixture(scope="module")
+def deep(reduced):
+    return cracked(reduced, 3.0)
+
+
+def damping(frequency, ratio, sd=0.03):
+    return ModalDamping(frequency, np.asarray(ratio), np.full(len(frequency), sd))
+
+
+def test_a_small_fall_is_that_of_the_eigenvalues(reduced):
+    """To first order φᵀK₀φ / λ - 1 is λ₀ / λ - 1 (Rayleigh); the rest is of second order."""
+    slight = cracked(reduced, -7.0)
+    frequency, fall = softened(slight)
+    idle = evaluate(slight.model, slight.effects, np.array([slight.effect.parameters[0].nominal]))
+    due = idle.lam[-len(frequency) :] / (2 * np.pi * frequency) ** 2 - 1
+    assert due.max() > 1e-4
+    np.testing.assert_allclose(fall[:12], due[:12], rtol=0.02, atol=1e-3 * due.max())
+
+
+def test_modes_damped_as_much_as_they_give_are_said(deep):
+    frequency, fall = softened(deep)
+    n = int((frequency < 400).sum())
+    lossy = damping(frequency[:n], 0.005 + 0.5 * 0.6 * fall[:n])
+    found = heard_of_damping(FITS, deep, lossy)
+    assert not found.passes
+    assert "crack" in found.what
+    assert "another level" in found.what
+    assert found.where == deep.effect.text
+    assert found.statistics[-1].value > found.statistics[-1].high
+
+
+def test_evenly_or_elsewhere_damped_modes_are_not(deep):
+    frequency, fall = softened(deep)
+    n = int((frequency < 400).sum())
+    rng = np.random.default_rng(5)
+    scattered = 0.005 * np.exp(SCATTER * rng.normal(size=n))
+    assert heard_of_damping(FITS, deep, damping(frequency[:n], scattered)).passes
+    elsewhere = 0.005 + 0.3 * (fall[:n].max() - fall[:n])
+    assert heard_of_damping(FITS, deep, damping(frequency[:n], elsewhere)).passes
+
+
+def test_damping_of_foreign_poles_and_of_few_is_not_heard(deep):
+    foreign = damping(np.linspace(1e4, 2e4, 8), np.geomspace(0.001, 0.2, 8))
+    assert heard_of_damping(FITS, deep, foreign) is FITS
+    assert heard_of_damping(FITS, deep, None) is FITS
+
+
+def test_p_is_uniform_where_damping_scatters_as_believed():
+    rng = np.random.default_rng(9)
+    share = rng.exponential(size=12)
+    p = []
+    for _ in range(300):
+        sd = np.hypot(SCATTER * np.exp(LOG_SD * rng.normal()), 0.03)
+        ratio = 0.005 * np.exp(sd * rng.normal(size=12))
+        p.append(damping(np.linspace(30, 300, 12), ratio).following(share)[0])
+    assert kstest(p, "uniform").statistic < 1.63 / np.sqrt(300)  # 1 %
+    assert LEAST < 0.05
