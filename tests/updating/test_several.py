@@ -9,6 +9,7 @@ import pytest
 from chladni.effects import point_mass, sensor_mass
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
@@ -204,6 +205,17 @@ def test_what_has_a_place_stands_at_one_of_its_own(two, found):
     held = two.holding([(there, np.zeros(3))])
     assert not repeats(held, away, np.zeros(3))
     assert not repeats(held, masses_of_sensors(two.where)[0], np.zeros(1))
+
+
+def test_there_are_no_two_resonators(two):
+    """Resonators in parallel are the partial fractions of whatever is attached: two are no find."""
+    here, there = (
+        LocalResonator.near(two.where, at(two.reduced, *where)) for where in (HERE, THERE)
+    )
+    start = np.array([p.mean for p in here.parameters])
+    held = two.holding([(here, start)])
+    assert repeats(held, there, start)
+    assert not repeats(held, PointMass.near(two.where, at(two.reduced, *THERE)), np.zeros(3))
 
 
 def test_what_is_written_holds_all_that_was_found(found):

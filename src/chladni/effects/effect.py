@@ -145,6 +145,7 @@ class Effect:
     writable: ClassVar[bool] = True  # whether a deck could hold it
     remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
     elastic: ClassVar[bool] = False  # gives and nothing else: what rubs there as well is not it
+    lone: ClassVar[bool] = False  # a second one beside it would be no finding
     rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
     own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
 

@@ -40,6 +40,7 @@ class LocalResonator(MovableAttachment):
     """x = (ln mass, place along both axes of the patch, ln frequency)."""
 
     name = "local-resonator"
+    lone = True  # resonators in parallel are a partial fraction: enough of them fit anything driven
     claim = "something on the structure swings on a spring of its own"
     own_dofs: ClassVar[int] = 1
 

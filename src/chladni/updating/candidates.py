@@ -54,8 +54,11 @@ def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
     """Whether an effect at x is one that was found already, or stands where one was found.
 
     What is local and alters one place in two ways is one thing that the catalogue does not hold: a
-    patch with sharp edges was a thinning, a crack and a mass, each of which paid.
+    patch with sharp edges was a thinning, a crack and a mass, each of which paid. Nor are there two
+    of what in numbers fits anything: a rotor was two lumps on springs.
     """
+    if effect.lone and any(other.name == effect.name for other, _ in problem.found):
+        return True
     reach = APART * float(np.linalg.norm(np.ptp(problem.where.grids.point, axis=0)))
     mine = effect.location(x)
     for other, at in problem.found:
