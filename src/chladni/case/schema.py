@@ -53,7 +53,7 @@ ALIASES = {  # effects that are an ordinary number by another name
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
 PLANNED = (  # names of the public contract that no model stands behind yet
-    *("membrane-prestress", "viscoelastic-joint", "over-constraint", "rattle", "joint-friction"),
+    *("viscoelastic-joint", "over-constraint", "rattle", "joint-friction"),
     *("shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)

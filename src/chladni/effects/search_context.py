@@ -108,6 +108,9 @@ class SearchContext(Protocol):
         With ``carried`` the basis is widened by what the effect moves, as it is for a fit.
         """
 
+    def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ (m,) of the calibrated model with an effect of one number, and φᵀ ∂K/∂x φ (m, m)."""
+
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Where poles alone are known: the lowest minima over the effect's whole prior."""
 

@@ -17,13 +17,13 @@ def derivatives(xi: float, eta: float) -> np.ndarray:
     return np.stack([a * (1 + eta * b), b * (1 + xi * a)]) / 4
 
 
-_SLOPES = np.stack([derivatives(*point) for point in GAUSS])  # (4 points, 2, 4)
+SLOPES = np.stack([derivatives(*point) for point in GAUSS])  # (4 points, 2, 4)
 _CORNER_SLOPES = np.stack([derivatives(*point) for point in CORNERS])  # (4 corners, 2, 4)
 
 
 def jacobians(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Determinant (m, 4) and inverse (m, 4, 2, 2) of J, rows ∂x/∂ξ, ∂x/∂η, at the Gauss points."""
-    return invert((_SLOPES.reshape(8, 4) @ corners).reshape(-1, 4, 2, 2))
+    return invert((SLOPES.reshape(8, 4) @ corners).reshape(-1, 4, 2, 2))
 
 
 def invert(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -36,7 +36,7 @@ def invert(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def gradients(inverse: np.ndarray) -> np.ndarray:
     """∂N/∂x and ∂N/∂y at the Gauss points (m, 4, 2, 4)."""
-    return inverse @ _SLOPES
+    return inverse @ SLOPES
 
 
 def corner_slopes(corners: np.ndarray) -> np.ndarray:

@@ -183,6 +183,12 @@ class UpdatingContext:
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
 
+    def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ (m,) of the calibrated model with an effect of one number, and φᵀ ∂K/∂x φ (m, m)."""
+        base, model = self.baselines[-1], self.problem.reduced.model.split_for(effect, x)
+        state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, x]))
+        return state.lam, state.dK[-1]
+
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""
         return global_starts(self.problem, effect)

@@ -67,10 +67,13 @@ def _springs(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
     """CELAS2 of every spring that was added."""
     s, n = after.springs, len(before.springs)
     first = next_id(after) + len(after.masses)
-    unit = units.force / units.length
+    work, scalar = units.force * units.length, after.scalar_points
     for k in range(n, len(s)):
-        grid, component = int(after.ids[s.nodes[k, 0]]), int(s.component[k, 0])
-        yield ["CELAS2", first + k, s.value[k] / unit, grid, component]
+        card, value = ["CELAS2", first + k], float(s.value[k]) / work
+        ends = [(int(r), int(c)) for r, c in zip(s.nodes[k], s.component[k], strict=True) if r >= 0]
+        moves = [c <= 3 or (scalar is not None and scalar[r]) for r, c in ends]
+        value *= units.length ** sum(m * 2 / len(ends) for m in moves)
+        yield [*card, value, *(word for r, c in ends for word in (int(after.ids[r]), c))]
 
 
 def _bushes(before: Assembly, after: Assembly, units: Units, free: FreeIds) -> Iterator[list]:
