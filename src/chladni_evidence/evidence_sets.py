@@ -28,8 +28,9 @@ REPORTING = 600  # seeds below tune scales and code, those from here on report
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
     "thickness-distribution", "orthotropic-material", "stiffness-patch", "mass-patch", "crack",
+    "membrane-prestress",
 )  # fmt: skip
-OURS = ("crack", "friction-joint")  # CalculiX has no card for them here
+OURS = ("crack", "membrane-prestress", "friction-joint")  # CalculiX has no card for them here
 HOMES = {  # structures of the set outside, by what is put into them
     "rotor": ("lidded box", "ribbed plate", "curved shell", "panel"),
     "foam": ("panel", "curved shell", "bonded plates", "ribbed plate"),

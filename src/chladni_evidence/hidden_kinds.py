@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from chladni.effects.membrane_prestress import critical_force, prestressed, tensors
 from chladni.effects.ordinary import scaled as sheet_scaled
 from chladni.effects.ordinary import value
 from chladni.errors import ModelError
@@ -199,6 +200,26 @@ def _with_disc(a: Assembly, mine: np.ndarray, quantity: str, factor: float) -> A
     return replace(a, parts=(*a.parts, new), shells=replace(a.shells, part=part))
 
 
+def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """A membrane force in a sheet, 0.2 to 0.45 of buckling at size 1, either sign, one way more.
+
+    Across it has 0 to 1 of what it has along, or the other way round: no form of the catalogue but
+    by chance.
+    """
+    a, name = site.article, site.part(rng)
+    part = a.part(name)
+    if not (a.shells.part == part).any():
+        raise ModelError(f"part {name} has no sheet that could stand under a membrane force")
+    along, across, _ = tensors(a, part)
+    if rng.integers(2):
+        along, across = across, along
+    tensor = along + float(rng.uniform(0, 1)) * across
+    share = float(rng.choice([-1, 1]) * min(rng.uniform(0.2, 0.45) * size, 0.7))
+    N = share * critical_force(a, part, tensor)
+    truth = {"value": N, "part": name, "share": share}
+    return Hidden(prestressed(a, part, tensor, N), truth)
+
+
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
     a = site.article
@@ -255,4 +276,5 @@ CATALOGUED: dict[str, Kind] = {
     "stiffness-patch": stiffness_patch,
     "mass-patch": mass_patch,
     "crack": crack,
+    "membrane-prestress": prestress,
 }

@@ -23,7 +23,8 @@ ALSO = {  # names that are right as well
     "foam": ("viscoelastic-joint", "compliant-support"),
 }
 KIN = (  # what changes the same operator: the right family, if not the right name
-    {"thickness-distribution", "orthotropic-material", "stiffness-patch", "crack"},
+    {"thickness-distribution", "orthotropic-material", "stiffness-patch", "crack",
+     "membrane-prestress"},
     {"weld-missing", "weld-compliance", "adhesive-stiffness", "hem-contact", "contact-stiffness",
      "over-constraint", "viscoelastic-joint", "joint-friction", "rattle", "friction-joint"},
     {"point-mass", "mass-patch", "sensor-mass"},

@@ -196,9 +196,7 @@ def _with_springs(
 def _sheets(assembly: Assembly) -> Iterator[int]:
     """Parts that are more than a scrap of the sheets."""
     shells = assembly.shells
-    area = np.bincount(
-        shells.part, cell_areas(assembly.points, shells.nodes), len(assembly.parts)
-    )
+    area = np.bincount(shells.part, cell_areas(assembly.points, shells.nodes), len(assembly.parts))
     yield from np.flatnonzero(area > LARGE * area.sum()).tolist()
 
 
@@ -233,7 +231,9 @@ def critical_force(assembly: Assembly, part: int, tensor: np.ndarray) -> float:
     modes = normal_modes(built.system, min(MODES, len(built.system.dofs)))
     K, rows = geometric_stiffness(built, field_of(assembly, part, tensor))
     b = rows @ modes.shapes
-    return buckling((2 * np.pi * modes.frequency) ** 2, modes.shapes.T @ (K @ modes.shapes) - b.T @ b)
+    return buckling(
+        (2 * np.pi * modes.frequency) ** 2, modes.shapes.T @ (K @ modes.shapes) - b.T @ b
+    )
 
 
 FAMILY = Family(
