@@ -55,7 +55,7 @@ def lowest(system, count=6):
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("tensor", [X, Y, ROUND])
 def test_energy_of_a_wave_to_second_order(cut, tensor):
-    """∫ (∂w/∂x)² dA = k_x² AB/4 of sin k_x x sin k_y y, (2, 1) and (1, 3); the error falls as h²."""
+    """∫ (∂w/∂x)² dA = k_x² AB/4 of sin k_x x sin k_y y; the error falls as h²."""
     off = []
     for n in (24, 48):
         made = plate(A, B, n, 3 * n // 4, T)

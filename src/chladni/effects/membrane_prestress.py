@@ -20,6 +20,7 @@ from ..dynamics.eigen import normal_modes
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..fem.membrane_force import MembraneForce, geometric_stiffness, membrane_force
+from ..geometry.cells import edges_of
 from ..geometry.facets import cell_areas
 from ..model.added_points import next_id, with_points
 from ..model.assembly import Assembly, Average, Scalars
@@ -151,10 +152,8 @@ def _pulled(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
     """Rows of the grids at the rim of a part where the force pulls; all of it has if no rim."""
     shells = assembly.shells
     nodes = shells.nodes[shells.part == part]
-    edges = np.concatenate([nodes[:, [k, (k + 1) % 4]] for k in range(4)])
-    edges = np.sort(edges[edges[:, 0] != edges[:, 1]], axis=1)
-    pair, count = np.unique(edges, axis=0, return_counts=True)
-    rim = pair[count == 1]
+    sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
+    rim = sides[count == 1]
     t = np.diff(assembly.points[rim], axis=1)[:, 0]
     t /= np.linalg.norm(t, axis=1, keepdims=True)
     one_way = np.trace(tensor) < 1.5

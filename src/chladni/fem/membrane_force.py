@@ -55,7 +55,8 @@ def membrane_force(assembly: Assembly, shells: np.ndarray, tensor: np.ndarray) -
     tensor : (3, 3)        F in the basic frame: e eᵀ is a unit force along e, 1 one all round
     """
     n = len(assembly.points)
-    row, column, value = (np.concatenate(c) for c in zip(*_entries(assembly, shells, tensor)))
+    entries = zip(*_entries(assembly, shells, tensor), strict=True)
+    row, column, value = (np.concatenate(c) for c in entries)
     net = sp.csr_array((value, (row, column)), shape=(n, n))
     net.sum_duplicates()
     made = MembraneForce(net, np.zeros((3, 3)))

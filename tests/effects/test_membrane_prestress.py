@@ -1,0 +1,98 @@
+"""A membrane force as an effect: how far it may go, and what is written of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from chladni.dynamics.eigen import normal_modes
+from chladni.effects.membrane_prestress import (
+    MOST,
+    axes_of,
+    buckling,
+    critical_force,
+    prestress,
+    prestressed,
+    tensors,
+)
+from chladni.errors import ModelError
+from chladni.fem.assemble import structure
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.reduced_problem import reduced_problem
+from chladni_specimens.plates import plate
+
+TOP = 300.0
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    return plate(0.4, 0.3, 8, 6, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def reduced(sheet):
+    return reduced_problem(sheet, TOP)
+
+
+def frequencies(assembly):
+    return normal_modes(structure(assembly).system, 12).frequency
+
+
+def test_along_is_the_longest_way(sheet):
+    along, across = axes_of(sheet, 0)
+    assert_allclose(np.abs(along), [1, 0, 0], atol=1e-12)
+    assert_allclose(np.abs(across), [0, 1, 0], atol=1e-12)
+
+
+def test_buckling_of_two_springs():
+    """λ + N κ = 0 of each; a rigid motion and a mode the force does not touch set no bound."""
+    lam, kappa = np.array([0.0, 100.0, 300.0, 900.0]), np.diag([0.0, 1.0, -6.0, 0.0])
+    assert buckling(lam, kappa) == pytest.approx(50.0)
+    assert buckling(lam, 0 * kappa) == np.inf
+
+
+@pytest.mark.parametrize("form", [0, 1, 2])
+def test_no_value_buckles_the_sheet_and_its_bound_is_that_near(reduced, sheet, form):
+    """N → ±0.8 N_cr: one of both leaves about 0.2 of λ, and none takes all."""
+    tensor = tensors(sheet, 0)[form]
+    bare = prestress(reduced.structure, 0, tensor, "any")
+    state = evaluate(reduced.model, [bare], np.zeros(1))
+    effect = replace(bare, critical=buckling(state.lam, state.dK[0]))
+    assert effect.critical == pytest.approx(critical_force(sheet, 0, tensor), rel=0.02)
+    model = reduced.model_for(effect, np.zeros(1))
+    ends = [evaluate(model, [effect], np.array([x]), False).lam[6:] for x in (-9.0, 9.0)]
+    assert min(e[0] for e in ends) > 0
+    share = min((e[:1] / state.lam[6]).item() for e in ends)
+    assert share < 1 - MOST + 0.15
+    assert effect.force(9.0) == pytest.approx(MOST * effect.critical)
+
+
+def test_a_pull_stiffens_a_press_softens_and_both_leave_it_free(sheet):
+    N = 0.5 * critical_force(sheet, 0, tensor := tensors(sheet, 0)[2])
+    pressed, plain, pulled = (frequencies(prestressed(sheet, 0, tensor, f)) for f in (-N, 0, N))
+    assert np.all(pulled[6:] > plain[6:])
+    assert np.all(pressed[6:] < plain[6:])
+    assert max(pulled[:6].max(), pressed[:6].max()) < 0.01 * plain[6]
+
+
+def test_only_its_part_is_pulled():
+    two = plate(0.4, 0.3, 8, 6, 1e-3)
+    part = (two.points[two.shells.nodes].mean(axis=1)[:, 0] > 0.2).astype(int)
+    shells = replace(two.shells, part=part)
+    two = replace(two, parts=(*two.parts, replace(two.parts[0], id=2, name="right")), shells=shells)
+    made = prestressed(two, 1, np.eye(3), 500.0)
+    touched = made.springs.nodes[made.springs.nodes[:, 1] >= 0].ravel()
+    on_part = np.unique(shells.nodes[part == 1])
+    assert set(touched) - set(range(len(two.points), len(made.points))) == set(on_part)
+
+
+def test_grids_that_count_in_different_frames_are_refused(sheet):
+    axes = np.tile(np.eye(3), (len(sheet.points), 1, 1))
+    axes[3] = axes[3][[1, 2, 0]]
+    with pytest.raises(ModelError, match="different frames"):
+        prestressed(replace(sheet, axes=axes), 0, np.eye(3), 100.0)
+    turned = np.tile(np.eye(3)[[1, 2, 0]], (len(sheet.points), 1, 1))
+    same = prestressed(replace(sheet, axes=turned), 0, np.eye(3), 1000.0)
+    due = frequencies(prestressed(sheet, 0, np.eye(3), 1000.0))
+    assert_allclose(frequencies(same)[6:], due[6:], rtol=1e-9)
