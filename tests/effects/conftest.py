@@ -1,13 +1,15 @@
 """Packages that add effects, installed for a test as pip would: a folder and its entry points."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chladni.effects import registry
-from chladni.model.assembly import Assembly
+from chladni.model.added_points import next_id, with_points
+from chladni.model.assembly import Assembly, RigidBody
 from chladni.model.properties import Isotropic
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
@@ -66,6 +68,12 @@ def jointed():
 
 
 @pytest.fixture(scope="session")
+def tied():
+    """Builds the same two plates with a rigid element beside their joints."""
+    return lambda h=0.05: rigidly_tied(jointed_plates(h), (0.27, 0.16, HIGH / 2))
+
+
+@pytest.fixture(scope="session")
 def deck():
     """The two plates, for files that have no deck of their own."""
     return jointed_plates()
@@ -94,3 +102,14 @@ def jointed_plates(h: float = 0.05) -> Assembly:
     return adhesive_bead(
         made, line, ("lower", "upper"), height=0.15e-3, pitch=0.97 * h, material=SEALANT
     )[0]
+
+
+def rigidly_tied(made: Assembly, place: tuple[float, float, float]) -> Assembly:
+    """Four grids of either plate next to a place follow a point there."""
+    made, at = with_points(made, np.array([place]))
+    rows: list[int] = []
+    for part in (0, 1):
+        own = np.unique(made.shells.nodes[made.shells.part == part])
+        rows += own[np.argsort(np.linalg.norm(made.points[own] - place, axis=1))[:4]].tolist()
+    body = RigidBody(next_id(made), int(at[0]), tuple(rows), ((1, 2, 3, 4, 5, 6),) * len(rows))
+    return replace(made, rigid=(*made.rigid, body))

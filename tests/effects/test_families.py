@@ -107,10 +107,20 @@ def on_plate():
 @pytest.fixture(scope="module")
 def on_joints(jointed):
     """Two plates joined, for what acts on joints."""
-    deck = jointed()
+    return of_plates(jointed)
+
+
+@pytest.fixture(scope="module")
+def on_ties(tied):
+    """The same with a rigid element between them."""
+    return of_plates(tied)
+
+
+def of_plates(build):
+    deck = build()
     lower = np.unique(deck.shells.nodes[deck.shells.part == 0])
     spread = lower[farthest_point_sample(deck.points[lower], 6)]
-    return ground(deck, jointed(0.03), deck.ids[spread].tolist())
+    return ground(deck, build(0.03), deck.ids[spread].tolist())
 
 
 @pytest.fixture
@@ -131,7 +141,8 @@ def family(request, example_edge_mass):
 @pytest.fixture
 def on(family, request):
     """The ground a family has what it needs on."""
-    return request.getfixturevalue("on_joints" if family.needs else "on_plate")
+    joints = "on_ties" if family.name == "over-constraint" else "on_joints"
+    return request.getfixturevalue(joints if family.needs else "on_plate")
 
 
 @pytest.fixture

@@ -53,8 +53,7 @@ ALIASES = {  # effects that are an ordinary number by another name
 }
 PLACED = ("orthotropic-material", "sensor-mass", "suspension")  # where they act is known
 PLANNED = (  # names of the public contract that no model stands behind yet
-    *("viscoelastic-joint", "over-constraint", "rattle", "joint-friction"),
-    *("shaker-restraint", "compliant-support"),
+    *("viscoelastic-joint", "rattle", "joint-friction", "shaker-restraint", "compliant-support"),
 )
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 

@@ -20,6 +20,7 @@ from . import (
     mass_patch,
     membrane_prestress,
     orthotropic_material,
+    over_constraint,
     point_mass,
     sensor_fault,
     sensor_mass,
@@ -50,6 +51,7 @@ BUILT_IN = (
     adhesive_stiffness.FAMILY,
     hem_contact.FAMILY,
     contact_stiffness.FAMILY,
+    over_constraint.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
 from .effect import Effect
 from .joints import Connection
@@ -110,6 +111,9 @@ class SearchContext(Protocol):
 
     def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model with an effect of one number, and φᵀ ∂K/∂x φ (m, m)."""
+
+    def static(self, K: sp.csr_array, M: sp.csr_array) -> tuple[np.ndarray, float]:
+        """(K + σM)⁻¹ of the structure times the loads (K + σM)ᵀ of rows (k, n): (n, k), and σ."""
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Where poles alone are known: the lowest minima over the effect's whole prior."""

@@ -6,9 +6,10 @@ import numpy as np
 
 from ....errors import ModelError
 from ....model.added_points import next_id
-from ....model.assembly import Assembly, Average
+from ....model.assembly import Assembly, Average, RigidBody
 from ....units import Units
 from .free_ids import FreeIds
+from .tie_changes import rbe2
 
 
 def added_cards(before: Assembly, after: Assembly, units: Units, free: FreeIds) -> list[list]:
@@ -37,8 +38,11 @@ def _grids(before: Assembly, after: Assembly, units: Units) -> Iterator[list]:
 
 
 def _means(before: Assembly, after: Assembly) -> Iterator[list]:
-    """RBE3 of every mean that was added, its weights equal and of translations."""
+    """RBE3 of every mean that was added, its weights equal, and RBE2 of every rigid element."""
     for mean in after.rigid[len(before.rigid) :]:
+        if isinstance(mean, RigidBody):
+            yield rbe2(after, mean)
+            continue
         alike = isinstance(mean, Average) and len({(c, w) for _, c, w in mean.terms}) == 1
         if not isinstance(mean, Average) or not alike or mean.moved:
             raise ModelError(f"rigid element {mean.id} was added; only plain RBE3 are written here")
@@ -82,14 +86,16 @@ def _bushes(before: Assembly, after: Assembly, units: Units, free: FreeIds) -> I
     first = next_id(after) + len(after.masses) + len(after.springs)
     unit = units.force / units.length
     for k in range(len(before.bushes), len(b)):
-        if np.any(b.stiffness[k, 3:]) or np.any(b.viscous[k]) or np.any(b.loss[k]):
-            raise ModelError("a bush that turns or dissipates was added; CBUSH here is a spring")
+        if np.any(b.viscous[k]) or np.any(b.loss[k]):
+            raise ModelError("a bush that dissipates was added; CBUSH here is a spring")
         x, _, z = b.frame[k]
         cid, pid = 0, next(free.properties)
         if not np.allclose(b.frame[k], np.eye(3), rtol=0, atol=1e-9):
             cid = next(free.systems)
             yield ["CORD2R", cid, 0, 0.0, 0.0, 0.0, *z.tolist(), *x.tolist()]
-        yield ["PBUSH", pid, "K", *(b.stiffness[k, :3] / unit).tolist()]
+        turns = b.stiffness[k, 3:] / (unit * units.length**2)
+        K = [*(b.stiffness[k, :3] / unit).tolist(), *(turns.tolist() if turns.any() else ())]
+        yield ["PBUSH", pid, "K", *K]
         ends = [int(after.ids[row]) if row >= 0 else None for row in b.nodes[k]]
         place = (b.place[k] / units.length).tolist()
         yield ["CBUSH", first + k, pid, *ends, None, None, None, cid, None, 0, *place]

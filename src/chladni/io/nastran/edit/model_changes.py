@@ -26,6 +26,7 @@ from .split_properties import (
     taken_out,
     with_new_properties,
 )
+from .tie_changes import tie_changes
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
 
@@ -48,6 +49,7 @@ def changes(
     out += laminate_changes(deck, before, after, units, free.materials)
     out += _thickness(deck, before, after, units)
     out += joint_changes(deck, before, after, free.properties)
+    out += tie_changes(deck, before, after)
     out = with_sections(deck, before, after, units, split, out)
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := added_cards(before, after, units, free):

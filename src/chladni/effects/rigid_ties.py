@@ -1,0 +1,182 @@
+"""The rigid ties of a structure: who follows whom, and the structure with some of them let loose.
+
+A tie is what follows one rigid element on one sheet. Let loose, its followers are led by a point of
+their own at the place of the element's independent point, and move by δ (6,), three ways and three
+turns, against that.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem import rigid
+from ..fem.assemble import Structure, over_all_motions
+from ..geometry.beam_lines import fastener_bars
+from ..model.added_points import next_id, with_points
+from ..model.assembly import Assembly, Bushes, RigidBody
+
+LEAST_REACH = 0.005  # [m] by which turns count where a tie holds one grid alone
+
+
+@dataclass(frozen=True, eq=False)
+class RigidTie:
+    """Some followers of a rigid element.
+
+    Attributes
+    ----------
+    rows : rows of their points
+    lead : row of the element's independent point
+    reach : root mean square distance of the followers from their middle [m]
+    """
+
+    rows: tuple[int, ...]
+    lead: int
+    reach: float
+
+    def within(self, assembly: Assembly) -> tuple[int, RigidBody]:
+        """The rigid element that holds it, and its position."""
+        return next(
+            (k, body)
+            for k, body in enumerate(assembly.rigid)
+            if isinstance(body, RigidBody)
+            and body.independent == self.lead
+            and set(self.rows) <= set(body.dependent)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Release:
+    """What the relative motion δ = (ways, reach · turns) brings: T q + T' δ in place of T q.
+
+    Attributes
+    ----------
+    K, M : (6, n) csr          T'ᵀ A T
+    own_K, own_M : (6, 6)      T'ᵀ A T'
+    """
+
+    K: sp.csr_array
+    M: sp.csr_array
+    own_K: np.ndarray
+    own_M: np.ndarray
+
+
+def rigid_ties(assembly: Assembly) -> list[RigidTie]:
+    """Every tie that holds something against something else.
+
+    What leads a fastener or a bush to its sheet is left out: that one's own compliance is in series
+    with it. Of two sheets that follow a point on which nothing else hangs, one is enough.
+    """
+    sheet, used = _sheet_of(assembly), _used(assembly)
+    led = _fastened(assembly)
+    out: list[RigidTie] = []
+    for body in assembly.rigid:
+        if not isinstance(body, RigidBody) or body.independent in led:
+            continue
+        on = sheet[list(body.dependent)]
+        groups = [np.flatnonzero(on == s).tolist() for s in np.unique(on)]
+        if body.independent not in used:
+            groups = sorted(groups, key=len)[: len(groups) if len(groups) > 2 else len(groups) - 1]
+        out += [_tie(assembly, body, legs) for legs in groups]
+    return out
+
+
+def _tie(assembly: Assembly, body: RigidBody, legs: list[int]) -> RigidTie:
+    rows = tuple(body.dependent[k] for k in legs)
+    X = assembly.points[list(rows)]
+    reach = float(np.sqrt(((X - X.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    return RigidTie(rows, body.independent, max(reach, LEAST_REACH))
+
+
+def _sheet_of(assembly: Assembly) -> np.ndarray:
+    """Part of the elements at each point (n,), shells before beams before solids; -1: of none."""
+    out = np.full(len(assembly.points), -1)
+    groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
+    for group in groups:
+        out[group.nodes.ravel()] = np.repeat(group.part, group.nodes.shape[1])
+    return out
+
+
+def _used(assembly: Assembly) -> set[int]:
+    """Rows of points on which something hangs beside rigid elements that they lead."""
+    a = assembly
+    nodes = [a.shells.nodes, a.beams.nodes, *(s.nodes for s in a.solids), a.springs.nodes,
+             a.bushes.nodes, a.scalar_masses.nodes, a.masses.node, a.supports[:, 0]]  # fmt: skip
+    lead = [b.independent for b in a.rigid if isinstance(b, RigidBody)]
+    follow = [r for b in a.rigid for r in _others(b)]
+    twice = [r for r in set(lead) if lead.count(r) > 1]
+    return {int(r) for rows in nodes for r in rows.ravel()} | set(follow) | set(twice)
+
+
+def _others(body: object) -> Iterator[int]:
+    """Points of a rigid element that do not lead it."""
+    if isinstance(body, RigidBody):
+        yield from body.dependent
+    else:
+        yield from (int(r) for r in getattr(body, "nodes", ()))
+        yield from (int(t[0]) for t in getattr(body, "terms", ()))
+        yield from [int(body.reference)] if hasattr(body, "reference") else []
+
+
+def _fastened(assembly: Assembly) -> set[int]:
+    """Rows of the ends of fasteners and of bushes between points."""
+    bars = [assembly.beams.nodes[piece].ravel() for piece in fastener_bars(assembly)]
+    bushes = assembly.bushes.nodes[(assembly.bushes.nodes >= 0).all(axis=1)].ravel()
+    return set(np.concatenate([bushes, *bars]).astype(int).tolist())
+
+
+def loosened(assembly: Assembly, tie: RigidTie) -> tuple[Assembly, int]:
+    """The assembly with the tie's followers led by a point of their own, and its row."""
+    grown, at = with_points(assembly, assembly.points[[tie.lead]])
+    (position, body), lead = tie.within(assembly), int(at[0])
+    legs, bodies = np.isin(body.dependent, tie.rows), list(assembly.rigid)
+    if legs.all():
+        bodies[position] = replace(body, independent=lead)
+        return replace(grown, rigid=tuple(bodies)), lead
+    bodies[position] = _with_legs(body, ~legs)
+    new = replace(_with_legs(body, legs), id=next_id(assembly), independent=lead)
+    return replace(grown, rigid=(*bodies, new)), lead
+
+
+def _with_legs(body: RigidBody, legs: np.ndarray) -> RigidBody:
+    at = np.flatnonzero(legs)
+    rows, motions = tuple(body.dependent[k] for k in at), tuple(body.components[k] for k in at)
+    return replace(body, dependent=rows, components=motions)
+
+
+def sprung(assembly: Assembly, tie: RigidTie, k: float) -> Assembly:
+    """The assembly with springs k [N/m] all ways and k reach² all turns in place of the tie."""
+    made, lead = loosened(assembly, tie)
+    old, none = made.bushes, np.zeros((1, 6))
+    new = Bushes(
+        np.append(old.ids, next_id(made)), np.vstack([old.nodes, [[tie.lead, lead]]]),
+        np.concatenate([old.frame, np.eye(3)[None]]),
+        np.vstack([old.place, made.points[[lead]]]),
+        np.vstack([old.stiffness, k * np.r_[1, 1, 1, [tie.reach**2] * 3]]),
+        np.vstack([old.viscous, none]), np.vstack([old.loss, none]),
+    )  # fmt: skip
+    return replace(made, bushes=new)
+
+
+def releases(built: Structure, ties: list[RigidTie]) -> list[Release]:
+    """What each of them brings when it is let loose alone."""
+    if not ties:
+        return []
+    M, _, K, _ = over_all_motions(built.assembly)
+    KT, MT = sp.csr_array(K @ built.T), sp.csr_array(M @ built.T)
+    out = []
+    for tie in ties:
+        grown, lead = loosened(built.assembly, tie)
+        T, independent = rigid.transformation(grown)
+        own = np.searchsorted(independent, 6 * lead + np.arange(6))
+        scale = np.diag(np.r_[1, 1, 1, [1 / tie.reach] * 3])
+        P = sp.csr_array(T[: K.shape[0]].tocsc()[:, own] @ scale)
+        out.append(
+            Release(
+                sp.csr_array(P.T @ KT), sp.csr_array(P.T @ MT),
+                (P.T @ K @ P).toarray(), (P.T @ M @ P).toarray(),
+            )
+        )  # fmt: skip
+    return out
