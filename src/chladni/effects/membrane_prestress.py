@@ -18,13 +18,14 @@ import scipy.sparse as sp
 
 from ..dynamics.eigen import normal_modes
 from ..errors import ModelError
-from ..fem.assemble import Structure, structure
-from ..fem.membrane_force import MembraneForce, geometric_stiffness, membrane_force
+from ..fem.assemble import Structure, frames, structure
+from ..fem.membrane_force import MembraneForce, geometric_stiffness, membrane_force, with_mean
 from ..geometry.cells import edges_of
 from ..geometry.facets import cell_areas
-from ..model.added_points import next_id, with_points
-from ..model.assembly import Assembly, Average, Scalars
-from .effect import WIDER, Effect, MatrixTerm, Parameter, PointTerm
+from ..geometry.sampling import farthest_point_sample
+from ..model.added_points import next_id
+from ..model.assembly import Assembly, Scalars
+from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_places
@@ -37,12 +38,13 @@ FOLLOWED = 2
 FORMS = ("along", "across", "all round")
 RIGID = 1e-6  # of the middle λ: below it a motion is rigid
 ACROSS = 0.7  # cosine between a rim's edge and the force: more, and the edge does not pull
+LEADS = 12  # grids at the rim with which the pulls there turn
 MODES = 40  # that tell what buckles an article
 
 
 @dataclass(frozen=True, eq=False)
 class MembranePrestress(Effect):
-    """K + N (K_g - Σ bᵀ b), N = 0.8 N_cr tanh x; see :mod:`..fem.membrane_force`.
+    """K + N K_g, N = 0.8 N_cr tanh x; see :mod:`..fem.membrane_force`.
 
     ``critical`` is N_cr [N/m], ``tensor`` (3, 3) the direction of a unit force.
     """
@@ -54,24 +56,15 @@ class MembranePrestress(Effect):
     tensor: np.ndarray = field(default_factory=lambda: np.eye(3))
     critical: float = 1.0
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
-    turns: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     def force(self, x: float) -> float:
         """N [N/m], positive where it pulls."""
         return float(MOST * self.critical * np.tanh(x))
 
-    def _slope(self, x: float) -> float:
-        return float(MOST * self.critical / np.cosh(x) ** 2)
-
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """N K_g."""
-        return (MatrixTerm("K", self.operator, self.force(x[0]), np.array([self._slope(x[0])])),)
-
-    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """What the pulls at the rim take back as they turn with the sheet."""
-        one = -np.ones(self.turns.shape[0])
-        slope = self._slope(x[0]) * one[:, None]
-        return (PointTerm("K", self.turns, self.force(x[0]) * one, slope),)
+        slope = MOST * self.critical / np.cosh(x[0]) ** 2
+        return (MatrixTerm("K", self.operator, self.force(x[0]), np.array([slope])),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CELAS2 between the grids of the part, and on the mean turn of its rim."""
@@ -100,17 +93,22 @@ def field_of(assembly: Assembly, part: int, tensor: np.ndarray) -> MembraneForce
     return membrane_force(assembly, np.flatnonzero(assembly.shells.part == part), tensor)
 
 
+def unit_stiffness(built: Structure, part: int, tensor: np.ndarray) -> sp.csr_array:
+    """K_g (n, n) of a unit force in a part."""
+    rim = pulled_rim(built.assembly, part, tensor)
+    return geometric_stiffness(built, field_of(built.assembly, part, tensor), rim)
+
+
 def prestress(
     built: Structure, part: int, tensor: np.ndarray, form: str, tried: int = 1
 ) -> MembranePrestress:
     """A force of a form in a part, of which nothing is known yet: N_cr = 1 / 0.8."""
     a = built.assembly
-    K, rows = geometric_stiffness(built, field_of(a, part, tensor))
     unknown = Parameter("N", "N/m", 0.0, SD, kind="linear", step=0.3, starts=STARTS)
     name = a.parts[part].name
     return MembranePrestress(
         (unknown,), f"{form} {name}", (name,), trials_factor=tried, part=part, tensor=tensor,
-        critical=1 / MOST, operator=K, turns=rows,
+        critical=1 / MOST, operator=unit_stiffness(built, part, tensor),
     )  # fmt: skip
 
 
@@ -140,16 +138,16 @@ def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> 
             f"the grids of {assembly.parts[part].name} count displacements in different frames "
             "(CD), so that scalar springs between them cannot hold a membrane force"
         )
-    made, at = _mean_turn(assembly, part, _pulled(assembly, part, tensor))
-    nodes, component, value = _full(at, -N * force.turning)
-    made = _with_springs(made, nodes, component, value)
+    made, at = with_mean(assembly, pulled_rim(assembly, part, tensor))
+    moments = sp.csr_array(frames(assembly).T @ force.moments)
+    made = _with_springs(made, *_turns(at, N * force.turning, N * moments))
     three = np.repeat(np.arange(1, 4), len(k))
     ends = np.column_stack([three, three])
     return _with_springs(made, np.tile(pairs, (3, 1)), ends, np.tile(N * k, 3))
 
 
-def _pulled(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
-    """Rows of the grids at the rim of a part where the force pulls; all of it has if no rim."""
+def pulled_rim(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
+    """Some grids at the rim of a part where the force pulls, as rows; any where it has no rim."""
     shells = assembly.shells
     nodes = shells.nodes[shells.part == part]
     sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
@@ -159,24 +157,37 @@ def _pulled(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
     one_way = np.trace(tensor) < 1.5
     pulls = np.einsum("ka,ab,kb->k", t, tensor, t) < ACROSS**2 if one_way else len(rim) > 0
     found = np.unique(rim[np.broadcast_to(pulls, len(rim))])
-    return found if len(found) > 2 else np.unique(nodes)
+    found = found if len(found) > 2 else np.unique(nodes)
+    return np.asarray(found[farthest_point_sample(assembly.points[found], LEADS)])
 
 
-def _mean_turn(assembly: Assembly, part: int, rows: np.ndarray) -> tuple[Assembly, int]:
-    """The assembly with a point that moves as the mean of others, and its row."""
-    grown, at = with_points(assembly, assembly.points[rows].mean(axis=0)[None])
-    terms = tuple((int(r), (1, 2, 3), 1.0) for r in rows)
-    mean = Average(next_id(assembly), int(at[0]), (1, 2, 3, 4, 5, 6), terms)
-    return replace(grown, rigid=(*grown.rigid, mean)), int(at[0])
+def _turns(
+    row: int, cost: np.ndarray, moments: sp.csr_array
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Springs that make θᵀ C θ - 2 uᵀ m θ of the turns θ of a point: nodes, components, values.
 
-
-def _full(row: int, A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Springs that make A (3, 3) on the turns of a point: to ground, and between its turns."""
-    i, j = np.triu_indices(3, 1)
-    nodes = np.array([(row, -1)] * 3 + [(row, row)] * 3)
-    component = np.column_stack([np.r_[0, 1, 2, i], np.r_[0, 1, 2, j]]) + 4
-    value = np.r_[A.sum(axis=1), -A[i, j]]
-    some = np.abs(value) > 1e-9 * np.abs(A).max()
+    A spring h couples two motions by -h and holds both by h, which springs to ground take back.
+    """
+    m = sp.coo_array(moments)
+    a, b = np.triu_indices(3, 1)
+    ground = np.full(m.nnz, -1)
+    nodes = np.concatenate(
+        [
+            np.array([(row, -1)] * 3 + [(row, row)] * 3),
+            np.column_stack([m.row // 6, np.full(m.nnz, row)]),
+            np.column_stack([m.row // 6, ground]),
+        ]
+    )
+    component = 1 + np.concatenate(
+        [
+            np.column_stack([np.r_[0, 1, 2, a], np.r_[0, 1, 2, b]]) + 3,
+            np.column_stack([m.row % 6, m.col + 3]),
+            np.column_stack([m.row % 6, m.row % 6]),
+        ]
+    )
+    held = cost.sum(axis=1) - np.asarray(moments.sum(axis=0)).ravel()
+    value = np.concatenate([held, -cost[a, b], m.data, -m.data])
+    some = value != 0
     return nodes[some], component[some], value[some]
 
 
@@ -228,11 +239,8 @@ def critical_force(assembly: Assembly, part: int, tensor: np.ndarray) -> float:
     """N_cr of a part over the structure's lowest modes [N/m]."""
     built = structure(assembly)
     modes = normal_modes(built.system, min(MODES, len(built.system.dofs)))
-    K, rows = geometric_stiffness(built, field_of(assembly, part, tensor))
-    b = rows @ modes.shapes
-    return buckling(
-        (2 * np.pi * modes.frequency) ** 2, modes.shapes.T @ (K @ modes.shapes) - b.T @ b
-    )
+    K, lam = unit_stiffness(built, part, tensor), (2 * np.pi * modes.frequency) ** 2
+    return buckling(lam, modes.shapes.T @ (K @ modes.shapes))
 
 
 FAMILY = Family(

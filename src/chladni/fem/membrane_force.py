@@ -6,37 +6,42 @@ row a point whose rows sum to zero: translations cost exactly nothing, and L is 
 terms of motions in the sheet are small beside its own stiffness there).
 
 Where the force does not vanish at the rim somebody holds it there. Were these pulls fixed in space,
-to turn the sheet as a whole would cost C = Σ_ij -L_ij (d² 1 - d dᵀ), d the way from i to j; they
-are taken to turn with it instead, as those of a frame do round a sheet.
+to turn the sheet as a whole would cost; they are taken to turn with some grids at the rim instead,
+as those of a frame do round a sheet: with θ the mean turn of these, the springs of the net feel
+u_i - u_j - θ × (x_i - x_j). What is held at its rim has no such θ.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..model.assembly import Assembly
+from ..model.added_points import next_id, with_points
+from ..model.assembly import Assembly, Average
 from .assemble import Structure
+from .average import average_rows
 from .energy import rigid_motions
 from .shell_membrane import SLOPES as QUAD_SLOPES
 from .sparse_assembly import congruence
 from .triangle import SLOPES as TRIANGLE_SLOPES
 
-TURNS = 1e-6  # of the dearest turn: what costs less is free by itself
+NOTHING = 1e-12  # of the largest entry: rounding
 
 
 @dataclass(frozen=True, eq=False)
 class MembraneForce:
-    """A force field over some shells, by what it does.
+    """A force field over some shells, by what it does; all per unit of force.
 
     Attributes
     ----------
-    net : (n, n) csr     L over the points of the assembly, per unit of force [-]
-    turning : (3, 3)     C, what turns of the whole would cost [m²]
+    net : (n, n) csr        L over the points of the assembly [-]
+    moments : (6 n, 3) csr  K_g R, what turns of the whole do to motions of points [m]
+    turning : (3, 3)        C = Rᵀ K_g R, what they cost [m²]
     """
 
     net: sp.csr_array
+    moments: sp.csr_array
     turning: np.ndarray
 
     @property
@@ -58,12 +63,15 @@ def membrane_force(assembly: Assembly, shells: np.ndarray, tensor: np.ndarray) -
     entries = zip(*_entries(assembly, shells, tensor), strict=True)
     row, column, value = (np.concatenate(c) for c in entries)
     net = sp.csr_array((value, (row, column)), shape=(n, n))
-    net.sum_duplicates()
-    made = MembraneForce(net, np.zeros((3, 3)))
-    (i, j), k = made.springs[0].T, made.springs[1]
-    d = assembly.points[j] - assembly.points[i]
-    cost = (k * (d**2).sum(axis=1)).sum() * np.eye(3) - np.einsum("k,ka,kb->ab", k, d, d)
-    return MembraneForce(net, cost)
+    R = rigid_motions(assembly)[:, 3:]
+    KR = _over_motions(net) @ R
+    KR[np.abs(KR) < NOTHING * np.abs(KR).max(initial=0.0)] = 0.0
+    return MembraneForce(net, sp.csr_array(KR), R.T @ KR)
+
+
+def _over_motions(net: sp.csr_array) -> sp.csr_array:
+    """L ⊗ 1 over the six motions of every point."""
+    return sp.csr_array(sp.kron(net, sp.csr_array(np.diag([1.0, 1, 1, 0, 0, 0]))))
 
 
 def _entries(
@@ -84,18 +92,25 @@ def _entries(
         yield np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, k).ravel(), K.ravel()
 
 
-def geometric_stiffness(
-    built: Structure, force: MembraneForce
-) -> tuple[sp.csr_array, sp.csr_array]:
-    """K_g (n, n) of a unit force, and rows b (k, n) with K_g - Σ bᵀ b idle in every turn.
+def with_mean(assembly: Assembly, rows: np.ndarray) -> tuple[Assembly, int]:
+    """The assembly with a point that moves and turns as the mean of others, and its row."""
+    grown, at = with_points(assembly, assembly.points[rows].mean(axis=0)[None])
+    terms = tuple((int(r), (1, 2, 3), 1.0) for r in rows)
+    mean = Average(next_id(assembly), int(at[0]), (1, 2, 3, 4, 5, 6), terms)
+    return replace(grown, rigid=(*grown.rigid, mean)), int(at[0])
 
-    With R the turns, K_g - K_g R (Rᵀ K_g R)⁻¹ Rᵀ K_g. Where the sheet is held at its rim b is
-    nothing: ∫ ∂w/∂a dA is that of w round the rim.
+
+def geometric_stiffness(built: Structure, force: MembraneForce, rim: np.ndarray) -> sp.csr_array:
+    """(1 - R B)ᵀ K_g (1 - R B) over the free motions, θ = B u the mean turn of the points ``rim``.
+
+    No rigid motion costs anything, and what pulls everywhere has no negative stiffness.
     """
-    translations = sp.csr_array(np.diag([1.0, 1, 1, 0, 0, 0]))
-    K = sp.csr_array(sp.kron(force.net, translations))
-    KR = K @ rigid_motions(built.assembly)[:, 3:]
-    cost, axes = np.linalg.eigh(force.turning)
-    kept = cost > TURNS * cost.max()
-    rows = (KR @ (axes[:, kept] / np.sqrt(cost[kept]))).T
-    return congruence(built.T, K), sp.csr_array(sp.csr_array(rows) @ built.T)
+    bare = replace(built.assembly, axes=None, rigid=())
+    grown, at = with_mean(bare, rim)
+    mean = average_rows(grown, np.array([0]))
+    where = (mean.dof[mean.row] - 6 * at, mean.on)
+    B = sp.csr_array((mean.factor, where), shape=(6, 6 * len(grown.points)))
+    B = B[3:, : built.T.shape[0]]
+    KRB = force.moments @ B
+    K = _over_motions(force.net) - KRB - KRB.T + B.T @ (force.turning @ B)
+    return congruence(built.T, sp.csr_array(K))
