@@ -203,14 +203,13 @@ def _with_disc(a: Assembly, mine: np.ndarray, quantity: str, factor: float) -> A
 def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A membrane force in a sheet, 0.2 to 0.45 of buckling at size 1, either sign, one way more.
 
-    Across it has 0 to 1 of what it has along, or the other way round: no form of the catalogue but
-    by chance.
+    Across it has 0 to 1 of what it has along, or the other way round.
     """
     a, name = site.article, site.part(rng)
     part = a.part(name)
     if not (a.shells.part == part).any():
         raise ModelError(f"part {name} has no sheet that could stand under a membrane force")
-    along, across, _ = tensors(a, part)
+    along, across = tensors(a, part)
     if rng.integers(2):
         along, across = across, along
     tensor = along + float(rng.uniform(0, 1)) * across

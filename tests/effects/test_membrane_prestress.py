@@ -52,24 +52,27 @@ def test_buckling_of_two_springs():
     assert buckling(lam, 0 * kappa) == np.inf
 
 
-@pytest.mark.parametrize("form", [0, 1, 2])
-def test_no_value_buckles_the_sheet_and_its_bound_is_that_near(reduced, sheet, form):
-    """N → ±0.8 N_cr: one of both leaves about 0.2 of λ, and none takes all."""
-    tensor = tensors(sheet, 0)[form]
-    bare = prestress(reduced.structure, 0, tensor, "any")
-    state = evaluate(reduced.model, [bare], np.zeros(1))
-    effect = replace(bare, critical=buckling(state.lam, state.dK[0]))
-    assert effect.critical == pytest.approx(critical_force(sheet, 0, tensor), rel=0.02)
-    model = reduced.model_for(effect, np.zeros(1))
-    ends = [evaluate(model, [effect], np.array([x]), False).lam[6:] for x in (-9.0, 9.0)]
-    assert min(e[0] for e in ends) > 0
-    share = min((e[:1] / state.lam[6]).item() for e in ends)
-    assert share < 1 - MOST + 0.15
-    assert effect.force(9.0) == pytest.approx(MOST * effect.critical)
+def test_no_value_buckles_the_sheet_and_its_bound_is_that_near(reduced, sheet):
+    """x → ±∞ alone: a λ at about 0.3 of what it was; both at once, whatever signs: none below 0."""
+    bare = prestress(reduced.structure, 0)
+    state = evaluate(reduced.model, [bare], np.zeros(2))
+    critical = np.array([buckling(state.lam, K) for K in state.dK])
+    effect = replace(bare, critical=critical)
+    for k, tensor in enumerate(tensors(sheet, 0)):
+        assert critical[k] == pytest.approx(critical_force(sheet, 0, tensor), rel=0.02)
+        assert effect.force(1e3 * np.eye(2)[k])[k] == pytest.approx(MOST * critical[k], rel=1e-5)
+    model = reduced.model_for(effect, np.zeros(2))
+
+    def lowest(x):
+        return evaluate(model, [effect], np.array(x, float), False).lam[6]
+
+    alone = [min(lowest([-99 * a, -99 * b]), lowest([99 * a, 99 * b])) for a, b in np.eye(2)]
+    assert min(alone) / state.lam[6] < 1 - MOST + 0.15
+    assert min(lowest([99 * a, 99 * b]) for a in (-1, 1) for b in (-1, 1)) > 0
 
 
 def test_a_pull_stiffens_a_press_softens_and_both_leave_it_free(sheet):
-    N = 0.5 * critical_force(sheet, 0, tensor := tensors(sheet, 0)[2])
+    N = 0.5 * critical_force(sheet, 0, tensor := np.eye(3))
     pressed, plain, pulled = (frequencies(prestressed(sheet, 0, tensor, f)) for f in (-N, 0, N))
     assert np.all(pulled[6:] > plain[6:])
     assert np.all(pressed[6:] < plain[6:])

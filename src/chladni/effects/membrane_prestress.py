@@ -1,12 +1,11 @@
 """A sheet under a membrane force: assembled with strain, or warmer or colder than what holds it.
 
-The force N [N/m] is even over a part: along it, across it, or the same all round.  Low modes tell
-one strength well; how the two directions share it is told by which of their families moved, so that
-it is asked as one of three forms, not as a second number: a free ratio is one more number that
-mimics the sheet's own stiffness.
+The forces N [N/m] along and across a part are even over it. Each has its own family of modes (waves
+along, waves across), so that data tell both: three forms of one strength (along, across, all round)
+lost on a plate and a panel to orthotropy and thinning where the truth was none of the three.
 
-N stays within 0.8 of what would buckle the sheet (or, pulled, of as much), which is also the scale
-of its prior: a sheet that has not buckled says no more of its N.
+N stays within 0.7 of what would buckle the sheet (or, pulled, of as much), both together as well;
+that is also the scale of its prior: a sheet that has not buckled says no more of its N.
 """
 
 from collections.abc import Iterator
@@ -30,12 +29,12 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_places
 
-MOST = 0.8  # of what buckles
-SD = 0.4  # of artanh(N / (0.8 N_cr)): within a third of buckling, mostly
-STARTS = (-0.5, 0.5)
+MOST = 0.7  # of what buckles: of both at once 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
+SD = 0.4  # of N / (0.7 N_cr) where that is small: within a third of buckling, mostly
+STARTS = (-0.35, 0.35)
 LARGE = 0.05  # share of the shells' area below which a part is not asked
 FOLLOWED = 2
-FORMS = ("along", "across", "all round")
+WAYS = ("along", "across")
 RIGID = 1e-6  # of the middle λ: below it a motion is rigid
 ACROSS = 0.7  # cosine between a rim's edge and the force: more, and the edge does not pull
 LEADS = 12  # grids at the rim with which the pulls there turn
@@ -44,36 +43,44 @@ MODES = 40  # that tell what buckles an article
 
 @dataclass(frozen=True, eq=False)
 class MembranePrestress(Effect):
-    """K + N K_g, N = 0.8 N_cr tanh x; see :mod:`..fem.membrane_force`.
+    """K + Σ N_k K_k, N_k = 0.7 N_cr,k x_k / √(1 + |x|²); see :mod:`..fem.membrane_force`.
 
-    ``critical`` is N_cr [N/m], ``tensor`` (3, 3) the direction of a unit force.
+    ``critical`` are N_cr,k [N/m], ``tensors`` (2, 3, 3) the unit forces along and across.
     """
 
     name = "membrane-prestress"
     claim = "a sheet stands under a membrane force: it was strained, warmed or cooled in its place"
 
     part: int = 0
-    tensor: np.ndarray = field(default_factory=lambda: np.eye(3))
-    critical: float = 1.0
-    operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    tensors: np.ndarray = field(default_factory=lambda: np.zeros((2, 3, 3)))
+    critical: np.ndarray = field(default_factory=lambda: np.ones(2))
+    operators: tuple[sp.csr_array, ...] = ()
 
-    def force(self, x: float) -> float:
-        """N [N/m], positive where it pulls."""
-        return float(MOST * self.critical * np.tanh(x))
+    def force(self, x: np.ndarray) -> np.ndarray:
+        """N (2,) [N/m], positive where it pulls."""
+        return np.asarray(MOST * self.critical * x / np.sqrt(1 + x @ x))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """N K_g."""
-        slope = MOST * self.critical / np.cosh(x[0]) ** 2
-        return (MatrixTerm("K", self.operator, self.force(x[0]), np.array([slope])),)
+        """N_k K_k."""
+        s = 1 + x @ x
+        slope = MOST * self.critical[:, None] * (np.eye(2) - np.outer(x, x) / s) / np.sqrt(s)
+        every = zip(self.operators, self.force(x), slope, strict=True)
+        return tuple(MatrixTerm("K", K, float(N), g) for K, N, g in every)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CELAS2 between the grids of the part, and on the mean turn of its rim."""
-        return prestressed(assembly, self.part, self.tensor, self.force(x[0]))
+        for tensor, N in zip(self.tensors, self.force(x), strict=True):
+            assembly = prestressed(assembly, self.part, tensor, float(N))
+        return assembly
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """N."""
-        low, here, high = (self.force(x[0] + s * 1.96 * WIDER * sd[0]) for s in (-1, 0, 1))
-        return (Estimate("N", here, "N/m", low, high),)
+        """N along and across, each with the other where it is."""
+        out = []
+        for k, p in enumerate(self.parameters):
+            step = 1.96 * WIDER * sd[k] * np.eye(2)[k]
+            low, here, high = (float(self.force(x + s * step)[k]) for s in (-1, 0, 1))
+            out.append(Estimate(p.name, here, "N/m", low, high))
+        return tuple(out)
 
 
 def axes_of(assembly: Assembly, part: int) -> np.ndarray:
@@ -82,10 +89,9 @@ def axes_of(assembly: Assembly, part: int) -> np.ndarray:
     return np.asarray(np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2][:2])
 
 
-def tensors(assembly: Assembly, part: int) -> tuple[np.ndarray, ...]:
-    """A unit force along the part, across it, and all round (3, 3) each."""
-    along, across = axes_of(assembly, part)
-    return np.outer(along, along), np.outer(across, across), np.eye(3)
+def tensors(assembly: Assembly, part: int) -> np.ndarray:
+    """A unit force along the part and across it (2, 3, 3)."""
+    return np.stack([np.outer(e, e) for e in axes_of(assembly, part)])
 
 
 def field_of(assembly: Assembly, part: int, tensor: np.ndarray) -> MembraneForce:
@@ -99,16 +105,18 @@ def unit_stiffness(built: Structure, part: int, tensor: np.ndarray) -> sp.csr_ar
     return geometric_stiffness(built, field_of(built.assembly, part, tensor), rim)
 
 
-def prestress(
-    built: Structure, part: int, tensor: np.ndarray, form: str, tried: int = 1
-) -> MembranePrestress:
-    """A force of a form in a part, of which nothing is known yet: N_cr = 1 / 0.8."""
+def prestress(built: Structure, part: int, tried: int = 1) -> MembranePrestress:
+    """Forces in a part of which nothing is known yet: N_cr = 1 / 0.7."""
     a = built.assembly
-    unknown = Parameter("N", "N/m", 0.0, SD, kind="linear", step=0.3, starts=STARTS)
-    name = a.parts[part].name
+    both, name = tensors(a, part), a.parts[part].name
+    unknown = tuple(
+        Parameter(f"N {way}", "N/m", 0.0, SD, kind="linear", step=0.3, starts=STARTS)
+        for way in WAYS
+    )
     return MembranePrestress(
-        (unknown,), f"{form} {name}", (name,), trials_factor=tried, part=part, tensor=tensor,
-        critical=1 / MOST, operator=unit_stiffness(built, part, tensor),
+        unknown, f"in {name}", (name,), trials_factor=tried, part=part, tensors=both,
+        critical=np.full(2, 1 / MOST),
+        operators=tuple(unit_stiffness(built, part, tensor) for tensor in both),
     )  # fmt: skip
 
 
@@ -211,28 +219,31 @@ def _sheets(assembly: Assembly) -> Iterator[int]:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The parts and forms that explain most, each within what would buckle its sheet."""
+    """The parts whose forces explain most, each within what would buckle its sheet."""
     built = context.where.groups.structure
     parts = list(_sheets(built.assembly))
-    effects, centre = [], []
+    effects = []
     for part in parts:
-        for tensor, form in zip(tensors(built.assembly, part), FORMS, strict=True):
-            bare = prestress(built, part, tensor, form, len(FORMS) * len(parts))
-            critical = buckling(*context.stiffened(bare, np.zeros(1)))
-            if np.isfinite(critical):
-                effects.append(replace(bare, critical=critical))
-                centre.append(built.assembly.points.mean(axis=0))
-    return best_places(context, effects, np.array(centre), FOLLOWED, -1.0) if effects else []
+        bare = prestress(built, part, len(parts))
+        lam, K = context.stiffened(bare, np.zeros(2))
+        critical = np.array([buckling(lam, each) for each in K])
+        if np.isfinite(critical).all():
+            effects.append(replace(bare, critical=critical))
+    centre = np.zeros((len(effects), 3))
+    return best_places(context, effects, centre, FOLLOWED, -1.0) if effects else []
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A force along, across or all round the first part, 0.3 to 0.7 of buckling, either sign."""
-    made, form = article.assembly, int(rng.integers(len(FORMS)))
-    N = float(rng.choice([-1, 1]) * rng.uniform(0.3, 0.7)) * critical_force(
-        made, 0, tensor := tensors(made, 0)[form]
-    )
-    truth = {"value": N, "form": FORMS[form], "parameters": {"N": N}}
-    return replace(article, assembly=prestressed(made, 0, tensor, N), truth=truth)
+    """Forces along and across the first part, one 0.25 to 0.5 of buckling, the other up to 0.15."""
+    made = article.assembly
+    share = rng.choice([-1, 1], 2) * np.array([rng.uniform(0.25, 0.5), rng.uniform(0, 0.15)])
+    truth = {}
+    for k, part_of in zip(rng.permutation(2), share, strict=True):
+        tensor = tensors(article.assembly, 0)[k]
+        N = float(part_of) * critical_force(article.assembly, 0, tensor)
+        made, truth[f"N {WAYS[k]}"] = prestressed(made, 0, tensor, N), N
+    largest = max(truth.values(), key=abs)
+    return replace(article, assembly=made, truth={"value": largest, "parameters": truth})
 
 
 def critical_force(assembly: Assembly, part: int, tensor: np.ndarray) -> float:

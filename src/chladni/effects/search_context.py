@@ -110,7 +110,7 @@ class SearchContext(Protocol):
         """
 
     def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ (m,) of the calibrated model with an effect of one number, and φᵀ ∂K/∂x φ (m, m)."""
+        """λ (m,) of the calibrated model with an effect at x, and φᵀ ∂K/∂x φ (n_p, m, m)."""
 
     def static(self, K: sp.csr_array, M: sp.csr_array) -> tuple[np.ndarray, float]:
         """(K + σM)⁻¹ of the structure times the loads (K + σM)ᵀ of rows (k, n): (n, k), and σ."""

@@ -186,10 +186,10 @@ class UpdatingContext:
         return out
 
     def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ (m,) of the calibrated model with an effect of one number, and φᵀ ∂K/∂x φ (m, m)."""
+        """λ (m,) of the calibrated model with an effect at x, and φᵀ ∂K/∂x φ (n_p, m, m)."""
         base, model = self.baselines[-1], self.problem.reduced.model.split_for(effect, x)
         state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, x]))
-        return state.lam, state.dK[-1]
+        return state.lam, state.dK[len(base.x) :]
 
     def static(self, K: sp.csr_array, M: sp.csr_array) -> tuple[np.ndarray, float]:
         """(K + σM)⁻¹ of the structure times the loads (K + σM)ᵀ of rows (k, n): (n, k), and σ."""
