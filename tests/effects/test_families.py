@@ -16,6 +16,7 @@ from chladni.effects.family import Article
 from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
+from chladni.effects.rigid_ties import on_firm_springs
 from chladni.effects.surroundings import Setup
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
@@ -82,7 +83,7 @@ def recorded(reduced, sensors):
 
 
 def ground(deck, fine, sensors):
-    reduced = reduced_problem(deck, TOP)
+    reduced = reduced_problem(on_firm_springs(deck), TOP)
     hangers = sensors[1], sensors[3]
     shares = tuple(((int(g), 1.0),) for g in sensors)
     setup = Setup(shares, hangers, mass_properties(deck)[0], TOP)
@@ -117,6 +118,7 @@ def on_ties(tied):
 
 
 def of_plates(build):
+    """Ground on two plates; what is searched has firm springs in its rigid ties."""
     deck = build()
     lower = np.unique(deck.shells.nodes[deck.shells.part == 0])
     spread = lower[farthest_point_sample(deck.points[lower], 6)]

@@ -7,12 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
-from chladni.dynamics.reduction import attachments
-from chladni.effects.over_constraint import RIGID, over_constraint, seat
-from chladni.effects.rigid_ties import loosened, releases, rigid_ties, sprung
+from chladni.effects.joints import fasteners
+from chladni.effects.ordinary import ordinary
+from chladni.effects.over_constraint import RIGID, over_constraint
+from chladni.effects.rigid_ties import on_firm_springs, rigid_ties
 from chladni.fem.assemble import structure
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import RigidBody
+from chladni.updating.fastener_scan import loosened
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
@@ -57,17 +59,14 @@ def plates(request):
 
 @pytest.fixture(scope="module")
 def reduced(plates):
-    return reduced_problem(plates, TOP)
+    return reduced_problem(on_firm_springs(plates), TOP)
 
 
 @pytest.fixture(scope="module")
 def effect(reduced):
-    built = reduced.structure
-    tie = rigid_ties(built.assembly)[1]
-    (release,) = releases(built, [tie])
-    sigma = (2 * np.pi * reduced.hertz) ** 2
-    static = attachments(reduced.factor, release.K + sigma * release.M)
-    return over_constraint(built, tie, release, seat(release, static, sigma), 3)
+    every = loosened(reduced)
+    assert [each.joint.rigid for each in every] == [True] * 3
+    return over_constraint(reduced.structure.assembly, every[1].joint, every[1].share, 3)
 
 
 def frequencies(assembly):
@@ -105,17 +104,21 @@ def test_the_softer_the_lower(reduced, effect):
     assert f[0, 0] < 0.98 * f[-1, 0]
 
 
-def test_with_no_spring_at_all_the_tie_is_gone(plates, effect):
-    """The released structure without its spring: the same elements without those followers."""
-    tie = effect.tie
-    free, _ = loosened(plates, tie)
-    bodies = [b for b in free.rigid if set(b.dependent) != set(tie.rows)]
-    gone = replace(plates, rigid=tuple(bodies))
-    soft = frequencies(sprung(plates, tie, 1e-3))
-    flexible = [f[f > 3.0][:6] for f in (soft, frequencies(gone))]
-    due = flexible[1]
-    # six motions of the loose followers as one rigid piece remain: theirs is all that may differ
-    assert np.all(flexible[0] > due * (1 - 1e-9))
+def test_firm_springs_change_nothing_and_are_no_fasteners_of_the_deck(plates, reduced):
+    due = frequencies(plates)
+    got = frequencies(reduced.structure.assembly)
+    assert_allclose(got[FLEXIBLE], due[FLEXIBLE], rtol=1e-4)
+    assert fasteners(structure(plates)) == []
+
+
+@pytest.mark.parametrize("x", [-3.0, 0.0, 3.0])
+def test_positive_whatever_the_sheets_are_made_of(reduced, effect, x):
+    """Half and twice the modulus of both sheets: what is let loose is the spring's alone."""
+    softer = ordinary(reduced.groups, "E", [0, 1])
+    model = reduced.model_for(effect, np.array([x]))
+    for e in (-0.7, 0.7):
+        lam = evaluate(model, [softer, effect], np.array([e, x]), False).lam
+        assert lam[0] > -1e-6 * lam[6]
 
 
 def test_which_ties_there_are():

@@ -50,6 +50,11 @@ class Connection:
     rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     @property
+    def rigid(self) -> bool:
+        """Whether it is none of the deck's: a firm spring in a rigid tie (:mod:`.rigid_ties`)."""
+        return self.ids[0] < 0
+
+    @property
     def where(self) -> str:
         """What it holds and where, in words."""
         at = ", ".join(f"{1e3 * v:.0f}" for v in self.point)

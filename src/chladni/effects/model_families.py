@@ -85,9 +85,9 @@ def _solids(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
 
 def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
     """All bushes together."""
-    bushes = built.assembly.bushes
-    if len(bushes.ids):
-        yield "bushes", of_lumps(built, "bushes", range(len(bushes))).K, FASTENER
+    own = np.flatnonzero(built.assembly.bushes.ids > 0)  # none of the firm ones in rigid ties
+    if len(own):
+        yield "bushes", of_lumps(built, "bushes", own.tolist()).K, FASTENER
 
 
 def _shear(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:

@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..fem import rigid
-from ..fem.assemble import Structure, over_all_motions
 from ..geometry.beam_lines import fastener_bars
 from ..model.added_points import next_id, with_points
 from ..model.assembly import Assembly, Bushes, RigidBody
+from ..model.properties import ShellSection
 
+FIRM = 100.0  # times E t: firmer than any sheet, and not so firm that its modes drown all others
 LEAST_REACH = 0.005  # [m] by which turns count where a tie holds one grid alone
 
 
@@ -45,22 +44,6 @@ class RigidTie:
             and body.independent == self.lead
             and set(self.rows) <= set(body.dependent)
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Release:
-    """What the relative motion δ = (ways, reach · turns) brings: T q + T' δ in place of T q.
-
-    Attributes
-    ----------
-    K, M : (6, n) csr          T'ᵀ A T
-    own_K, own_M : (6, 6)      T'ᵀ A T'
-    """
-
-    K: sp.csr_array
-    M: sp.csr_array
-    own_K: np.ndarray
-    own_M: np.ndarray
 
 
 def rigid_ties(assembly: Assembly) -> list[RigidTie]:
@@ -146,12 +129,13 @@ def _with_legs(body: RigidBody, legs: np.ndarray) -> RigidBody:
     return replace(body, dependent=rows, components=motions)
 
 
-def sprung(assembly: Assembly, tie: RigidTie, k: float) -> Assembly:
+def sprung(assembly: Assembly, tie: RigidTie, k: float, id: int | None = None) -> Assembly:
     """The assembly with springs k [N/m] all ways and k reach² all turns in place of the tie."""
     made, lead = loosened(assembly, tie)
     old, none = made.bushes, np.zeros((1, 6))
     new = Bushes(
-        np.append(old.ids, next_id(made)), np.vstack([old.nodes, [[tie.lead, lead]]]),
+        np.append(old.ids, next_id(made) if id is None else id),
+        np.vstack([old.nodes, [[tie.lead, lead]]]),
         np.concatenate([old.frame, np.eye(3)[None]]),
         np.vstack([old.place, made.points[[lead]]]),
         np.vstack([old.stiffness, k * np.r_[1, 1, 1, [tie.reach**2] * 3]]),
@@ -160,23 +144,32 @@ def sprung(assembly: Assembly, tie: RigidTie, k: float) -> Assembly:
     return replace(made, bushes=new)
 
 
-def releases(built: Structure, ties: list[RigidTie]) -> list[Release]:
-    """What each of them brings when it is let loose alone."""
-    if not ties:
-        return []
-    M, _, K, _ = over_all_motions(built.assembly)
-    KT, MT = sp.csr_array(K @ built.T), sp.csr_array(M @ built.T)
-    out = []
-    for tie in ties:
-        grown, lead = loosened(built.assembly, tie)
-        T, independent = rigid.transformation(grown)
-        own = np.searchsorted(independent, 6 * lead + np.arange(6))
-        scale = np.diag(np.r_[1, 1, 1, [1 / tie.reach] * 3])
-        P = sp.csr_array(T[: K.shape[0]].tocsc()[:, own] @ scale)
-        out.append(
-            Release(
-                sp.csr_array(P.T @ KT), sp.csr_array(P.T @ MT),
-                (P.T @ K @ P).toarray(), (P.T @ M @ P).toarray(),
-            )
-        )  # fmt: skip
-    return out
+def on_firm_springs(assembly: Assembly) -> Assembly:
+    """The assembly with a spring of its own in every tie, so firm that nothing gives.
+
+    A rigid motion cannot be let loose, a spring can: what is searched has these. Their elements
+    have ids below zero, which no deck has.
+    """
+    ties, firm = rigid_ties(assembly), _firm(assembly)
+    for k, tie in enumerate(ties):
+        assembly = sprung(assembly, tie, firm, -1 - k)
+    return assembly
+
+
+def firmly_held(assembly: Assembly, row: int) -> tuple[RigidTie, float]:
+    """The tie that a spring of :func:`on_firm_springs` stands in, and its stiffness [N/m]."""
+    b = assembly.bushes
+    lead, own = b.nodes[row].tolist()
+    body = next(x for x in assembly.rigid if isinstance(x, RigidBody) and x.independent == own)
+    k, turns = b.stiffness[row, [0, 3]].tolist()
+    return RigidTie(body.dependent, lead, float(np.sqrt(turns / k))), k
+
+
+def _firm(assembly: Assembly) -> float:
+    """FIRM times what the stiffest sheet has in its plane, E t [N/m]."""
+    t = [
+        (p.section.membrane or p.section.bending, p.section.thickness)
+        for p in assembly.parts
+        if isinstance(p.section, ShellSection)
+    ]
+    return FIRM * max([m.plane_stress()[0, 0] * h for m, h in t if m is not None], default=2e8)

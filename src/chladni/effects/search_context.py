@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import scipy.sparse as sp
 
 from .effect import Effect
 from .joints import Connection
@@ -111,9 +110,6 @@ class SearchContext(Protocol):
 
     def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model with an effect at x, and φᵀ ∂K/∂x φ (n_p, m, m)."""
-
-    def static(self, K: sp.csr_array, M: sp.csr_array) -> tuple[np.ndarray, float]:
-        """(K + σM)⁻¹ of the structure times the loads (K + σM)ᵀ of rows (k, n): (n, k), and σ."""
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Where poles alone are known: the lowest minima over the effect's whole prior."""

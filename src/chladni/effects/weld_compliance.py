@@ -139,18 +139,19 @@ def of_one(
 def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candidate]:
     """The fasteners that explain most, by exact re-analysis about the calibrated model and both."""
     tried = context.fasteners
-    if not tried:
+    own = [k for k, (joint, _) in enumerate(tried) if not joint.rigid]
+    if not own:
         return []
     built = context.where.groups.structure
     families = {text: (K, sd) for text, K, sd in joint_families(built)}
 
     def effect(k: int) -> WeldCompliance:
-        return of_one(kind, *tried[k], families, len(tried))
+        return of_one(kind, *tried[k], families, len(own))
 
     if context.scan is None:
-        points = np.array([joint.point for joint, _ in tried])
+        points = np.array([tried[k][0].point for k in own])
         some = farthest_point_sample(points, BY_POLES)
-        chosen = [effect(k) for k in some]
+        chosen = [effect(own[k]) for k in some]
         return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
     alone = [kind((kind.strength(float(share.min())),)) for _, share in tried]
     left = np.array([[e.left(x[0])[0] for x in e.starts()] for e in alone])
@@ -158,7 +159,7 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
     for about, base in reversed(tuple(enumerate(context.bases))):
         score = context.scan.fastener_scores(about, left)
         wanted = FOLLOWED if not out else FOLLOWED + 1
-        for k in np.argsort(score.min(axis=1)).tolist():
+        for k in sorted(own, key=score.min(axis=1).__getitem__):
             if len(out) >= wanted:
                 break
             if k not in out:

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..dynamics.reduction import attachments
 from ..effects.effect import Effect
 from ..effects.joints import Connection
 from ..effects.registry import families
@@ -190,12 +188,6 @@ class UpdatingContext:
         base, model = self.baselines[-1], self.problem.reduced.model.split_for(effect, x)
         state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, x]))
         return state.lam, state.dK[len(base.x) :]
-
-    def static(self, K: sp.csr_array, M: sp.csr_array) -> tuple[np.ndarray, float]:
-        """(K + σM)⁻¹ of the structure times the loads (K + σM)ᵀ of rows (k, n): (n, k), and σ."""
-        reduced = self.problem.reduced
-        sigma = (2 * np.pi * reduced.hertz) ** 2
-        return attachments(reduced.factor, sp.csr_array(K + sigma * M)), sigma
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""

@@ -70,7 +70,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     noise : of |H|, at every line that is compared
     """
     low, f_max = asked.band
-    nominal = modelled(asked.tested(asked.assembly), SOLVED * f_max)
+    nominal = modelled(asked.searched(asked.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = asked.outputs.rows(built), asked.inputs.rows(built)
     reduced = ready_for_responses(asked, nominal, f_max)

@@ -81,7 +81,7 @@ def _by_responses(question: Question) -> Prepared:
             f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
-    nominal = modelled(question.tested(question.assembly), SOLVED * f_max)
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
@@ -246,7 +246,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     frequency, sd, strength, found, notes = frequencies(question, uncertain)
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
-    nominal = modelled(question.tested(question.assembly), max(FAR * f_max, SOLVED * highest))
+    nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
     built = nominal.structure
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))

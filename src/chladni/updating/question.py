@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..dynamics.frf import FRF
+from ..effects.rigid_ties import on_firm_springs
 from ..ema.identification import Identified
 from ..ema.level_study import LevelStudy
 from ..ema.setup import Control, SensorAccuracy
@@ -73,6 +74,10 @@ class Question:
             return assembly
         grids, m = zip(*self.carried, strict=True)
         return with_masses(assembly, grids, np.array(m))
+
+    def searched(self, assembly: Assembly) -> Assembly:
+        """The same with springs in its rigid ties, so firm that nothing gives until one is let."""
+        return on_firm_springs(self.tested(assembly))
 
     @property
     def base(self) -> np.ndarray | None:

@@ -99,7 +99,7 @@ def _on_new_structure(
     changed = replace(question, assembly=assembly)
     data, f_max = hypothesis.data, old.setup.f_max
     assert isinstance(data, (Responses, Poles))
-    model = modelled(changed.tested(changed.assembly), SOLVED * f_max)
+    model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
