@@ -21,7 +21,16 @@ from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 2.0  # of ln k about what the sheets set against the tie
-STARTS = (-2.0, 0.0, 2.0)
+STARTS = (
+    -4.0,
+    -3.0,
+    -2.0,
+    -1.0,
+    0.0,
+    1.0,
+    2.0,
+    3.0,
+)  # a factor of e off, the right tie looks wrong
 RIGID = 60.0  # ln of k over its median that is no give at all
 BY_POLES, FOLLOWED = 12, 2
 
@@ -94,11 +103,13 @@ def candidates(context: SearchContext) -> list[Candidate]:
         return best_places(context, chosen, points[some], FOLLOWED, -1.0, carried=True)
     left = np.ones((len(every), len(STARTS)))
     left[at] = [[e.left(x) for x in STARTS] for e in effects]
-    score = context.scan.fastener_scores(len(context.bases) - 1, left)[at]
-    return [
-        Candidate(effects[k], np.array([STARTS[int(np.argmin(score[k]))]]), context.bases[-1])
-        for k in np.argsort(score.min(axis=1))[:FOLLOWED]
-    ]
+    out: dict[int, Candidate] = {}
+    for about, base in reversed(tuple(enumerate(context.bases))):
+        score = context.scan.fastener_scores(about, left)[at]
+        best = np.argsort(score.min(axis=1)).tolist()
+        for k in [k for k in best if k not in out][:FOLLOWED]:
+            out[k] = Candidate(effects[k], np.array([STARTS[int(np.argmin(score[k]))]]), base)
+    return list(out.values())
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
