@@ -45,6 +45,21 @@ def test_along_is_the_longest_way(sheet):
     assert_allclose(np.abs(across), [0, 1, 0], atol=1e-12)
 
 
+def test_axes_lie_in_the_sheets_of_two_flanges_that_face_each_other():
+    """0.4 x 0.03 m each, 0.3 m apart: along them, and up; not from one to the other."""
+    flange = plate(0.4, 0.03, 8, 2, 1e-3)
+    x, y, _ = flange.points.T
+    one = np.column_stack([x, 0 * x, y])
+    n = len(x)
+    shells = {k: np.concatenate([v, v]) for k, v in vars(flange.shells).items() if k != "nodes"}
+    nodes = np.concatenate([flange.shells.nodes, flange.shells.nodes + n])
+    two = replace(
+        flange, ids=np.arange(1, 2 * n + 1), points=np.vstack([one, one + np.array([0, 0.3, 0])]),
+        shells=replace(flange.shells, **shells, nodes=nodes),
+    )  # fmt: skip
+    assert_allclose(np.abs(axes_of(two, 0)), [[1, 0, 0], [0, 0, 1]], atol=1e-9)
+
+
 def test_buckling_of_two_springs():
     """λ + N κ = 0 of each; a rigid motion and a mode the force does not touch set no bound."""
     lam, kappa = np.array([0.0, 100.0, 300.0, 900.0]), np.diag([0.0, 1.0, -6.0, 0.0])

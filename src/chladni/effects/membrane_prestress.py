@@ -20,14 +20,14 @@ from ..errors import ModelError
 from ..fem.assemble import Structure, frames, structure
 from ..fem.membrane_force import MembraneForce, geometric_stiffness, membrane_force, with_mean
 from ..geometry.cells import edges_of
-from ..geometry.facets import cell_areas
+from ..geometry.facets import cell_areas, vector_areas
 from ..geometry.sampling import farthest_point_sample
 from ..model.added_points import next_id
 from ..model.assembly import Assembly, Scalars
 from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .search_context import Candidate, SearchContext, best_places
+from .search_context import Candidate, SearchContext
 
 MOST = 0.7  # of what buckles: of both at once 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
 SD = 0.4  # of N / (0.7 N_cr) where that is small: within a third of buckling, mostly
@@ -84,9 +84,16 @@ class MembranePrestress(Effect):
 
 
 def axes_of(assembly: Assembly, part: int) -> np.ndarray:
-    """Along and across a part (2, 3): where its points lie farthest apart, and next to that."""
-    X = assembly.points[np.unique(assembly.shells.nodes[assembly.shells.part == part])]
-    return np.asarray(np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2][:2])
+    """Along and across a part (2, 3): in its sheets, where its points lie farthest apart first.
+
+    Of two flanges that face each other the way from one to the other is in neither.
+    """
+    cells = assembly.shells.nodes[assembly.shells.part == part]
+    n = vector_areas(assembly.points, cells)
+    n /= np.sqrt(np.linalg.norm(n, axis=1, keepdims=True))
+    plane = np.linalg.eigh(n.T @ n)[1][:, :2]  # what is normal to least of its area
+    X = assembly.points[np.unique(cells)] @ plane
+    return np.asarray(np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2] @ plane.T)
 
 
 def tensors(assembly: Assembly, part: int) -> np.ndarray:
@@ -229,8 +236,13 @@ def candidates(context: SearchContext) -> list[Candidate]:
         critical = np.array([buckling(lam, each) for each in K])
         if np.isfinite(critical).all():
             effects.append(replace(bare, critical=critical))
-    centre = np.zeros((len(effects), 3))
-    return best_places(context, effects, centre, FOLLOWED, -1.0) if effects else []
+    out = []
+    for about, base in enumerate(context.bases):  # calibration alone may have gone far astray
+        found = [context.scores(e, e.starts(), about=about)[0] for e in effects]
+        for k in sorted(range(len(effects)), key=lambda j: found[j].min())[:FOLLOWED]:
+            start = effects[k].starts()[int(np.argmin(found[k]))]
+            out.append(Candidate(effects[k], start, base))
+    return out
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:

@@ -101,9 +101,9 @@ class SearchContext(Protocol):
         """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
 
     def scores(
-        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False
+        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False, about: int = -1
     ) -> np.ndarray:
-        """Score of an effect at each start about the calibrated model (n_ways, n_starts).
+        """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
 
         With ``carried`` the basis is widened by what the effect moves, as it is for a fit.
         """

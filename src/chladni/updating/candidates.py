@@ -155,13 +155,13 @@ class UpdatingContext:
         return tuple((each.joint, each.share) for each in self.loosened)
 
     def scores(
-        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False
+        self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False, about: int = -1
     ) -> np.ndarray:
-        """Score of an effect at each start about the calibrated model (n_ways, n_starts).
+        """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
 
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
-        base, reduced = self.baselines[-1], self.problem.reduced
+        base, reduced = self.baselines[about], self.problem.reduced
         widened = reduced.model_for if carried else reduced.model.split_for
         model = widened(effect, starts[0])
         data = self.problem.data.over(model)
