@@ -21,16 +21,7 @@ from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 2.0  # of ln k about what the sheets set against the tie
-STARTS = (
-    -4.0,
-    -3.0,
-    -2.0,
-    -1.0,
-    0.0,
-    1.0,
-    2.0,
-    3.0,
-)  # a factor of e off, the right tie looks wrong
+STARTS = tuple(np.arange(-4.0, 4.0).tolist())  # two e off, the right tie looks wrong
 RIGID = 60.0  # ln of k over its median that is no give at all
 BY_POLES, FOLLOWED = 12, 2
 
