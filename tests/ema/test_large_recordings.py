@@ -80,6 +80,20 @@ def test_many_lines_are_as_sure_as_they_say() -> None:
     assert np.sqrt((z**2).mean()) < 1 + 3 / np.sqrt(2 * len(z))
 
 
+def test_noise_that_nobody_states_goes_with_all_that_rings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A band's own modes are a part of the response; noise is a share of the whole of it."""
+    monkeypatch.setattr(identification, "is_large", lambda data: True)
+    monkeypatch.setattr(pole_search_by_parts, "PER_BAND", 100)
+    scores = []
+    for seed in (588, 591):
+        known = structure(seed, 9, 10)
+        frf, variance = recording(known, "share, unsaid", seed, lines=1200)
+        told = held_against(known, frf, variance, identify(frf))
+        scores += [told.z_frequency, told.z_damping]
+    z = np.concatenate(scores)
+    assert np.sqrt((z**2).mean()) < 1 + 3 / np.sqrt(2 * len(z))
+
+
 def test_poles_stand_beside_the_band_only_where_something_rings() -> None:
     """With modes there the noise alone is left; of residual terms alone no pole is made."""
     known = structure(589, 5, 4)

@@ -166,18 +166,16 @@ def _polished(
 ) -> tuple[np.ndarray, np.ndarray, Spread]:
     """Poles, rise of χ² and spread of one band once what rings elsewhere is taken off."""
     rest = np.delete(np.arange(len(fit.p)), own)
-    s = data.s[part.rows]
+    whole = PoleData(data.s[part.rows], data.y[part.rows], data.w[part.rows], data.q)
     x = fit.x[:-2].reshape(len(fit.p), 2, -1)[rest].reshape(2 * len(rest), -1)
-    y = data.y[part.rows] - basis(s, fit.p[rest], data.q) @ x
-    band = assumed = PoleData(s, y, data.w[part.rows], data.q)
-    if not stated:
-        band = replace(band, w=part.w)
-        band = with_noise_left(band, band, solve(band, fit.p[own])[0])
+    band = assumed = replace(whole, y=whole.y - basis(whole.s, fit.p[rest], data.q) @ x)
+    if not stated:  # noise goes with all that rings, not with the band's own part of it
+        fitted = replace(band, w=part.w)
+        own_noise = with_noise_left(whole, fitted, solve(fitted, fit.p[own])[0])
+        band = replace(band, w=own_noise.w)
     best, slope = polish(band, fit.p[own], rule.largest, POLISH, 0.05)
-    noise = chi_of(band, best) ** 2
-    if stated:
-        noise = max(1.0, noise)
-    else:
-        chi = max(chi_of(assumed, solve(assumed, best.p)[0]), ROUNDING)
-        noise *= max(1.0, STEADY / chi) ** 2
+    noise = max(1.0, left := chi_of(band, best)) ** 2
+    chi = 1.0 if stated else max(chi_of(assumed, solve(assumed, best.p)[0]), ROUNDING)
+    if chi < STEADY:
+        noise = (left * STEADY / chi) ** 2
     return best.p, best.delta_chi2, uncertainty(best.p, slope, noise)
