@@ -133,6 +133,34 @@ def test_the_command_leaves_a_case_that_identifies(case, tmp_path):
     assert_allclose(mine[:3], nearest[:3], rtol=0.15)  # five sensors of 5 g on 190 g of plate
 
 
+def test_responses_on_a_table_at_the_sensors_of_a_layout(case, tmp_path):
+    """--sensors with --input base:+Z, or with that in the table, is --output one by one."""
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    labels = case.outputs.labels
+    table.write_text("label\n" + "\n".join(labels))
+    rows = "\n".join(f"{name},output" for name in labels)
+    (tmp_path / "whole.csv").write_text(f"label,role\n{rows}\nbase:+Z,input\n")
+    ask = ["frf", str(deck), "--units", "SI", "--band", "5:300", "--lines", "50"]
+    words = {
+        "each": ["--input", "base:+Z", *(w for name in labels for w in ("--output", name))],
+        "layout": ["--sensors", str(table), "--input", "base:+Z"],
+        "table": ["--sensors", str(tmp_path / "whole.csv")],
+    }
+    found = {}
+    for name, more in words.items():
+        done = CliRunner().invoke(application(), [*ask, *more, "--out", str(tmp_path / name)])
+        assert done.exit_code == 0, done.output
+        found[name] = np.load(tmp_path / name / "frf.npz")
+        assert str(found[name]["quantity"]) == "transmissibility"
+    for name in ("layout", "table"):
+        assert found[name]["outputs"].tolist() == list(labels)
+        assert_allclose(found[name]["values"], found["each"]["values"], rtol=1e-6, atol=1e-9)
+    refused = [*ask, *words["layout"], "--input", "20:+Z", "--out", str(tmp_path / "x")]
+    done = CliRunner().invoke(application(), refused)
+    assert done.exit_code == 2
+    assert "stands alone" in done.output
+
+
 QUICK = ["--excitation", "stepped-sine", "--band", "15:120", "--exact", "--units", "SI"]
 
 

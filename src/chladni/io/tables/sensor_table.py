@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
 from typing import Any, get_args
@@ -41,8 +42,10 @@ def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
     return sensors
 
 
-def read_layout(path: Path) -> tuple[Sensor, ...]:
+def read_layout(path: Path, driven: Sequence[Sensor] = ()) -> tuple[Sensor, ...]:
     """Sensors and exciters of a table, or of ``plan.json``: its sensors and its shakers.
+
+    ``driven`` takes the place of the exciters.
 
     Raises
     ------
@@ -50,6 +53,8 @@ def read_layout(path: Path) -> tuple[Sensor, ...]:
         If it is neither, or names no exciter or no sensor.
     """
     found = _planned(path) if path.suffix.lower() == ".json" else read_sensors(path)
+    if driven:
+        found = (*(s for s in found if s.role == "output"), *driven)
     for role in get_args(Role):
         if not any(s.role == role for s in found):
             raise FileError(f"{path} names no {role}; a layout has sensors and what drives them")
