@@ -25,7 +25,7 @@ from .pole_search import (
 )
 from .pole_selection import Rule, extended, uncertainty, with_neighbours
 
-CHANNELS, LINES = 48, 3000  # up to here all are fitted at once
+CHANNELS, LINES = 48, 2000  # up to here all are fitted at once; of more what rings beside shows
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
 MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
