@@ -85,7 +85,9 @@ def ground(deck, fine, sensors):
     reduced = reduced_problem(deck, TOP)
     hangers = sensors[1], sensors[3]
     shares = tuple(((int(g), 1.0),) for g in sensors)
-    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP)
+    drive = int(sensors[4]), (0.0, 0.0, 1.0)
+    drives = ((((drive[0], 1.0),), drive[1]),)
+    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP, drives)
     f = reduced.frequency[FLEXIBLE] * 1.02
     every = np.ones(len(f), bool)
     poles = Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP))
@@ -94,7 +96,7 @@ def ground(deck, fine, sensors):
         deck, reduced, sensors,
         updating_context(reduced, recorded(reduced, sensors), setup, sensors),
         updating_context(reduced, poles, setup, sensors),
-        Article(fine, deck, np.array(sensors), np.array(hangers), ones),
+        Article(fine, deck, np.array(sensors), np.array(hangers), ones, drive=drive),
     )  # fmt: skip
 
 
@@ -111,6 +113,19 @@ def on_joints(jointed):
     lower = np.unique(deck.shells.nodes[deck.shells.part == 0])
     spread = lower[farthest_point_sample(deck.points[lower], 6)]
     return ground(deck, jointed(0.03), deck.ids[spread].tolist())
+
+
+def cantilever(nx, ny):
+    """The plate with all of its edge x = 0 held."""
+    free = plate(0.4, 0.3, nx, ny, 1.5e-3)
+    edge = np.flatnonzero(free.points[:, 0] == 0)
+    return replace(free, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
+
+
+@pytest.fixture(scope="module")
+def on_held():
+    """A plate in a clamp, for what acts on supports."""
+    return ground(cantilever(8, 6), cantilever(16, 12), [57, 10, 63, 40, 25, 39])
 
 
 @pytest.fixture
@@ -131,7 +146,8 @@ def family(request, example_edge_mass):
 @pytest.fixture
 def on(family, request):
     """The ground a family has what it needs on."""
-    return request.getfixturevalue("on_joints" if family.needs else "on_plate")
+    grounds = {"": "on_plate", "supports": "on_held", "a shaker": "on_plate"}
+    return request.getfixturevalue(grounds.get(family.needs, "on_joints"))
 
 
 @pytest.fixture

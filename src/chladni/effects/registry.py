@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from ..errors import ExtensionError, LabelError
 from . import (
     adhesive_stiffness,
+    compliant_support,
     contact_stiffness,
     crack,
     extra_support,
@@ -22,6 +23,7 @@ from . import (
     point_mass,
     sensor_fault,
     sensor_mass,
+    shaker_restraint,
     stiffness_patch,
     suspension,
     thickness_distribution,
@@ -48,6 +50,8 @@ BUILT_IN = (
     adhesive_stiffness.FAMILY,
     hem_contact.FAMILY,
     contact_stiffness.FAMILY,
+    compliant_support.FAMILY,
+    shaker_restraint.FAMILY,
 )
 _added: dict[str, Family] = {}
 
