@@ -84,7 +84,7 @@ class PointTerm:
     Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it. Of an
     effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that
     moves carries them as it does the rows ``carrier`` of the structure. Where a clamp was let go,
-    ``elastic`` rows see what deforms alone, not what follows the clamp.
+    ``strained`` rows see what deforms alone, not what follows the clamp.
     """
 
     matrix: Literal["K", "M"]
@@ -94,7 +94,7 @@ class PointTerm:
     moving: dict[int, sp.csr_array] = field(default_factory=dict)
     own: np.ndarray | None = None
     carrier: sp.csr_array | None = None
-    elastic: bool = False
+    strained: bool = False
 
 
 @dataclass(frozen=True, eq=False)

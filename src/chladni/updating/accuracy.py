@@ -122,7 +122,7 @@ def products(
     K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            rows = model.wide(term.rows, term.elastic)
+            rows = model.wide(term.rows, term.strained)
             beside = sp.csr_array((rows.shape[0], n - rows.shape[1]))
             own = sp.csr_array(own_part(term, first, n_own))
             b = sp.hstack([rows, beside, own], format="csr")

@@ -55,18 +55,18 @@ class Reduced:
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
     _within: "Reduced | None" = None  # over the first vectors of this basis: what it knows is kept
 
-    def rows(self, rows: sp.csr_array, keep: bool = True, elastic: bool = False) -> np.ndarray:
+    def rows(self, rows: sp.csr_array, keep: bool = True, strained: bool = False) -> np.ndarray:
         """Rows of the structure in the basis (k, r); projected once where they are to be kept.
 
-        Rows over the dofs of the deck see no clamp's own; ``elastic`` ones see what deforms.
+        Rows over the dofs of the deck see no clamp's own; ``strained`` ones see what deforms.
         """
-        wide = self.wide(rows, elastic)
+        wide = self.wide(rows, strained)
         basis = self.basis[: wide.shape[1]]
         return self._once(rows, lambda: wide @ basis) if keep else wide @ basis
 
-    def wide(self, rows: sp.csr_array, elastic: bool) -> sp.csr_array:
-        """The rows; ``elastic`` ones over clamps as well, less what follows them."""
-        if not elastic or self.following is None:
+    def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
+        """The rows; ``strained`` ones over clamps as well, less what follows them."""
+        if not strained or self.following is None:
             return rows
         return sp.csr_array(sp.hstack([rows, sp.csr_array(-(rows @ self.following))]))
 
@@ -225,7 +225,7 @@ def evaluate(
     base = _participating(model, logs, slopes, n_own)
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            seen = model.rows(term.rows, not term.moving, term.elastic)
+            seen = model.rows(term.rows, not term.moving, term.strained)
             b = row(seen, own_part(term, first, n_own))
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
             target += (b.T * term.coefficient) @ b
@@ -282,7 +282,7 @@ def _moved(
     for effect, at in slices(effects):
         if (change := effect.seen(x[at])) is None:
             continue
-        whole = change.shapes @ (model.rows(change.rows, elastic=True) @ phi)
+        whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
         value = change.coefficient * whole
         total = value if total is None else total + value
         slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}
