@@ -3,12 +3,18 @@
 Accelerances of known modes on an even grid with 2 % of noise, channels x lines as asked for. The
 peer's least-squares complex frequency method runs to order 60; of its last order the poles nearest
 to the true ones are taken, which helps it. Ours finds, selects and weighs alone, residues too.
+Every run is a process of its own, recording and all; a library that is missing, runs out of memory
+or over the limit has a line that says so.
 """
 
 import argparse
 import contextlib
-import importlib.util
 import io
+import json
+import os
+import resource
+import subprocess
+import sys
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -55,24 +61,58 @@ def error(poles: np.ndarray, due: np.ndarray) -> tuple[float, float]:
     return 100 * float(f), 100 * float(z)
 
 
+METHODS = {"chladni": lambda frf: identify(frf, BAND).poles, "sdypy-EMA": peer}
+
+
+def run_here(name: str, channels: int, lines: int, modes: int) -> None:
+    """One method in this process; prints a line of JSON."""
+    frf, due = responses(channels, lines, modes)
+    with threadpool_limits(1):
+        seconds, poles = timed(lambda: METHODS[name](frf), 1)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(json.dumps({"seconds": seconds, "peak": peak, "error": error(poles, due)}))
+
+
+def run_apart(name: str, size: str, modes: int, limit: float) -> dict | str:
+    """One method in a process of its own; in words why there is no result."""
+    command = [sys.executable, __file__, "--run", name, "--sizes", size, "--modes", str(modes)]
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=limit, env=os.environ | one_thread
+        )
+    except subprocess.TimeoutExpired:
+        return f"not done after {limit:g} s"
+    if done.returncode:
+        return (done.stderr.strip().splitlines() or [f"ended by signal {-done.returncode}"])[-1]
+    return json.loads(done.stdout)
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sizes", default="30x900,100x5000,500x20000", help="channels x lines")
     parser.add_argument("--modes", type=int, default=15)
+    parser.add_argument("--limit", type=float, default=900, help="seconds on the clock for one run")
+    parser.add_argument("--run", choices=METHODS, help=argparse.SUPPRESS)
     args = parser.parse_args()
-    print(f"{'size':>12}{'':>12}{'CPU [s]':>10}{'x ours':>8}{'df [%]':>10}{'dzeta [%]':>11}")
-    for size in args.sizes.split(","):
-        channels, lines = map(int, size.split("x"))
-        frf, due = responses(channels, lines, args.modes)
-        with threadpool_limits(1):
-            ours, found = timed(lambda frf=frf: identify(frf, BAND), 1)
-            rows = [("chladni", ours, found.poles)]
-            if importlib.util.find_spec("sdypy"):
-                rows.append(("sdypy-EMA", *timed(lambda frf=frf: peer(frf), 1)))
-        for name, seconds, poles in rows:
-            f, z = error(poles, due)
-            print(f"{size:>12}{name:>12}{seconds:10.2f}{seconds / ours:8.2f}{f:10.4f}{z:11.3f}")
+    sizes = [tuple(map(int, size.split("x"))) for size in args.sizes.split(",")]
+    if args.run:
+        run_here(args.run, *sizes[0], args.modes)
+        return
+    heads = f"{'CPU [s]':>10}{'x ours':>8}{'peak MB':>9}{'df [%]':>10}{'dzeta [%]':>11}"
+    print(f"{'size':>12}{'':>12}{heads}")
+    for channels, lines in sizes:
+        size, ours = f"{channels}x{lines}", float("nan")
+        for name in METHODS:
+            found = run_apart(name, size, args.modes, args.limit)
+            if isinstance(found, str):
+                print(f"{size:>12}{name:>12}  {found}")
+                continue
+            seconds, (f, z) = found["seconds"], found["error"]
+            ours = seconds if name == "chladni" else ours
+            print(f"{size:>12}{name:>12}{seconds:10.2f}{seconds / ours:8.2f}"
+                  f"{found['peak']:9.0f}{f:10.4f}{z:11.3f}", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -116,7 +116,9 @@ go; levels do not. The first is fitted, the others score the decks.
 From three levels on `identify` and `diagnose` fit elements that friction, play and stretching are
 known by (cubic spring, gap, slider, micro-slip, drag) to each mode's frequency and damping against
 its amplitude, and from four on they foretell levels that are held out. Levels are amplitudes: of
-one line of a stepped sine where `control` is `"response"`, else of the force.
+one line of a stepped sine where `control` is `"response"`, else of the force. From two levels on
+both show every mode at every level, amplitude, frequency and damping with 95 % intervals; JSON
+holds that, and `identify` writes it as `levels.csv`.
 States are one object changed: each is diagnosed with what the others say of E, rho and t, all are
 then fitted at once with these shared, and each has its own effect, deck and page.
 

@@ -1,7 +1,7 @@
 """A structure on the test bench: deck, meshes of its articles, sensors, shaker, cords, bands."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -19,7 +19,7 @@ from chladni.planning import PlanSettings, plan
 from chladni.planning.measurement_lines import even_lines
 from chladni_specimens.forms import FORMS
 from chladni_specimens.holed_plate import holed_plate
-from chladni_specimens.plates import folded_panel
+from chladni_specimens.plates import folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
@@ -63,6 +63,18 @@ SPECIMENS = {
     "panel": Specimen(
         lambda times: _panel(0.02 / times), lambda: _panel(0.017), 380.0, (12.0, 310.0)
     ),
+}
+
+
+def _clamped(times: float) -> Assembly:
+    """300 x 200 x 2 mm steel, one short side in a clamp."""
+    free = plate(0.3, 0.2, round(12 * times), round(8 * times), 2e-3)
+    edge = np.flatnonzero(free.points[:, 0] == 0)
+    return replace(free, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
+
+
+CLAMPED = {
+    "clamped plate": Specimen(_clamped, lambda: _clamped(1.3), 620.0, (10.0, 480.0), 16),
 }
 
 
@@ -134,24 +146,26 @@ def form_bench(name: str, seed: int) -> Bench:
 
 
 def panel_bench(name: str, seed: int) -> Bench:
-    """The small plate or panel, its sensors laid out by the seed."""
-    spec, rng = SPECIMENS[name], np.random.default_rng([seed, 3, *name.encode()])
+    """The small plate or panel, free or in its clamp, its sensors laid out by the seed."""
+    spec, rng = {**SPECIMENS, **CLAMPED}[name], np.random.default_rng([seed, 3, *name.encode()])
     deck = spec.build(1)
     built = structure(deck)
     modes = normal_modes(built.system, 20)
-    moving = (built.T @ modes.shapes[:, 6:]).reshape(len(deck.points), 6, -1)[:, :3]
+    rigid = 0 if len(deck.supports) else 6
+    moving = (built.T @ modes.shapes[:, rigid:]).reshape(len(deck.points), 6, -1)[:, :3]
     every = glue_candidates(deck)
+    every = every.only(np.flatnonzero(~np.isin(every.grids, deck.ids[deck.supports[:, 0]])))
     return Bench(
         name=name,
         deck=deck,
         meshes={"fine": lambda: spec.build(2), "calculix": spec.unlike},
         outputs=every.only(_spread(every, spec.sensors, rng)),
         drive=every.only(_driven(deck, every, moving, rng)),
-        hangers=_hung(every),
+        hangers=() if len(deck.supports) else _hung(every),
         lines=np.arange(4.0, spec.f_max, 0.25),
         fit=spec.fit,
         held=(spec.fit[1], spec.f_max - 10),
-        first=float(modes.frequency[6]),
+        first=float(modes.frequency[rigid]),
         sheets=tuple(p.name for p in deck.parts),
         rolled=tuple(p.name for p in deck.parts),
     )

@@ -8,6 +8,7 @@ from chladni.errors import LabelError, did_you_mean
 from chladni_specimens.forms import FORMS
 
 from .bench_of_structure import (
+    CLAMPED,
     SPECIMENS,
     TAILGATE,
     Bench,
@@ -21,7 +22,7 @@ from .made_case import KINDS
 from .package_kinds import package_kinds
 from .pair_kinds import PAIRS
 
-SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs")
+SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs", "clamps")
 Purpose = Literal["tune", "report"]
 PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
 REPORTING = 600  # seeds below tune scales and code, those from here on report
@@ -45,6 +46,7 @@ JOINED = {  # structures of the set joints, by what is put into them
     "adhesive-stiffness": ("bonded plates", "tailgate"),
     "hem-contact": ("tailgate",),
 }
+IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support", "point-mass")
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Order:
         """The structure on the bench."""
         if self.structure == "tailgate":
             return tailgate_bench()
-        if self.structure in SPECIMENS:
+        if self.structure in {**SPECIMENS, **CLAMPED}:
             return panel_bench(self.structure, self.seed)
         return form_bench(self.structure, self.seed)
 
@@ -78,6 +80,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
     pairs: two effects at once on plate and panel, our fine mesh and CalculiX in turn.
+    clamps: nothing, a clamp that gives and what looks like it, on a plate in a clamp; our mesh.
     """
     made = {
         "tailgate": _tailgate,
@@ -87,6 +90,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "outside": _outside,
         "joints": _joints,
         "pairs": _pairs,
+        "clamps": _clamps,
     }
     if name not in made:
         raise LabelError(f"no set {name!r}; there are {', '.join(SETS)}")
@@ -105,7 +109,7 @@ def chosen(
     """
     whole = orders(name, seeds)
     hidden = tuple(dict.fromkeys([*KINDS, *(o.kind for o in whole)]))
-    every = ("tailgate", *SPECIMENS, *FORMS)
+    every = ("tailgate", *SPECIMENS, *CLAMPED, *FORMS)
     for what, asked, known in (("kind", kinds, hidden), ("structure", structures, every)):
         for word in asked:
             if word not in known:
@@ -162,6 +166,11 @@ def _pairs(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(PAIRS):
             yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
+
+
+def _clamps(seed: int) -> Iterator[Order]:
+    for structure in CLAMPED:
+        yield from (Order(structure, kind, seed, "fine") for kind in IN_CLAMP)
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:

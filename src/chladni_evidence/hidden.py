@@ -27,6 +27,7 @@ class Site:
     article : Assembly     scattered, on a mesh of its own
     outputs : Spots        where it is measured
     hangers : (k, 3)       places of the cords [m]
+    drive : Spots          where it is driven
     mass : float           [kg]
     first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
     sheets : tuple of str  parts an effect may sit on
@@ -36,6 +37,7 @@ class Site:
     article: Assembly
     outputs: Spots
     hangers: np.ndarray
+    drive: Spots
     mass: float
     first: float
     f_max: float

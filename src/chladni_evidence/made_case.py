@@ -26,6 +26,7 @@ from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
 from .benched_recording import PLAIN, Benched, Recorder, benched_recording, can_be_benched
 from .footing import Spots, footing
+from .held_kinds import HELD
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
 from .joint_kinds import JOINTS
@@ -35,7 +36,7 @@ from .pair_kinds import members, together
 from .part_scatter import scattered
 from .response_of_article import accelerance, decades_apart, seen
 
-KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS}
+KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS, **HELD}
 UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # as large as they are
 TWICE = 2.0  # an effect moves the responses at least this many times as far as the scatter does
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
@@ -182,6 +183,7 @@ def _site(bench: Bench, article: Assembly) -> Site:
         article,
         bench.outputs,
         bench.deck.points[bench.deck.rows(list(bench.hangers))],
+        bench.drive,
         mass_properties(article)[0],
         bench.first,
         bench.fit[1],

@@ -86,7 +86,9 @@ def ground(deck, fine, sensors):
     reduced = reduced_problem(on_firm_springs(deck), TOP)
     hangers = sensors[1], sensors[3]
     shares = tuple(((int(g), 1.0),) for g in sensors)
-    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP)
+    drive = int(sensors[4]), (0.0, 0.0, 1.0)
+    drives = ((((drive[0], 1.0),), drive[1]),)
+    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP, drives)
     f = reduced.frequency[FLEXIBLE] * 1.02
     every = np.ones(len(f), bool)
     poles = Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP))
@@ -95,7 +97,7 @@ def ground(deck, fine, sensors):
         deck, reduced, sensors,
         updating_context(reduced, recorded(reduced, sensors), setup, sensors),
         updating_context(reduced, poles, setup, sensors),
-        Article(fine, deck, np.array(sensors), np.array(hangers), ones),
+        Article(fine, deck, np.array(sensors), np.array(hangers), ones, drive=drive),
     )  # fmt: skip
 
 
@@ -125,6 +127,19 @@ def of_plates(build):
     return ground(deck, build(0.03), deck.ids[spread].tolist())
 
 
+def cantilever(nx, ny):
+    """The plate with all of its edge x = 0 held."""
+    free = plate(0.4, 0.3, nx, ny, 1.5e-3)
+    edge = np.flatnonzero(free.points[:, 0] == 0)
+    return replace(free, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
+
+
+@pytest.fixture(scope="module")
+def on_held():
+    """A plate in a clamp, for what acts on supports."""
+    return ground(cantilever(8, 6), cantilever(16, 12), [57, 10, 63, 40, 25, 39])
+
+
 @pytest.fixture
 def reduced(on_plate):
     return on_plate.reduced
@@ -143,8 +158,10 @@ def family(request, example_edge_mass):
 @pytest.fixture
 def on(family, request):
     """The ground a family has what it needs on."""
-    joints = "on_ties" if family.name == "over-constraint" else "on_joints"
-    return request.getfixturevalue(joints if family.needs else "on_plate")
+    if family.name == "over-constraint":
+        return request.getfixturevalue("on_ties")
+    grounds = {"": "on_plate", "supports": "on_held", "a shaker": "on_plate"}
+    return request.getfixturevalue(grounds.get(family.needs, "on_joints"))
 
 
 @pytest.fixture

@@ -5,9 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chladni.ema import identification, pole_search_by_parts
-from chladni.ema.identification import identify, pole_data
+from chladni.ema import identification, pole_fitting, pole_search_by_parts
+from chladni.ema.identification import identify, kept_lines, pole_data
+from chladni.ema.outer_poles import outside, with_outer_poles
+from chladni.ema.pole_fitting import PoleData, linear, normal_matrices
 from chladni.ema.pole_search_by_parts import core_bands, few_channels
+from chladni.ema.pole_selection import Rule
 from chladni_evidence.identification_evidence import held_against, recording, structure
 
 
@@ -62,3 +65,69 @@ def test_bands_are_cut_between_resonances() -> None:
     for low, _ in bands[1:]:
         gap = np.abs(2 * np.pi * frf.frequency[low] - np.abs(known.poles))
         assert (gap > 2 * np.abs(known.poles.real)).all()
+
+
+def test_many_lines_are_as_sure_as_they_say() -> None:
+    """What rings beside the band stands out of the noise of many lines; no mode inside moves."""
+    scores = []
+    for seed in (588, 590):
+        known = structure(seed, 6, 3)
+        frf, variance = recording(known, "share", seed, lines=4000)
+        told = held_against(known, frf, variance, identify(frf))
+        assert (told.missed, told.invented) == (0, 0)
+        scores += [told.z_frequency, told.z_damping]
+    z = np.concatenate(scores)
+    assert np.sqrt((z**2).mean()) < 1 + 3 / np.sqrt(2 * len(z))
+
+
+def test_noise_that_nobody_states_goes_with_all_that_rings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A band's own modes are a part of the response; noise is a share of the whole of it."""
+    monkeypatch.setattr(identification, "is_large", lambda data: True)
+    monkeypatch.setattr(pole_search_by_parts, "PER_BAND", 100)
+    scores = []
+    for seed in (588, 591):
+        known = structure(seed, 9, 10)
+        frf, variance = recording(known, "share, unsaid", seed, lines=1200)
+        told = held_against(known, frf, variance, identify(frf))
+        scores += [told.z_frequency, told.z_damping]
+    z = np.concatenate(scores)
+    assert np.sqrt((z**2).mean()) < 1 + 3 / np.sqrt(2 * len(z))
+
+
+def test_poles_stand_beside_the_band_only_where_something_rings() -> None:
+    """With modes there the noise alone is left; of residual terms alone no pole is made."""
+    known = structure(589, 5, 4)
+    frf, _ = recording(known, "share", 589, lines=4000)
+    data, omega_max = pole_data(frf, kept_lines(frf))
+    rule = Rule(4, len(data.s))
+    inner = known.inside / omega_max
+    fit, _ = with_outer_poles(data, inner, rule)
+    assert outside(data, fit.p).any()
+    assert fit.chi2 < data.samples + 4 * np.sqrt(2 * data.samples)
+
+    rng = np.random.default_rng(589)
+    A = linear(data.s, inner, data.q)
+    clean = A @ np.linalg.lstsq(A, data.y, rcond=None)[0].real
+    noise = (rng.normal(size=clean.shape) + 1j * rng.normal(size=clean.shape)) / data.w
+    alone, _ = with_outer_poles(PoleData(data.s, clean + noise, data.w, data.q), inner, rule)
+    assert not outside(data, alone.p).any()
+    assert len(alone.p) == len(inner)
+
+
+@pytest.mark.parametrize("channels", [3, 40])
+def test_normal_matrices_are_the_weighted_sums(
+    channels: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Few channels one by one, many by products of columns, in blocks of lines: Σ v² q qᵀ."""
+    monkeypatch.setattr(pole_fitting, "_PRODUCTS", 200)
+    rng = np.random.default_rng(590)
+    n, m = 50, 6
+    y = rng.normal(size=(2, n, channels + 2))
+    data = PoleData(1j * np.linspace(0.1, 1, n), y[0] + 1j * y[1], rng.uniform(0, 2, y[0].shape), 2)
+    Q, at = rng.normal(size=(2 * n, m)), slice(1, channels + 1)
+    G, b = normal_matrices(Q, data, at)
+    g = np.concatenate([data.common] * 2)
+    v = np.concatenate([data.w] * 2)[:, at] / g[:, None]
+    t = g[:, None] * np.concatenate([data.y.real, data.y.imag])[:, at]
+    np.testing.assert_allclose(G, np.einsum("ki,kc,kj->cij", Q, v**2, Q), atol=1e-12)
+    np.testing.assert_allclose(b, np.einsum("ki,kc,kc->ci", Q, v**2, t), atol=1e-12)

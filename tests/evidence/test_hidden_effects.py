@@ -1,12 +1,17 @@
 """What is hidden is physics: limits, reciprocity, work, and sizes that can be seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
+from chladni_evidence.bench_of_structure import panel_bench
 from chladni_evidence.footing import Spots, footing
+from chladni_evidence.held_kinds import HELD
 from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import (
     CATALOGUED,
@@ -38,7 +43,18 @@ def site():
     mass = mass_properties(a)[0]
     names = ("panel", "flanges")
     material_axis = np.array([1.0, 0, 0])
-    return Site(a, spots, a.points[at[:2]], mass, 30.0, TOP, names, material_axis, names)
+    return Site(
+        a,
+        spots,
+        a.points[at[:2]],
+        spots.only(np.array([1])),
+        mass,
+        30.0,
+        TOP,
+        names,
+        material_axis,
+        names,
+    )
 
 
 def response(site, hidden, damping=0.01):
@@ -133,7 +149,7 @@ def test_friction_softens_and_damps():
     """Joints of the box: lower modes, and a modal loss no negative motion feeds."""
     form = FORMS["lidded box"]
     a = form.made(0)
-    site_ = Site(a, None, None, 1.0, 60.0, TOP, ("lid",), np.zeros(3), ())
+    site_ = Site(a, None, None, None, 1.0, 60.0, TOP, ("lid",), np.zeros(3), ())
     hidden = friction(site_, np.random.default_rng(5), 1.5)
     rows = a.rows([1])
     plain, slipping = (article_modes(x, rows, rows, TOP) for x in (a, hidden.article))
@@ -223,3 +239,28 @@ def test_two_at_once_are_each_what_it_is_alone(site, kind):
     places = [t["point_m"] for t in told if "point_m" in t]
     if len(places) == 2:
         assert np.linalg.norm(np.subtract(*places)) > APART * site.size
+
+
+def test_a_stinger_and_its_gauge_are_where_the_site_is_driven(site):
+    hidden = HELD["shaker-restraint"](site, np.random.default_rng(4), 1.0)
+    a, truth = hidden.article, hidden.truth
+    assert mass_properties(a)[0] == pytest.approx(site.mass + truth["m"], rel=1e-12)
+    assert hidden.unweighed == truth["m"]
+    assert np.linalg.norm(truth["point_m"] - site.drive.points[0]) < 0.02
+    assert a.bushes.stiffness[-1, [1, 2, 4, 5]] == pytest.approx(
+        [truth["k_lat"]] * 2 + [truth["k_rot"]] * 2
+    )
+
+
+def test_a_clamp_that_gives_lowers_every_mode_that_bends_its_root(site):
+    """Of a free article there is none that could."""
+    with pytest.raises(ModelError, match="no supports"):
+        HELD["compliant-support"](site, np.random.default_rng(4), 1.0)
+    bench = panel_bench("clamped plate", 580)
+    held = replace(site, article=bench.deck, mass=mass_properties(bench.deck)[0], first=bench.first)
+    hidden = HELD["compliant-support"](held, np.random.default_rng(4), 1.0)
+    rows = bench.deck.rows([60])
+    f, g = (article_modes(a, rows, rows, TOP).frequency for a in (bench.deck, hidden.article))
+    assert len(hidden.article.supports) < len(bench.deck.supports)
+    assert (g[:6] < f[:6] * (1 + 1e-9)).all()
+    assert 0.7 < g[0] / f[0] < 0.99

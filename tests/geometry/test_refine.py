@@ -153,3 +153,21 @@ def test_a_stiffener_along_shells_takes_the_points_their_sides_get():
     middle = np.setdiff1d(fine.beams.nodes, edge)
     assert (middle >= n).all()
     assert np.isin(middle, fine.shells.nodes).all()
+
+
+@pytest.mark.parametrize("components", [(1, 2, 3, 4, 5, 6), (3,), (3, 6)])
+def test_an_edge_that_is_held_stays_held_between_its_points(components):
+    """A supported plate becomes the one meshed twice as fine, none of whose edge is let go."""
+
+    def held(nx, ny):
+        made = plate(0.4, 0.3, nx, ny, 1e-3)
+        edge = np.flatnonzero((made.points[:, 0] == 0) | (made.points[:, 1] == 0))
+        turned = np.tile(np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]], (len(made.points), 1, 1))
+        supports = np.array([(row, c) for row in edge for c in components])
+        return replace(made, supports=supports, axes=turned)
+
+    halved, due = (
+        normal_modes(structure(a).system, 12).frequency[6:]
+        for a in (refined(held(4, 3)), held(8, 6))
+    )
+    assert_allclose(halved, due, rtol=1e-9)

@@ -113,12 +113,12 @@ def test_what_is_no_layout_is_told(planned, tmp_path, text, name, told):
     assert told in done.output
 
 
-def test_a_layout_and_an_input_are_one_too_many(planned, tmp_path):
+def test_a_layout_and_an_output_are_one_too_many(planned, tmp_path):
     deck, plan = planned
-    words = ["frf", deck, "--sensors", plan / "plan.json", "--input", "2:+Z"]
+    words = ["frf", deck, "--sensors", plan / "plan.json", "--output", "2:+Z"]
     done = CliRunner().invoke(application(), [*map(str, words), "--out", str(tmp_path / "out")])
     assert done.exit_code == 2
-    assert "leave out the others" in done.output
+    assert "leave out --output" in done.output
 
 
 def test_a_plan_tells_what_it_would_find(planned, tmp_path):

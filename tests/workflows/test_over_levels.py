@@ -1,6 +1,8 @@
 """An object at several levels: the verdict, the page, the updated deck; and the same if linear."""
 
+import csv
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -18,6 +20,7 @@ from chladni.io.nastran import read_deck, write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
 from chladni.report.diagnosis_json import diagnosis_json, from_json
+from chladni.report.level_blocks import level_section, read_levels
 from chladni.updating.question import Prepared, Question
 from chladni.updating.result import NamedEffect
 from chladni.workflows.diagnosis_result import DiagnosisResult, UpdatedModels
@@ -138,7 +141,32 @@ def test_identify_says_it_on_the_terminal_and_in_its_files(folder, tmp_path):
     assert "friction" in done.output
     found = json.loads((tmp_path / "identified.json").read_text())
     assert any(t["signature"] == "friction" for study in found["levels"] for t in study)
-    assert "levels_1.png" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert "levels_1.png" in page
+    assert "Every mode at every level" in page
+    assert "Every mode at every level" in done.output
+
+
+def test_a_table_holds_every_mode_at_every_level(folder, tmp_path):
+    """The file has a row where a mode was found; the page one of dashes where it was not."""
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), ["identify", str(folder), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    (study,) = json.loads((out / "identified.json").read_text())["levels"]
+    with (out / "levels.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(len(t["rows"]) for t in study)
+    for row in rows:
+        held = {r["level"]: r for r in study[int(row["mode"]) - 1]["rows"]}[float(row["level"])]
+        for name, value in held.items():
+            if name in row:
+                assert float(row[name]) == value
+        assert float(row["damping_low"]) < float(row["damping"]) < float(row["damping_high"])
+    first, *others = read_levels(study)
+    section = level_section([replace(first, rows=first.rows[1:]), *others], {})
+    (table,) = [b for b in section.blocks if getattr(b, "columns", ("",))[-1] == "damping, 95 %"]
+    assert len(table.rows) == len(LEVELS) * len(study)
+    assert table.rows[0] == ("1", "1", *["–"] * 5)
 
 
 def test_linear_recordings_are_not_called_nonlinear(tmp_path):

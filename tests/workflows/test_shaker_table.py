@@ -131,3 +131,112 @@ def test_the_command_leaves_a_case_that_identifies(case, tmp_path):
     assert len(mine) >= 3
     nearest = f[np.abs(f[:, None] / mine - 1).argmin(axis=0)]
     assert_allclose(mine[:3], nearest[:3], rtol=0.15)  # five sensors of 5 g on 190 g of plate
+
+
+def test_responses_on_a_table_at_the_sensors_of_a_layout(case, tmp_path):
+    """--sensors with --input base:+Z, or with that in the table, is --output one by one."""
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    labels = case.outputs.labels
+    table.write_text("label\n" + "\n".join(labels))
+    rows = "\n".join(f"{name},output" for name in labels)
+    (tmp_path / "whole.csv").write_text(f"label,role\n{rows}\nbase:+Z,input\n")
+    ask = ["frf", str(deck), "--units", "SI", "--band", "5:300", "--lines", "50"]
+    words = {
+        "each": ["--input", "base:+Z", *(w for name in labels for w in ("--output", name))],
+        "layout": ["--sensors", str(table), "--input", "base:+Z"],
+        "table": ["--sensors", str(tmp_path / "whole.csv")],
+    }
+    found = {}
+    for name, more in words.items():
+        done = CliRunner().invoke(application(), [*ask, *more, "--out", str(tmp_path / name)])
+        assert done.exit_code == 0, done.output
+        found[name] = np.load(tmp_path / name / "frf.npz")
+        assert str(found[name]["quantity"]) == "transmissibility"
+    for name in ("layout", "table"):
+        assert found[name]["outputs"].tolist() == list(labels)
+        assert_allclose(found[name]["values"], found["each"]["values"], rtol=1e-6, atol=1e-9)
+    refused = [*ask, *words["layout"], "--input", "20:+Z", "--out", str(tmp_path / "x")]
+    done = CliRunner().invoke(application(), refused)
+    assert done.exit_code == 2
+    assert "stands alone" in done.output
+
+
+QUICK = ["--excitation", "stepped-sine", "--band", "15:120", "--exact", "--units", "SI"]
+
+
+def bench(out, *words):
+    return CliRunner().invoke(application(), ["bench", *map(str, words), "--out", str(out)])
+
+
+def test_a_bare_deck_asks_for_a_table(case, tmp_path):
+    """--input base:+Z beside a table of sensors: what a case with that input leaves, too."""
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    labels = case.outputs.labels
+    table.write_text("label,mass\n" + "".join(f"{name},0.001\n" for name in labels))
+    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", "base:+Z")
+    assert done.exit_code == 0, done.output
+    assert "level [m/s²]" in done.output
+    (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
+    assert (frf.quantity, frf.inputs) == ("transmissibility", ("base:+Z",))
+    assert frf.outputs == labels
+
+
+def test_sensors_are_planned_for_a_table(case, tmp_path):
+    """Of the plan the sensors; neither its shaker nor its cords are there."""
+    deck = case.path.parent / "plate.bdf"
+    done = bench(tmp_path / "o", deck, *QUICK, "--input", "base:+Z")
+    assert done.exit_code == 0, done.output
+    left = chladni.load_case(tmp_path / "o" / "case")
+    assert left.inputs.labels == ("base:+Z",)
+    assert len(left.outputs.labels) > 5
+    assert "hangers" not in (tmp_path / "o" / "case" / "case.toml").read_text()
+
+
+def test_a_deck_is_driven_where_input_says(case, tmp_path):
+    """A grid in place of the planned shaker, by force."""
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    table.write_text("label\n" + "\n".join(case.outputs.labels))
+    here = case.outputs.labels[-1]
+    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", here)
+    assert done.exit_code == 0, done.output
+    (frf,) = chladni.load_case(tmp_path / "o" / "case").frfs
+    assert (frf.quantity, frf.inputs) == ("accelerance", (here,))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--input", "base"), "--input: direction 'base'; write +X"),
+        (("--input", "base:n"), "--input: label 'base:n': the base has no normal"),
+        (("--input", "base:+Q"), "--input: direction 'base:+Q'"),
+        (("--input", "999:+Z"), "--input: label '999:+Z': the deck has no grid 999"),
+        (("--input", "corner:+Z"), "--input: 'corner:+Z' names no node"),
+        (("--input", "base:+Z", "--excitation", "hammer"), "on which there is no"),
+    ],
+)
+def test_an_input_that_is_none_is_one_sentence(case, tmp_path, words, said):
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    table.write_text("label\n" + "\n".join(case.outputs.labels))
+    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, *words)
+    assert done.exit_code == 2, done.output
+    assert said in done.output
+    assert "Traceback" not in done.output
+    assert not (tmp_path / "o").exists()
+
+
+def test_what_drives_is_said_once(case, tmp_path):
+    """A table that names it, a case, and a deck that no SPC holds."""
+    deck, table = case.path.parent / "plate.bdf", tmp_path / "places.csv"
+    rows = "\n".join(f"{name},output" for name in case.outputs.labels)
+    table.write_text(f"label,role\n{rows}\n{case.outputs.labels[0]},input\n")
+    done = bench(tmp_path / "o", deck, *QUICK, "--sensors", table, "--input", "base:+Z")
+    assert done.exit_code == 2
+    assert "names what drives" in done.output
+    done = bench(tmp_path / "o", case.path, "--input", "base:+Z")
+    assert done.exit_code == 2
+    assert "is a case, which names its sensors, what drives it" in done.output
+    write_assembly(plate(0.3, 0.2, 8, 6, 1.2e-3), tmp_path / "free.bdf")
+    done = bench(tmp_path / "o", tmp_path / "free.bdf", *QUICK, "--input", "base:+Z")
+    assert done.exit_code == 2
+    assert "holds no grid by SPC" in done.output
+    assert not (tmp_path / "o").exists()

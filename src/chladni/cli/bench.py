@@ -9,7 +9,9 @@ import typer
 
 from ..bench.drive_signals import Kind
 from ..case import Case, load_case
+from ..case.sensor_places import placed
 from ..errors import FileError
+from ..io.tables.sensor_table import exciter, with_input
 from ..output import write_text
 from ..planning import PlanSettings, plan, sensors_csv
 from ..progress import Progress, within
@@ -68,6 +70,13 @@ def run(
     sensors: Annotated[
         Path | None, typer.Option(help="Table of sensors of a bare deck; else one is planned.")
     ] = None,
+    input: Annotated[
+        str,
+        typer.Option(
+            help="What drives a bare deck: 12:+Z, 12:n, or base:+Z, a shaker table that moves its "
+            "supports; default: what the table of sensors or the plan says."
+        ),
+    ] = "",
     units: Units = None,
     out: Out = None,
 ) -> None:
@@ -100,7 +109,8 @@ def run(
     with started("bench", source, out) as job:
         job.progress("reading", 0.0)
         with tempfile.TemporaryDirectory() as scratch:
-            case = _case(source, units, sensors, Path(scratch), within(job.progress, 0.0, 0.2))
+            stage = within(job.progress, 0.0, 0.2)
+            case = _case(source, units, sensors, input, Path(scratch), stage)
             found = virtual_test(case, settings, within(job.progress, 0.2, 0.95))
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
@@ -121,24 +131,36 @@ def _factors(text: str) -> tuple[float, ...]:
 
 
 def _case(
-    source: Path, units: str | None, sensors: Path | None, scratch: Path, progress: Progress
+    source: Path,
+    units: str | None,
+    sensors: Path | None,
+    driven: str,
+    scratch: Path,
+    progress: Progress,
 ) -> Case:
     """The case itself; of a bare deck one that is drafted in a scratch folder."""
     if source.exists() and is_case(source):
-        if sensors is not None or units is not None:
-            raise FileError(f"{source} is a case, which names its sensors and units itself")
+        if sensors is not None or units is not None or driven:
+            raise FileError(
+                f"{source} is a case, which names its sensors, what drives it and its units itself"
+            )
         return load_case(source)
     bare = load_deck(source, units)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
+    if driven:
+        placed(bare.model().assembly, [exciter(driven, "--input")], "--input")
     table, hangers = scratch / "sensors.csv", ""
     if sensors is None:
         progress("planning the sensors", 0.1)
         made = plan(bare.model().assembly, PlanSettings(draws=0))
-        write_text(table, sensors_csv(made))
-        hangers = f"hangers = {[int(h) for h in made.hangers]}\n"
+        write_text(table, sensors_csv(made, driven))
+        on_table = driven.startswith("base:")
+        hangers = "" if on_table else f"hangers = {[int(h) for h in made.hangers]}\n"
     elif not sensors.is_file():
         raise FileError(f"no file {sensors}{beside(sensors)}")
+    elif driven:
+        write_text(table, with_input(sensors, driven))
     else:  # as it is: what is wrong in it is told where it is read
         shutil.copyfile(sensors, table)
     from ..io.nastran import write_deck

@@ -38,7 +38,10 @@ def run(
     allow: Allow = None,
     sensors: Annotated[
         Path | None,
-        typer.Option(help="Where it is driven and answers: plan.json, or a table of sensors."),
+        typer.Option(
+            help="Where it answers and, without --input, is driven: plan.json, or a table of "
+            "sensors."
+        ),
     ] = None,
     out: Out = None,
 ) -> None:
@@ -53,15 +56,15 @@ def run(
         raise LabelError(f"no quantity {quantity!r}; there are {', '.join(per_force)}")
     with started("frf", source, out) as job:
         job.progress("reading the model", 0.0)
-        if sensors is not None and (input or output):
-            raise FileError("--sensors says where it is driven and answers; leave out the others")
+        if sensors is not None and output:
+            raise FileError("--sensors says where it answers; leave out --output")
         driven = bool(input) or sensors is not None
         given = _source(source, driven, units, allow or [])
         f = np.linspace(low, high, lines) if driven else None
         stage = within(job.progress, 0.1, 0.9)
         ends: tuple[Side, Side] = (output or (), input or ())
         if sensors is not None:
-            given, *placed = placed_layout(as_model(given, "frf"), sensors)
+            given, *placed = placed_layout(as_model(given, "frf"), sensors, input or ())
             ends = (placed[0], placed[1])
         found = frf(given, *ends, f, damping, stage)
         job.notes.extend(found.notes)

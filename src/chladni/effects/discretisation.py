@@ -50,7 +50,7 @@ class MeshError(Effect):
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """x ΔK over the modes."""
-        return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None]),)
+        return (PointTerm("K", self.rows, x[0] * self.change, self.change[:, None], strained=True),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class ModalDiscrepancy(Effect):
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
         """λ_r x_r on the diagonal of the modal stiffness."""
-        return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam)),)
+        return (PointTerm("K", self.rows, self.lam * x, np.diag(self.lam), strained=True),)
 
 
 @dataclass(frozen=True, eq=False)

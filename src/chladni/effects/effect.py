@@ -7,6 +7,7 @@ An effect acts in five ways, and in no other:
   ones, keeps every stiffness positive whatever the other parameters do;
 - it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass), and of
   degrees of freedom it brings along (a lump on a spring);
+  It may let clamps go (fem/released.py): its rows then reach beyond the dofs of the deck;
 - it adds *operators* c(p) A, A what a part other than a sheet has in K or M already, c > -1;
 - it changes *channels* of the test: gain, sign;
 - it changes *shapes* where they are measured, and only there (a mesh about a sensor).
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..fem.assemble import Structure
 from ..model.assembly import Assembly
 from .estimate import Estimate, Location
 
@@ -81,7 +83,8 @@ class PointTerm:
 
     Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it. Of an
     effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that
-    moves carries them as it does the rows ``carrier`` of the structure.
+    moves carries them as it does the rows ``carrier`` of the structure. Where a clamp was let go,
+    ``strained`` rows see what deforms alone, not what follows the clamp.
     """
 
     matrix: Literal["K", "M"]
@@ -91,6 +94,7 @@ class PointTerm:
     moving: dict[int, sp.csr_array] = field(default_factory=dict)
     own: np.ndarray | None = None
     carrier: sp.csr_array | None = None
+    strained: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,8 @@ class ShapeChange:
     """c S b added to the motion of the places that were measured: outputs first, then inputs.
 
     b are coordinates ``rows`` (k, n) of the structure, S ``shapes`` (places, k), c and dc/dx
-    (n_parameters,). What is local at a sensor no change of K and M over a basis can bring.
+    (n_parameters,). What is local at a sensor no change of K and M over a basis can bring. What
+    follows a clamp that was let go is none of it.
     """
 
     rows: sp.csr_array
@@ -147,6 +152,7 @@ class Effect:
     elastic: ClassVar[bool] = False  # gives and nothing else: what rubs there as well is not it
     lone: ClassVar[bool] = False  # a second one beside it would be no finding
     rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
+    lets_go: ClassVar[bool] = False  # of clamps: its rows reach beyond the dofs of the deck
     own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()
@@ -195,6 +201,10 @@ class Effect:
         points = [term.rows for term in self.terms(x)]
         operators = [sp.csr_array((m.operator @ shapes).T) for m in self.matrices(x)]
         return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
+
+    def released(self, built: Structure) -> Structure:
+        """The structure with the dofs its rows speak of beyond those the deck's supports leave."""
+        return built
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
         """Loads (n, k) that static responses (n, k) of the last round cause in their turn.

@@ -27,6 +27,7 @@ class Article:
     outputs, hangers : (k,) int    grid ids of the deck
     gains : (n_out,)               factor on every channel
     off_scale : mass that is taken off before the article is weighed [kg]
+    drive : grid id of the deck and direction of the force, or None where none is known
     truth : what was concealed; ``parameters`` by the names the effect reports, ``value`` the first
         of them, ``point_m`` and ``channel`` where it has a place
     """
@@ -37,6 +38,7 @@ class Article:
     hangers: np.ndarray
     gains: np.ndarray
     off_scale: float = 0.0
+    drive: tuple[int, tuple[float, float, float]] | None = None
     truth: dict[str, Any] = field(default_factory=dict)
 
     @property

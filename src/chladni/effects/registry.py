@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from ..errors import ExtensionError, LabelError
 from . import (
     adhesive_stiffness,
+    compliant_support,
     contact_stiffness,
     crack,
     extra_support,
@@ -24,6 +25,7 @@ from . import (
     point_mass,
     sensor_fault,
     sensor_mass,
+    shaker_restraint,
     stiffness_patch,
     suspension,
     thickness_distribution,
@@ -52,6 +54,8 @@ BUILT_IN = (
     hem_contact.FAMILY,
     contact_stiffness.FAMILY,
     over_constraint.FAMILY,
+    compliant_support.FAMILY,
+    shaker_restraint.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -105,7 +105,8 @@ class SearchContext(Protocol):
     ) -> np.ndarray:
         """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
 
-        With ``carried`` the basis is widened by what the effect moves, as it is for a fit.
+        With ``carried``, or where the effect lets clamps go, the basis is widened by what it moves,
+        as it is for a fit.
         """
 
     def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

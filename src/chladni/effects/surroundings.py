@@ -1,7 +1,7 @@
 """What an effect may know before anything is fitted: shells, beams, their grids, the test."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -25,12 +25,14 @@ class Setup:
     hangers : grid ids
     weight : mass of the structure [kg]
     f_max : highest frequency of interest [Hz]
+    drives : of each force the (grid id, weight) it acts on, and its direction
     """
 
     sensors: tuple[Share, ...]
     hangers: tuple[int, ...]
     weight: float
     f_max: float
+    drives: tuple[tuple[Share, tuple[float, float, float]], ...] = ()
 
     @property
     def stiffness(self) -> float:
@@ -142,12 +144,15 @@ class Surroundings:
     grids : ShellGrids        all of them
     places : ShellGrids       a sample of them, tried where a place is unknown
     setup : Setup             of the test
+    frequency : (r,) Hz, shapes : (n, r)    modes of the deck up to the highest line
     """
 
     groups: ShellGroups
     grids: ShellGrids
     places: ShellGrids
     setup: Setup
+    frequency: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def translations(self, grids: Sequence[int]) -> sp.csr_array:
         """Rows of all three translations of each grid (3k, n)."""

@@ -214,7 +214,10 @@ def _lines(first: Identified, mode: int, one: AtLevel, pole: complex, i: int, j:
 def _modal_lines(
     first: Identified, mode: int, one: AtLevel, pole: complex, j: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each."""
+    """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each.
+
+    Noise is no less than what the lowest level leaves, where the object is nearest to linear.
+    """
     away = np.abs(2 * np.pi * one.frf.frequency - np.abs(pole))
     near = away <= max(-NEAR * pole.real, np.sort(away)[2])
     frf, s = one.frf, 2j * np.pi * one.frf.frequency[near]
@@ -222,7 +225,7 @@ def _modal_lines(
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2
     H = (frf.values[near] - evaluate(rest, s))[:, :, j] / s[:, None] ** DERIVATIVES[first.quantity]
     R = first.residues[mode, :, j]
-    variance = one.variance[near][:, :, j] / q
+    variance = max(1.0, first.chi) ** 2 * one.variance[near][:, :, j] / q
     return s.imag, H @ R.conj(), variance @ np.abs(R) ** 2
 
 

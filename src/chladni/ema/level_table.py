@@ -9,6 +9,7 @@ from .level_study import LevelStudy, ModeStudy
 from .level_words import mode_sentence
 
 DRAWN = 60  # points of a fitted curve
+NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class LevelRow:
     """A mode at one level: measured, by the best element, and foretold where it was held out.
 
     ``stiffness`` and ``loss`` are what the element adds at that amplitude, κ' and κ'' over the
-    stiffness of the mode.
+    stiffness of the mode. ``..._low`` and ``..._high`` are 95 % intervals by the recording's noise.
     """
 
     level: float
@@ -31,6 +32,10 @@ class LevelRow:
     foretold_damping: float | None = None
     stiffness: float | None = None
     loss: float | None = None
+    frequency_low_hz: float | None = None
+    frequency_high_hz: float | None = None
+    damping_low: float | None = None
+    damping_high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,10 @@ def _rows(one: ModeStudy) -> tuple[LevelRow, ...]:
     if held is not None:
         for k, f, zeta in zip(held.rows, held.frequency, held.damping, strict=True):
             fitted[2][k], fitted[3][k] = float(f), float(zeta)
-    return tuple(LevelRow(*row) for row in zip(*columns, *fitted, strict=True))
+    half, factor = NORMAL_95 * m.frequency_sd, np.exp(NORMAL_95 * m.damping_sd / m.damping)
+    ends = (m.frequency - half, m.frequency + half, m.damping / factor, m.damping * factor)
+    ranges = [x.tolist() for x in ends]  # a damping ratio is above zero: its interval is of ln ζ
+    return tuple(LevelRow(*row) for row in zip(*columns, *fitted, *ranges, strict=True))
 
 
 def _tried(fit: ElementFit) -> TriedElement:

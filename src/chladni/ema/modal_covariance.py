@@ -69,11 +69,10 @@ def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float)
     Q, R = orthonormal(data, np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1))
     R1, R12, R2 = R[:n, :n], R[:n, n:], R[n:, n:]
     inverse = solve_triangular(R1, np.eye(n))[: 2 * r]
-    v = np.concatenate([data.w / data.common[:, None]] * 2)
     H = np.zeros((2 * r, 2 * r))
     local, slope = np.empty((r, n_c, 2, 2)), np.empty((n_c, 2 * r, 2 * r))
     for at in channel_blocks(n_c, Q.shape[1]):
-        G, _ = normal_matrices(Q, v[:, at], np.zeros_like(v[:, at]))
+        G, _ = normal_matrices(Q, data, at)
         G[:, range(n), range(n)] += _RIDGE
         tied = np.linalg.solve(G[:, :n, :n], G[:, :n, n:])
         S = R2.T @ (G[:, n:, n:] - G[:, n:, :n] @ tied) @ R2

@@ -17,6 +17,8 @@ from scipy.linalg import solve_triangular
 _TINY = 1e-300
 _RIDGE = 1e-12  # of the orthonormal basis: a channel that is dead stays solvable
 _TOGETHER = 4_000_000  # entries of normal matrices held at once
+_PRODUCTS = 1_000_000  # products of columns held at once: what a cache takes
+_ONE_BY_ONE = 12  # channels for which products of columns are not worth forming
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ class PoleFit:
     @property
     def chi2(self) -> float:
         """Sum of squares of the whitened residual."""
-        return float((np.abs(self.e) ** 2).sum())
+        return float(np.vdot(self.e, self.e).real)
 
     @property
     def residues(self) -> np.ndarray:
@@ -128,14 +130,12 @@ def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, 
     both = np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1) if slope else A
     Q, R = orthonormal(data, both)
     R1, R2 = R[:n, :n], R[n:, n:]
-    v = np.concatenate([data.w / data.common[:, None]] * 2)
-    t = stacked(data.common[:, None] * data.y)
     n_c, r = data.y.shape[1], len(p)
     x, delta_chi2 = np.empty((n, n_c)), np.zeros(r)
     H, g = np.zeros((2 * r, 2 * r)), np.zeros(2 * r)
     inverse = solve_triangular(R1, np.eye(n))
     for at in channel_blocks(n_c, Q.shape[1]):
-        G, b = normal_matrices(Q, v[:, at], t[:, at])
+        G, b = normal_matrices(Q, data, at)
         G[:, range(n), range(n)] += _RIDGE
         root = np.linalg.solve(np.linalg.cholesky(G[:, :n, :n]), inverse[: 2 * r].T)
         known = np.concatenate([b[:, :n, None], G[:, :n, n:]], axis=2)
@@ -172,14 +172,50 @@ def channel_blocks(n_c: int, m: int) -> list[slice]:
     return [slice(k, min(k + step, n_c)) for k in range(0, n_c, step)]
 
 
-def normal_matrices(Q: np.ndarray, v: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Qᵀ v² Q (n_c, m, m) and Qᵀ v² t (n_c, m) of every channel."""
-    n_c, m = v.shape[1], Q.shape[1]
-    G, b = np.empty((n_c, m, m)), np.empty((n_c, m))
-    for c in range(n_c):
-        V = v[:, c, None] * Q
-        G[c], b[c] = V.T @ V, V.T @ (v[:, c] * t[:, c])
+def normal_matrices(Q: np.ndarray, data: PoleData, at: slice) -> tuple[np.ndarray, np.ndarray]:
+    """Qᵀ v² Q (n_c, m, m) and Qᵀ v² g y (n_c, m) of some channels, v = w / g; Q (2 n_f, m)."""
+    n, g, w = len(data.s), data.common[:, None], data.w[:, at]
+    z = w**2 / g * data.y[:, at]
+    b = (Q[:n].T @ z.real + Q[n:].T @ z.imag).T
+    if w.shape[1] > _ONE_BY_ONE:
+        return _weighted_squares(Q, (w / g) ** 2), b
+    G = np.empty((w.shape[1], Q.shape[1], Q.shape[1]))
+    for c, v in enumerate((w / g).T):
+        V = np.concatenate([v, v])[:, None] * Q
+        G[c] = V.T @ V
     return G, b
+
+
+def _weighted_squares(Q: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """Σ_k v_kc² q_k q_kᵀ over lines k of every channel (n_c, m, m), ``square`` v² (n_f, n_c).
+
+    Products of columns are formed once for all channels, real and imaginary part together for they
+    have one weight; one product of matrices then does all sums.
+    """
+    n, n_c, m = len(square), square.shape[1], Q.shape[1]
+    columns = np.ascontiguousarray(Q.T)
+    i, j = np.triu_indices(m)
+    upper = np.zeros((len(i), n_c))
+    step = max(1, _PRODUCTS // len(i))
+    for k in range(0, n, step):
+        lines = slice(k, min(k + step, n))
+        upper += _products(columns[:, :n][:, lines], columns[:, n:][:, lines]) @ square[lines]
+    G = np.empty((n_c, m, m))
+    G[:, i, j] = G[:, j, i] = upper.T
+    return G
+
+
+def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a_i a_j + b_i b_j, i <= j, row by row of the upper triangle (m (m + 1) / 2, n)."""
+    m = len(a)
+    rows = np.empty((m * (m + 1) // 2, a.shape[1]))
+    begin = 0
+    for i in range(m):
+        own = rows[begin : begin + m - i]
+        np.multiply(a[i], a[i:], out=own)
+        own += b[i] * b[i:]
+        begin += m - i
+    return rows
 
 
 def turned(x: np.ndarray) -> np.ndarray:

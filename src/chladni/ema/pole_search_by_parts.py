@@ -3,7 +3,8 @@
 A pole is known from the lines about it, so a band of some hundred lines holds few unknowns; in it
 thirty combinations of whitened channels carry nearly all that a hundred do (Juang and Suzuki 1988,
 ASME J. Vib. Acoust. 110, 88-95: compression by principal components). They choose the poles; every
-channel then polishes them with its own noise. Residues of all poles are solved for at once.
+channel then polishes them with its own noise. Residues of all poles are solved for at once, and so
+are the poles beside the band, which bend every part of it.
 """
 
 from dataclasses import dataclass, replace
@@ -11,11 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
-from .pole_fitting import PoleData, basis, polish, solve, stacked
-from .pole_search import ROUNDING, STEADY, Solution, chi_of, selected, with_noise_left
+from .outer_poles import outside, with_outer_poles
+from .pole_fitting import PoleData, PoleFit, basis, polish, solve, stacked
+from .pole_search import (
+    ROUNDING,
+    STEADY,
+    Solution,
+    Spread,
+    chi_of,
+    selected,
+    with_noise_left,
+)
 from .pole_selection import Rule, extended, uncertainty, with_neighbours
 
-CHANNELS, LINES = 48, 3000  # up to here all are fitted at once
+CHANNELS, LINES = 48, 2000  # up to here all are fitted at once; of more what rings beside shows
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
 MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
@@ -33,13 +43,14 @@ def is_large(data: PoleData) -> bool:
 class BandPoles:
     """Poles of one band, and the samples (margins too, own weights) they were fitted to.
 
-    ``poles`` (r,) are those of the band itself, ``x`` (2 r, n_c) their residues as real pairs.
+    ``poles`` (r,) are those from ``begin`` to ``end`` of |s|.
     """
 
     rows: slice
     w: np.ndarray
+    begin: float
+    end: float
     poles: np.ndarray
-    x: np.ndarray
 
 
 def searched_by_parts(
@@ -47,18 +58,31 @@ def searched_by_parts(
 ) -> Solution:
     """As :func:`.pole_search.searched`, of poles that are chosen band by band."""
     parts = [_part(data, low, high, rule, stated, orders, tries) for low, high in core_bands(data)]
-    parts = _once(parts)
+    whole, whole_spread = _with_outer(data, _once(parts), rule, stated)
+    beside = outside(data, whole.p)
+    of_part = [
+        np.flatnonzero(~beside & (one.begin <= np.abs(whole.p)) & (np.abs(whole.p) < one.end))
+        for one in parts
+    ]
+    p, delta_chi2, spread = whole.p.copy(), whole.delta_chi2.copy(), np.array(whole_spread)
+    fit, _ = solve(data, p)
     for _ in range(PASSES):
-        done = [_polished(data, parts, k, rule, stated) for k in range(len(parts))]
-        p, delta_chi2, sd_f, sd_z = (np.concatenate(all_of) for all_of in zip(*done, strict=True))
+        for part, own in zip(parts, of_part, strict=True):
+            p[own], delta_chi2[own], spread[:, own] = _polished(data, fit, part, own, rule, stated)
         fit, _ = solve(data, p)
-        ends = np.cumsum([2 * len(one[0]) for one in done])
-        x = np.split(fit.x[:-2], ends[:-1])
-        parts = [
-            replace(part, poles=one[0], x=own)
-            for part, one, own in zip(parts, done, x, strict=True)
-        ]
-    return Solution(replace(fit, delta_chi2=delta_chi2), (sd_f, sd_z), chi_of(data, fit))
+    return Solution(replace(fit, delta_chi2=delta_chi2), (spread[0], spread[1]), chi_of(data, fit))
+
+
+def _with_outer(
+    data: PoleData, parts: list[BandPoles], rule: Rule, stated: bool
+) -> tuple[PoleFit, Spread]:
+    """Poles of all bands and beside them, polished together in few combinations of channels."""
+    p = np.concatenate([one.poles for one in parts])
+    if not stated and chi_of(data, fit := solve(data, p)[0]) > ROUNDING:
+        data = with_noise_left(data, data, fit)
+    few = few_channels(data)
+    fit, slope = with_outer_poles(few, p, replace(rule, channels=few.y.shape[1]))
+    return fit, uncertainty(fit.p, slope, max(1.0, chi_of(few, fit)) ** 2)
 
 
 def core_bands(data: PoleData) -> list[tuple[int, int]]:
@@ -121,7 +145,7 @@ def _part(
     end = np.inf if high == n else f[high]
     slack = np.abs(fit.p.real)  # at the cut two bands may find one pole, each on the other's side
     core = (begin - slack <= np.abs(fit.p)) & (np.abs(fit.p) < end + slack)
-    return BandPoles(rows, whole.w, fit.p[core], fit.x[:-2][np.repeat(core, 2)])
+    return BandPoles(rows, whole.w, begin, end, fit.p[core])
 
 
 def _once(parts: list[BandPoles]) -> list[BandPoles]:
@@ -133,29 +157,25 @@ def _once(parts: list[BandPoles]) -> list[BandPoles]:
         if after is not None and len(after.poles):
             gap = np.abs(p[:, None] - after.poles)
             alone = (gap > 0.5 * np.abs(p.real[:, None] + after.poles.real)).all(axis=1)
-        kept.append(replace(part, poles=p[alone], x=part.x[np.repeat(alone, 2)]))
+        kept.append(replace(part, poles=p[alone]))
     return kept
 
 
 def _polished(
-    data: PoleData, parts: list[BandPoles], k: int, rule: Rule, stated: bool
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Poles, rise of χ² and spread of one band once what rings in all others is taken off."""
-    part, rest = parts[k], [one for j, one in enumerate(parts) if j != k]
-    s, y = data.s[part.rows], data.y[part.rows]
-    for other in rest:
-        y = y - basis(s, other.poles, data.q) @ other.x
-    own = assumed = PoleData(s, y, data.w[part.rows], data.q)
-    if not stated:
-        own = replace(own, w=part.w)
-        own = with_noise_left(own, own, solve(own, part.poles)[0])
-    fit, slope = polish(own, part.poles, rule.largest, POLISH, 0.05)
-    noise = chi_of(own, fit) ** 2
-    if stated:
-        noise = max(1.0, noise)
-    else:
-        chi = max(chi_of(assumed, solve(assumed, fit.p)[0]), ROUNDING)
-        noise *= max(1.0, STEADY / chi) ** 2
-    order = np.argsort(np.abs(fit.p))
-    sd_f, sd_z = uncertainty(fit.p, slope, noise)
-    return fit.p[order], fit.delta_chi2[order], sd_f[order], sd_z[order]
+    data: PoleData, fit: PoleFit, part: BandPoles, own: np.ndarray, rule: Rule, stated: bool
+) -> tuple[np.ndarray, np.ndarray, Spread]:
+    """Poles, rise of χ² and spread of one band once what rings elsewhere is taken off."""
+    rest = np.delete(np.arange(len(fit.p)), own)
+    whole = PoleData(data.s[part.rows], data.y[part.rows], data.w[part.rows], data.q)
+    x = fit.x[:-2].reshape(len(fit.p), 2, -1)[rest].reshape(2 * len(rest), -1)
+    band = assumed = replace(whole, y=whole.y - basis(whole.s, fit.p[rest], data.q) @ x)
+    if not stated:  # noise goes with all that rings, not with the band's own part of it
+        fitted = replace(band, w=part.w)
+        own_noise = with_noise_left(whole, fitted, solve(fitted, fit.p[own])[0])
+        band = replace(band, w=own_noise.w)
+    best, slope = polish(band, fit.p[own], rule.largest, POLISH, 0.05)
+    noise = max(1.0, left := chi_of(band, best)) ** 2
+    chi = 1.0 if stated else max(chi_of(assumed, solve(assumed, best.p)[0]), ROUNDING)
+    if chi < STEADY:
+        noise = (left * STEADY / chi) ** 2
+    return best.p, best.delta_chi2, uncertainty(best.p, slope, noise)

@@ -6,7 +6,7 @@ stiffness. An element matrix A over any points adds Tᵀ A T.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -193,6 +193,16 @@ def _transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
     else:
         T, at = frames(assembly), np.arange(6 * n)
     return T, np.column_stack([at // 6, at % 6 + 1])
+
+
+def supported(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
+    """Motion of all points if a support moved by one (6n, k), and (row, component) of each (k, 2).
+
+    What hangs on a support by rigid elements moves with it.
+    """
+    T, dofs = _transformation(assembly)
+    held = _held(replace(assembly, scalar_points=None), dofs)
+    return sp.csr_array(T[:, held]), dofs[held]
 
 
 def frames(assembly: Assembly) -> sp.csr_array:

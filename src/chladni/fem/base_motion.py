@@ -10,8 +10,9 @@ the base.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
-from .assemble import Structure
+from .assemble import Structure, over_all_motions
 from .energy import rigid_motions
 from .solve import inertia_load
 
@@ -30,6 +31,16 @@ class BaseMotion:
     whole: np.ndarray
     free: np.ndarray
     force: np.ndarray
+
+    def over(self, built: Structure) -> "BaseMotion":
+        """The same of the structure with more dofs, whose motion is one beside the base as well."""
+        more = built.T.shape[1] - len(self.free)
+        force = built.T.T @ (over_all_motions(built.assembly)[0] @ self.whole)
+        return BaseMotion(self.whole, np.pad(self.free, ((0, more), (0, 0))), np.asarray(force))
+
+    def carried(self, rows: sp.csr_array) -> np.ndarray:
+        """Motion of rows (m, n) that the base carries along (m, k)."""
+        return np.asarray(rows @ self.free[: rows.shape[1]])
 
 
 def base_motion(built: Structure, directions: np.ndarray) -> BaseMotion:

@@ -13,14 +13,16 @@ from ..model.assembly import Assembly, Beams, Shells, picked
 from .beam_lines import member_beams
 from .facets import cell_normals, point_normals
 
+SAME_AXES = 1e-6  # of unit vectors: frames of neighbours in which they are held alike
 SMOOTH = np.cos(np.radians(35.0))  # facets that differ by more make a fold
 
 
 def refined(assembly: Assembly) -> Assembly:
     """The assembly with every shell halved along both directions and every member beam in two.
 
-    All else is as it was. Old points keep their rows and ids; new ones follow with new ids. A beam
-    along a side of a shell gets the point that this side got.
+    All else is as it was; what is held at both ends of a side is held between them. Old points keep
+    their rows and ids; new ones follow with new ids. A beam along a side of a shell gets the point
+    that this side got.
     """
     halved, middle = _finer_shells(assembly)
     return _finer_beams(halved, middle)
@@ -45,7 +47,30 @@ def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
     centre = sides.mean(axis=1) * 2 - centre if len(quads) else centre
     points = np.concatenate([assembly.points, middle, centre])
     grown, _ = with_points(assembly, points[n:])
+    grown = _held_between(grown, np.arange(n, n + m), edges)
+    grown = _held_between(grown, np.arange(n + m, len(points)), quads)
     return replace(grown, shells=_split(shells, of + n, n + m)), (edges, n)
+
+
+def _held_between(assembly: Assembly, new: np.ndarray, ends: np.ndarray) -> Assembly:
+    """Points ``new`` (k,) held in what supports hold at all of their ends (k, m), along its axes.
+
+    A clamped edge stays clamped between its old points.
+    """
+    held = np.zeros((len(assembly.points), 6), bool)
+    held[assembly.supports[:, 0], assembly.supports[:, 1] - 1] = True
+    all_of = held[ends].all(axis=1)
+    if not all_of.any():
+        return assembly
+    axes = assembly.axes
+    if axes is not None:
+        alike = np.abs(axes[ends] - axes[ends[:, :1]]).max(axis=(1, 2, 3)) < SAME_AXES
+        all_of &= alike[:, None]
+        axes = axes.copy()
+        axes[new[all_of.any(axis=1)]] = axes[ends[all_of.any(axis=1), 0]]
+    k, component = np.nonzero(all_of)
+    more = np.column_stack([new[k], component + 1])
+    return replace(assembly, axes=axes, supports=np.concatenate([assembly.supports, more]))
 
 
 def _finer_beams(assembly: Assembly, sides: Middles) -> Assembly:

@@ -29,19 +29,20 @@ def with_springs(
 
 
 def with_ground_bushes(
-    assembly: Assembly, rows: np.ndarray, directions: np.ndarray, k: float,
+    assembly: Assembly, rows: np.ndarray, directions: np.ndarray, k: float | np.ndarray,
     places: np.ndarray | None = None,
 ) -> Assembly:  # fmt: skip
     """Springs k d dᵀ to ground at rows of points, along ``directions`` (n, 3) of unit length.
 
-    They sit at ``places`` (n, 3) [m], if given, led to by a rigid arm from their point.
+    They sit at ``places`` (n, 3) [m], if given, led to by a rigid arm from their point. Where k is
+    (n, 6) it is along, and about, that direction and two square to it.
     """
     old, n = assembly.bushes, len(rows)
     places = assembly.points[rows] if places is None else places
     if not n:
         return assembly
     stiffness = np.zeros((n, 6))
-    stiffness[:, 0] = k
+    stiffness[:, : 6 if np.ndim(k) else 1] = k
     none = np.zeros((n, 6))
     new = Bushes(
         np.append(old.ids, int(old.ids.max(initial=0)) + 1 + np.arange(n)),

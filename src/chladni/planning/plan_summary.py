@@ -265,8 +265,8 @@ def durations(found: Plan) -> Durations:
     )
 
 
-def sensors_csv(found: Plan) -> str:
-    """The table a case reads: sensors in order of rank, then the shakers.
+def sensors_csv(found: Plan, driven: str = "") -> str:
+    """The table a case reads: sensors in order of rank, then the shakers, or ``driven`` for them.
 
     A place that is no grid is given by x, y, z [m]; its label is a number no grid has.
     """
@@ -274,9 +274,12 @@ def sensors_csv(found: Plan) -> str:
     write = csv.writer(text, lineterminator="\n").writerow
     write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
     rows = [(int(i), "output", found.settings.mass) for i in found.layout]
-    for i, role, mass in [*rows, *((int(i), "input", 0.0) for i in found.together)]:
+    rows += [] if driven else [(int(i), "input", 0.0) for i in found.together]
+    for i, role, mass in rows:
         at = _place(found, i)
         place = [""] * 3 if at.grid is not None else [f"{x:.7g}" for x in at.point_m]
         direction = [f"{x:.9g}" for x in at.direction]
         write([at.label, at.grid, *place, *direction, role, f"{mass:g}"])
+    if driven:
+        write([driven, *[""] * 7, "input", "0"])
     return text.getvalue()

@@ -11,7 +11,7 @@ from ..ema.level_table import level_tables
 from ..ema.mode_indicators import cmif, mif
 from ..ema.shapes import driven_shapes, shape_spread, shapes
 from ..io.tables.write_modal import write_shape_table, write_state_space
-from ..io.tables.write_tables import write_poles
+from ..io.tables.write_tables import write_levels, write_poles
 from ..workflows.identify import Identification, RecordingModes
 from .blocks import PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
@@ -44,7 +44,10 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         files += [(p.path.name, _FILES[p.path.stem.removesuffix(stem)]) for p in pictures]
     for k, study in enumerate(found.levels):
         tables = level_tables(study)
-        drawn = draw_levels(folder, tables, "" if len(found.levels) == 1 else f"_{k + 1}")
+        stem = "" if len(found.levels) == 1 else f"_{k + 1}"
+        write_levels(folder / f"levels{stem}.csv", tables)
+        files.append((f"levels{stem}.csv", "every mode at every level, with its intervals"))
+        drawn = draw_levels(folder, tables, stem)
         sections.insert(k, level_section(tables, drawn))
         files += [(path.name, "a mode over levels") for path in drawn.values()]
     lead = "; ".join(_sentence(r) for r in found.recordings)

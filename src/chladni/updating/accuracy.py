@@ -71,8 +71,8 @@ def accuracy(
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
     at = np.flatnonzero((f > RIGID * f_max) & (f <= f_max))
     Kq, Mq = products(model, effects, x, _modes(model, state)[:, at])
-    force = (Kq - state.lam[at] * Mq)[: len(model.basis)]  # what effects bring lacks nothing
-    missing = np.asarray(reduced.factor.solve(force))
+    n = len(reduced.structure.system.dofs)  # what effects bring, and clamps, lack nothing
+    missing = np.asarray(reduced.factor.solve((Kq - state.lam[at] * Mq)[:n]))
     better = _improved(model, effects, x, state, missing)[at]
     return Accuracy(f[at], np.maximum(np.sqrt(state.lam[at] / better) - 1, 0.0), missing)
 
@@ -82,6 +82,7 @@ def _improved(
 ) -> np.ndarray:
     """λ of Rayleigh-Ritz on the basis and what it lacks, in increasing order."""
     M = model.groups.structure.system.M
+    missing = np.pad(missing, ((0, len(model.basis) - len(missing)), (0, 0)))
     both = orthonormal(M, [model.basis, missing], kept=model.basis.shape[1])
     Z = np.pad(both[:, model.basis.shape[1] :], ((0, len(state.own)), (0, 0)))
     if not Z.shape[1]:
@@ -121,11 +122,15 @@ def products(
     K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            b = sp.hstack([term.rows, sp.csr_array(own_part(term, first, n_own))], format="csr")
+            rows = model.wide(term.rows, term.strained)
+            beside = sp.csr_array((rows.shape[0], n - rows.shape[1]))
+            own = sp.csr_array(own_part(term, first, n_own))
+            b = sp.hstack([rows, beside, own], format="csr")
             added = b.T @ (term.coefficient[:, None] * (b @ q))
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
         for part in effect.matrices(x[at]):
-            added = np.pad(part.coefficient * (part.operator @ u), ((0, n_own), (0, 0)))
+            m = part.operator.shape[0]
+            added = np.pad(part.coefficient * (part.operator @ u[:m]), ((0, len(q) - m), (0, 0)))
             K, M = (K + added, M) if part.matrix == "K" else (K, M + added)
     return K, M
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..effects.effect import MatrixTerm, PointTerm
 from ..effects.shell_groups import ShellGroups
+from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 
 
@@ -28,6 +29,10 @@ class BaseParticipation:
     motion: BaseMotion
     groups: np.ndarray
     rest: np.ndarray
+
+    def over(self, built: Structure) -> Self:
+        """The same of a structure with more dofs, which no vector of the basis moves yet."""
+        return replace(self, motion=self.motion.over(built))
 
     def extended(self, shells: ShellGroups, new: np.ndarray) -> Self:
         """The same over a basis that also holds these vectors (n, m)."""
@@ -64,11 +69,11 @@ class Participating:
         """Masses c at rows b (k, r) of the basis, ``moved`` = ∂b/∂x of what moves them."""
         if term.matrix != "M":
             return
-        along = (term.rows if term.carrier is None else term.carrier) @ self.motion.free
+        along = self.motion.carried(term.rows if term.carrier is None else term.carrier)
         self.value = self.value + (b.T * term.coefficient) @ along
         self.slope[at] += np.einsum("ki,kp,kj->pij", b, term.gradient, along, optimize=True)
         for p, db in moved.items():
-            d_along = term.moving[p] @ self.motion.free
+            d_along = self.motion.carried(term.moving[p])
             c = term.coefficient
             self.slope[at.start + p] += (db.T * c) @ along + (b.T * c) @ d_along
 
@@ -76,7 +81,8 @@ class Participating:
         """A part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
-        l = np.pad(basis.T @ (part.operator @ self.motion.free), ((0, self.n_own), (0, 0)))
+        rows = basis[: part.operator.shape[0]].T
+        l = np.pad(rows @ self.motion.carried(part.operator), ((0, self.n_own), (0, 0)))
         self.value = self.value + part.coefficient * l
         self.slope[at] += part.gradient[:, None, None] * l
 

@@ -162,7 +162,8 @@ class UpdatingContext:
         Responses are scored once, with the base profiled out; poles at a wide and a narrow scale.
         """
         base, reduced = self.baselines[about], self.problem.reduced
-        widened = reduced.model_for if carried else reduced.model.split_for
+        wider = carried or effect.lets_go
+        widened = reduced.model_for if wider else reduced.model.split_for
         model = widened(effect, starts[0])
         data = self.problem.data.over(model)
         ways = WIDE if isinstance(data, Poles) else (0.0,)

@@ -87,7 +87,11 @@ class UpdatingProblem:
     def where(self) -> Surroundings:
         """The structure and its test as effects may know them."""
         reduced = self.reduced
-        return Surroundings(reduced.groups, reduced.grids, reduced.candidates, self.setup)
+        shapes = reduced.shapes
+        return Surroundings(
+            reduced.groups, reduced.grids, reduced.candidates, self.setup,
+            reduced.frequency[: shapes.shape[1]], shapes,
+        )  # fmt: skip
 
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> "UpdatingProblem":
         """Responses with errors of the model's form as they spread from this state."""

@@ -325,7 +325,10 @@ def setup_of(question: Question, f_max: float) -> Setup:
     """What the effects may know of the test."""
     weight = mass_properties(question.assembly)[0]
     sensors = question.outputs.shares(question.assembly)
-    return Setup(sensors, question.hangers, weight, f_max)
+    forces = question.inputs.shares(question.assembly)
+    ways = question.inputs.directions[~question.inputs.base].tolist()
+    drives = tuple((share, (x, y, z)) for share, (x, y, z) in zip(forces, ways, strict=True))
+    return Setup(sensors, question.hangers, weight, f_max, drives)
 
 
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
@@ -354,7 +357,7 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
         raise FileError(
             f"{p.field} cannot be freed: deck and test do not say where it acts (all parts of a "
             "material for orthotropic-material, [test] hangers for suspension, sensors on the "
-            "structure for sensor-mass)"
+            "structure for sensor-mass, drive points, three at most, for shaker-restraint)"
         )
     return freed_effect(found[0], p.name)
 

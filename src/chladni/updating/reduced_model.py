@@ -18,6 +18,7 @@ from ..effects.effect import Effect, count
 from ..effects.shell_components import COMPONENTS
 from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
+from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
@@ -32,12 +33,13 @@ class Reduced:
     Attributes
     ----------
     groups : of the structure's shells and beams
-    basis : (n, r)            M-orthonormal
+    basis : (n, r)            M-orthonormal; behind the dofs of the deck those of clamps let go
     linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
     mass : (g, r)             these three are stacks of r by r matrices, one for each group
     K0, M0 : (r, r)           all that is in no group
     weight0 : float           mass beside the groups [kg]
     base : what a moving base does to the basis, or None where forces drive the structure
+    following : (n, clamps)   how the structure follows unit motions of clamps that were let go
     """
 
     groups: ShellGroups
@@ -49,12 +51,24 @@ class Reduced:
     M0: np.ndarray
     weight0: float
     base: BaseParticipation | None = None
+    following: np.ndarray | None = None
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
     _within: "Reduced | None" = None  # over the first vectors of this basis: what it knows is kept
 
-    def rows(self, rows: sp.csr_array, keep: bool = True) -> np.ndarray:
-        """Rows of the structure in the basis (k, r); projected once where they are to be kept."""
-        return self._once(rows, lambda: rows @ self.basis) if keep else rows @ self.basis
+    def rows(self, rows: sp.csr_array, keep: bool = True, strained: bool = False) -> np.ndarray:
+        """Rows of the structure in the basis (k, r); projected once where they are to be kept.
+
+        Rows over the dofs of the deck see no clamp's own; ``strained`` ones see what deforms.
+        """
+        wide = self.wide(rows, strained)
+        basis = self.basis[: wide.shape[1]]
+        return self._once(rows, lambda: wide @ basis) if keep else wide @ basis
+
+    def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
+        """The rows; ``strained`` ones over clamps as well, less what follows them."""
+        if not strained or self.following is None:
+            return rows
+        return sp.csr_array(sp.hstack([rows, sp.csr_array(-(rows @ self.following))]))
 
     def operator(self, A: sp.csr_array) -> np.ndarray:
         """Φᵀ A Φ of a symmetric operator of the structure (r, r); projected once.
@@ -64,11 +78,12 @@ class Reduced:
         return self._once(A, lambda: self._projected(A))
 
     def _projected(self, A: sp.csr_array) -> np.ndarray:
+        basis = self.basis[: A.shape[0]]
         if self._within is None:
-            return _symmetric(self.basis.T @ (A @ self.basis))
+            return _symmetric(basis.T @ (A @ basis))
         old = self._within.operator(A)
         r = len(old)
-        border = self.basis.T @ (A @ self.basis[:, r:])
+        border = basis.T @ (A @ basis[:, r:])
         return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
 
     def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
@@ -77,9 +92,19 @@ class Reduced:
             known = self._seen[id(key)] = key, np.asarray(made())
         return known[1]
 
+    def released(self, built: Structure, following: np.ndarray) -> Self:
+        """The same model of a structure with more dofs, which no vector of the basis moves yet."""
+        more = len(built.system.dofs) - len(self.basis)
+        return replace(
+            self, groups=replace(self.groups, structure=built), following=following,
+            basis=np.pad(self.basis, ((0, more), (0, 0))),
+            base=None if self.base is None else self.base.over(built), _seen={}, _within=self,
+        )  # fmt: skip
+
     def extended(self, vectors: np.ndarray) -> Self:
-        """The same model over a basis that also holds these vectors (n, k)."""
+        """The same model over a basis that holds these (n, k) as well; short ones move no clamp."""
         system = self.groups.structure.system
+        vectors = np.pad(vectors, ((0, len(self.basis) - len(vectors)), (0, 0)))
         basis = orthonormal(system.M, [self.basis, vectors], kept=self.basis.shape[1])
         new = basis[:, self.basis.shape[1] :]
         if not new.shape[1]:
@@ -200,7 +225,8 @@ def evaluate(
     base = _participating(model, logs, slopes, n_own)
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
-            b = row(model.rows(term.rows, keep=not term.moving), own_part(term, first, n_own))
+            seen = model.rows(term.rows, not term.moving, term.strained)
+            b = row(seen, own_part(term, first, n_own))
             target, slope = (K, dK) if term.matrix == "K" else (M, dM)
             target += (b.T * term.coefficient) @ b
             moving = term.moving if gradient else {}
@@ -256,7 +282,7 @@ def _moved(
     for effect, at in slices(effects):
         if (change := effect.seen(x[at])) is None:
             continue
-        whole = change.shapes @ (model.rows(change.rows) @ phi)
+        whole = change.shapes @ (model.rows(change.rows, strained=True) @ phi)
         value = change.coefficient * whole
         total = value if total is None else total + value
         slopes |= {at.start + p: g * whole for p, g in enumerate(change.gradient)}

@@ -18,6 +18,7 @@ from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
 
 FEWEST = 12  # modes of a basis whose structure has no flexible one below that: six, and six rigid
+FOLLOWED = 10  # rounds in which the response to a clamp's motion is found with a shifted factor
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
@@ -48,7 +49,8 @@ class ReducedProblem:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
         exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
         b = self.model.rows(where.rows)
-        K = self.model.basis.T @ (self.structure.system.K.real @ self.model.basis)
+        basis = self.model.basis
+        K = basis.T @ (self.model.groups.structure.system.K.real @ basis)
         shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
         inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
         return np.maximum(exact - inside, 0.0)
@@ -59,15 +61,43 @@ class ReducedProblem:
 
     def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
         """The reduced model over a basis that can carry an effect near x, split as it needs."""
-        low = np.flatnonzero(self.frequency <= self.f_max)
-        rows = effect.basis_rows(x, self.model.basis[:, low])
+        model, rows = self.model, effect.basis_rows(x, self.shapes)
         if rows is None:
-            return self.model.split_for(effect, x)
-        blocks = [attachments(self.factor, rows)]
+            return model.split_for(effect, x)
+        if effect.lets_go:
+            model = self._released(effect)
+            assert model.following is not None
+            g = rows[:, len(model.following) :].toarray().T
+            blocks = [np.vstack([model.following @ g, g])]
+        else:
+            blocks = [attachments(self.factor, rows)]
         for _ in range(effect.rounds):
             loads = effect.reloads(blocks[-1], self.structure.system.M)
             blocks.append(self.factor.solve(loads))
-        return self.model.extended(np.hstack(blocks)).split_for(effect, x)
+        n = len(model.basis)
+        every = [np.pad(block, ((0, n - len(block)), (0, 0))) for block in blocks]
+        return model.extended(np.hstack(every)).split_for(effect, x)
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """Modes of the nominal model up to the highest frequency of interest (n, r)."""
+        low = np.flatnonzero(self.frequency <= self.f_max)
+        return self.model.basis[: len(self.structure.system.dofs), low]
+
+    def _released(self, effect: Effect) -> Reduced:
+        """The reduced model with clamps let go, which the structure follows by -K⁻¹ K_qg.
+
+        The factor is that of K + σM; each round leaves σ/(σ + λ_1) = 1/5 of the last error.
+        """
+        if self.model.following is not None:
+            return self.model
+        built, K = effect.released(self.structure), self.structure.system.K.real
+        n = len(self.structure.system.dofs)
+        force = -built.system.K.real[:n, n:].toarray()
+        R = self.factor.solve(force)
+        for _ in range(FOLLOWED):
+            R = R + self.factor.solve(force - K @ R)
+        return self.model.released(built, R)
 
 
 def reduced_problem(

@@ -149,7 +149,7 @@ def reanalysis(
     phi_b = model.rows(places.rows) @ base.state.phi
     G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
     if massive and model.base is not None:
-        carried = places.rows @ model.base.motion.free
+        carried = model.base.motion.carried(places.rows)
         G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
     return Reanalysis(
         base,

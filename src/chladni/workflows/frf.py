@@ -11,12 +11,12 @@ from ..case import Case
 from ..case.sensor_places import ROLES, carried, placed
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
-from ..dynamics.frf import FRF, residual_flexibility, residual_shift
+from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
 from ..errors import FileError
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, modelled, node_points
 from ..fem.solve import base_response, inertia_load
-from ..io.tables.sensor_table import read_layout
+from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
 from ..model.point_masses import with_masses
 from ..progress import Progress, silent
@@ -88,9 +88,14 @@ def _labels(side: Side) -> tuple[str, ...]:
     return side.labels if isinstance(side, MeasuredDofs) else tuple(side)
 
 
-def placed_layout(model: Model, path: Path) -> tuple[Model, MeasuredDofs, MeasuredDofs]:
+def placed_layout(
+    model: Model, path: Path, driven: Sequence[str] = ()
+) -> tuple[Model, MeasuredDofs, MeasuredDofs]:
     """The model with the sensors of a layout on it, and its places as :func:`layout_places`."""
-    outputs, inputs = layout_places(model, path)
+    outputs, inputs = layout_places(model, path, driven)
+    if driven:
+        said = f"Driven at {', '.join(driven)} (--input); the sensors are those of {path.name}."
+        model = replace(model, notes=(*model.notes, said))
     if not (masses := carried(model.assembly, outputs, inputs)):
         return model, outputs, inputs
     grids, m = zip(*masses, strict=True)
@@ -99,12 +104,15 @@ def placed_layout(model: Model, path: Path) -> tuple[Model, MeasuredDofs, Measur
     return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
 
 
-def layout_places(model: Model, path: Path) -> tuple[MeasuredDofs, MeasuredDofs]:
+def layout_places(
+    model: Model, path: Path, driven: Sequence[str] = ()
+) -> tuple[MeasuredDofs, MeasuredDofs]:
     """Outputs and inputs of a layout on a model.
 
     Parameters
     ----------
     path : a table of sensors, or ``plan.json``
+    driven : labels as 12:+Z, 12:n or base:+Z in place of its inputs
 
     Raises
     ------
@@ -113,12 +121,17 @@ def layout_places(model: Model, path: Path) -> tuple[MeasuredDofs, MeasuredDofs]
     """
     if not path.is_file():
         raise FileError(f"no file {path}{beside(path)}")
-    sensors = read_layout(path)
+    sensors = read_layout(path, [exciter(label, "--input") for label in driven])
     outputs, inputs = (
-        placed(model.assembly, [s for s in sensors if s.role == role], path.name) for role in ROLES
+        placed(
+            model.assembly,
+            [s for s in sensors if s.role == role],
+            "--input" if driven and role == "input" else path.name,
+        )
+        for role in ROLES
     )
-    if outputs.base.any() or inputs.base.any():
-        raise FileError(f"{path}: give a moving base as --input base:+Z")
+    if outputs.base.any():
+        raise FileError(f"{path}: the base is what drives a shaker table, no sensor of it")
     return outputs, inputs
 
 
@@ -155,6 +168,8 @@ def superposed(
 ) -> FRF:  # fmt: skip
     """Receptance of solved modes, up to ``REACH`` times the band, and the static rest of others."""
     names_o, names_i = _labels(outputs), _labels(inputs)
+    if isinstance(outputs, MeasuredDofs) and isinstance(inputs, MeasuredDofs) and inputs.base.any():
+        return _places_from_base(made, outputs, inputs, frequency, damping)
     if names_i[0].startswith("base:"):
         return _from_base(made, names_o, names_i, frequency, damping)
     s, modal = made.structure, made.modes.with_damping(damping)
@@ -189,6 +204,20 @@ def _from_base(
         outputs=tuple(outputs),
         inputs=tuple(inputs),
     )
+
+
+def _places_from_base(
+    made: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs, frequency: np.ndarray,
+    damping: float,
+) -> FRF:  # fmt: skip
+    """The same at places that need be no grids, along directions of their own."""
+    built, modal = made.structure, made.modes.with_damping(damping)
+    pick, load = outputs.rows(built).T.toarray(), inputs.loads(built).T.toarray()
+    rest = residual_flexibility(built.system, modal, pick, load, points=node_points(built))
+    s = 2j * np.pi * frequency
+    H = transfer(modal, pick.T @ modal.shapes, load.T @ modal.shapes, s, residual=rest)
+    values = outputs.carried_by(inputs) + (s**2)[:, None, None] * H
+    return FRF(values, frequency, outputs.labels, inputs.labels, "transmissibility")
 
 
 def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> FrequencyResponses:

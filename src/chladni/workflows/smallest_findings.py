@@ -41,6 +41,8 @@ def smallest_findings(
         raise FileError(f"{model.source} has no shells, and what a layout finds is told of shells")
     progress("predicted evidence", 0.1)
     outputs, inputs = layout_places(model, layout)
+    if inputs.base.any():
+        raise FileError(f"{layout}: what a force finds is foretold, not what a moving base does")
     asked = Question(
         model.assembly, outputs, inputs, band=band,
         carried=carried(model.assembly, outputs, inputs),

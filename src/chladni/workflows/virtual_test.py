@@ -252,8 +252,11 @@ def _article(
     if settings.finer:
         made = refined(made)
     hangers = np.array(case.setup.hangers, dtype=np.int64)
-    held = Article(made, case.assembly, _grids(case), hangers, np.ones(len(case.outputs.labels)))
+    gains, drive = np.ones(len(case.outputs.labels)), _driven(case)
+    held = Article(made, case.assembly, _grids(case, case.outputs), hangers, gains, drive=drive)
     for name in settings.hide:
+        if name == "shaker-restraint" and drive is None:
+            raise FileError(f"{case.path} moves its supports, so that no stinger can hold")
         if name == "suspension" and not len(hangers):
             raise FileError(f"{case.path} names no hangers, so that no cord can be too stiff")
         held = family(name).conceal(held, rng)
@@ -270,10 +273,18 @@ def _article(
     return replace(article, weight=article.weight - off, gains=held.gains), truth
 
 
-def _grids(case: Case) -> np.ndarray:
-    """Grid of the deck at or nearest to every output (n_out,)."""
-    a, out = case.assembly, case.outputs
-    return np.where(out.grids > 0, out.grids, a.ids[nearest_points(a.points, out.points)])
+def _grids(case: Case, at: MeasuredDofs) -> np.ndarray:
+    """Grid of the deck at or nearest to every place that is measured or driven (n,)."""
+    a = case.assembly
+    return np.where(at.grids > 0, at.grids, a.ids[nearest_points(a.points, at.points)])
+
+
+def _driven(case: Case) -> tuple[int, tuple[float, float, float]] | None:
+    """Grid and direction of the force; None where the supports are what moves."""
+    if case.inputs.base[0]:
+        return None
+    x, y, z = case.inputs.directions[0].tolist()
+    return int(_grids(case, case.inputs)[0]), (x, y, z)
 
 
 def _drawn(

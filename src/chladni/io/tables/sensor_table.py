@@ -1,6 +1,9 @@
 """The table of sensors and exciters: where each sits, which way it points, what it weighs (SI)."""
 
+import csv
 import json
+from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 from typing import Any, get_args
 
@@ -39,8 +42,10 @@ def read_sensors(path: str | Path) -> tuple[Sensor, ...]:
     return sensors
 
 
-def read_layout(path: Path) -> tuple[Sensor, ...]:
+def read_layout(path: Path, driven: Sequence[Sensor] = ()) -> tuple[Sensor, ...]:
     """Sensors and exciters of a table, or of ``plan.json``: its sensors and its shakers.
+
+    ``driven`` takes the place of the exciters.
 
     Raises
     ------
@@ -48,10 +53,48 @@ def read_layout(path: Path) -> tuple[Sensor, ...]:
         If it is neither, or names no exciter or no sensor.
     """
     found = _planned(path) if path.suffix.lower() == ".json" else read_sensors(path)
+    if driven:
+        found = (*(s for s in found if s.role == "output"), *driven)
     for role in get_args(Role):
         if not any(s.role == role for s in found):
             raise FileError(f"{path} names no {role}; a layout has sensors and what drives them")
     return found
+
+
+def exciter(label: str, where: str) -> Sensor:
+    """What drives, by its label alone: 12:+Z, 12:n or base:+Z.
+
+    Raises
+    ------
+    FileError
+        If the label is of another form.
+    """
+    node = _node(label, where)
+    way = direction(label, where)
+    return Sensor(label, None if np.isnan(node) else int(node), None, way, "input")
+
+
+def with_input(path: Path, label: str) -> str:
+    """The text of a table of sensors that names nothing that drives, and a row that does.
+
+    Raises
+    ------
+    FileError
+        If the table cannot be read, or names what drives already.
+    """
+    if named_already := [s.label for s in read_sensors(path) if s.role == "input"]:
+        raise FileError(
+            f"{path} names what drives ({', '.join(named_already)}); take that out of it, or leave "
+            f"out --input {label}"
+        )
+    held = read_table(path, ("label",), _OPTIONAL).columns
+    columns = list(dict.fromkeys([*held, "role"]))
+    text = StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(dict(zip(held, row, strict=True)) for row in zip(*held.values(), strict=True))
+    writer.writerow({"label": label, "role": "input"})
+    return text.getvalue()
 
 
 def _planned(path: Path) -> tuple[Sensor, ...]:

@@ -1,13 +1,14 @@
 """Recordings as tables out: what `tables` reads, every digit kept."""
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from ...dynamics.frf import FRF
+from ...ema.level_table import LevelTable
 from ...ema.setup import PoleTable
 from ...output import atomic
 
@@ -54,6 +55,24 @@ def write_poles(path: str | Path, poles: PoleTable) -> None:
         table = (poles.mode, poles.frequency, poles.frequency_sd, poles.damping, poles.state)
         for mode, f, sd, zeta, state in zip(*table, strict=True):
             writer.writerow([int(mode), repr(float(f)), text(sd), text(zeta), state])
+
+    _replace(path, "w", rows)
+
+
+def write_levels(path: str | Path, tables: Sequence[LevelTable]) -> None:
+    """Modes over levels as CSV, one row per mode and level at which it was found."""
+    columns = (
+        "level", "amplitude_m", "frequency_hz", "frequency_sd_hz", "frequency_low_hz",
+        "frequency_high_hz", "damping", "damping_sd", "damping_low", "damping_high",
+    )  # fmt: skip
+
+    def rows(file: IO) -> None:
+        writer = csv.writer(file)
+        writer.writerow(["mode", "output", *columns, "signature"])
+        for k, table in enumerate(tables, 1):
+            for row in table.rows:
+                values = (repr(getattr(row, name)) for name in columns)
+                writer.writerow([k, table.output, *values, table.signature])
 
     _replace(path, "w", rows)
 

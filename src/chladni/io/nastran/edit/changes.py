@@ -52,6 +52,14 @@ class Delete:
 
 
 @dataclass(frozen=True)
+class DeleteRow:
+    """A card without an id of its own (SPC1) taken out: the i-th of its kind."""
+
+    kind: str
+    row: int
+
+
+@dataclass(frozen=True)
 class Replace:
     """A card whose place another takes: MAT1 7 becomes ("MAT8", 7, ...)."""
 
@@ -60,7 +68,7 @@ class Replace:
     card: Sequence[Value]
 
 
-Change = SetField | SetColumns | Add | Delete | Replace
+Change = SetField | SetColumns | Add | Delete | DeleteRow | Replace
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +93,9 @@ def plan(deck: Deck, changes: Sequence[Change]) -> SortedChanges:
     for change in changes:
         if isinstance(change, Add):
             out.added.append(change)
+            continue
+        if isinstance(change, DeleteRow):
+            out.whole[change.kind, change.row] = None
             continue
         known = rows.setdefault(change.kind, _rows(deck, change.kind))
         if isinstance(change, SetColumns):

@@ -26,6 +26,7 @@ from .split_properties import (
     taken_out,
     with_new_properties,
 )
+from .support_changes import support_changes
 from .tie_changes import tie_changes
 
 _MID = {"membrane": "MID1", "bending": "MID2", "shear": "MID3", "coupling": "MID4"}
@@ -54,7 +55,7 @@ def changes(
     out = split_changes(deck, after, split, [*out, *section_changes(before, after, units)])
     if cards := added_cards(before, after, units, free):
         out.append(Add(cards, "put in by the diagnosis"))
-    return out
+    return [*out, *support_changes(deck, before, after)]
 
 
 def _uses(deck: Deck, assembly: Assembly) -> Iterator[tuple[int, str, Material]]:

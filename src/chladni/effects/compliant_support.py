@@ -1,0 +1,274 @@
+"""A clamp that gives: what the deck holds by supports, a fixture holds as a spring does.
+
+The supports that hang together are one rigid clamp. It moves along the one direction, and turns
+about the one axis, in which the modes pull hardest at it: the root of a beam shears and turns. A
+fixture is as stiff as its foundation; for a bolted root the rotation counts most (Gorman 1975, Free
+Vibration Analysis of Beams and Shafts, ch. 1). Where the base is what moves, the springs stand
+between it and the clamp.
+"""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..dynamics.eigen import normal_modes
+from ..errors import ModelError
+from ..fem.assemble import Structure, structure
+from ..fem.energy import mass_properties
+from ..fem.released import Clamp, clamps, released
+from ..geometry.facets import tangents
+from ..model.assembly import Assembly
+from ..model.clamp_springs import AN_AXIS, with_clamp_on_springs
+from .effect import Effect, Parameter, PointTerm
+from .family import Article, Family
+from .search_context import Candidate, SearchContext, best_starts
+
+RIGID = 2e4  # of the spring on which all of the mass swings at the highest line: it gives no more
+SD = 2.0  # of its prior: fixtures differ by as much as foundations do
+STARTS = (-4.0, -2.0, 0.0)
+SEEN = 1e-11  # of a rigid spring: what the modes pull less at is rounding
+TYPICAL = 0.01  # of the stiffness of the mode that pulls most: median of what a spring takes
+NEAR_AXIS = 0.999  # cosine from which a direction is taken for an axis of the basic frame
+TOGETHER = 0.01  # correlation of a moment with a force below which they are of other modes
+MOST = 12  # ways that are tried, those that take most
+FOLLOWED = 2  # ways that are fitted
+DRAWN = 8  # modes of an article that tell how its clamp is pulled at
+TAKEN = 0.05, 0.25  # of the mode that pulls most, by each spring of a concealed clamp
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """One way in which a clamp gives: along the first axis of a frame, and about the second.
+
+    Attributes
+    ----------
+    clamp : position among the clamps of the structure
+    frame : (3, 3)     rows are unit vectors in the basic frame
+    components : 1, or 1 and 5: along and about these axes
+    rigid : (k,)       springs that do not give [N/m, N m/rad]
+    pull : (k, r)      f²/λ of each mode: a spring k takes a share pull/k of its stiffness
+    """
+
+    clamp: int
+    frame: np.ndarray
+    components: tuple[int, ...]
+    rigid: np.ndarray
+    pull: np.ndarray
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Springs that take ``TYPICAL`` of the mode that pulls most (k,)."""
+        return np.asarray(self.pull.max(axis=1) / TYPICAL)
+
+    def motions(self) -> np.ndarray:
+        """Unit motions of the clamp in the basic frame, displacement then rotation (k, 6)."""
+        along = np.r_[self.frame[0], np.zeros(3)]
+        about = np.r_[np.zeros(3), self.frame[1]]
+        return np.array([along if c == 1 else about for c in self.components])
+
+
+@dataclass(frozen=True, eq=False)
+class CompliantSupport(Effect):
+    """x = ln of its springs over their scale: along the axis it is sheared, about that it turns."""
+
+    name = "compliant-support"
+    claim = "a clamp that the deck holds rigidly gives"
+    lets_go: ClassVar[bool] = True
+    rounds: ClassVar[int] = 1
+
+    every: tuple[Clamp, ...] = ()  # clamps of the structure, this one among them
+    rigid: np.ndarray | None = None  # springs of all of them where they do not give (6 clamps,)
+    way: Way | None = None
+    rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
+
+    def released(self, built: Structure) -> Structure:
+        """The structure with all of its clamps on springs that are as good as rigid."""
+        assert self.rigid is not None
+        return released(built, self.every, self.rigid)
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """(k - k_rigid) gᵀg at each motion that it gives in."""
+        assert self.rows is not None
+        assert self.way is not None
+        k = self.springs(x)
+        return (PointTerm("K", self.rows, k - self.way.rigid, np.diag(k)),)
+
+    def springs(self, x: np.ndarray) -> np.ndarray:
+        """[N/m] and [N m/rad] of each parameter."""
+        return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
+
+    def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
+        """Inertia of the structure that follows the clamp."""
+        return M @ static[: M.shape[0]]
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """GRID, RBE2 and CELAS2 to ground in place of the supports."""
+        assert self.way is not None
+        return on_springs(assembly, self.every[self.way.clamp], self.way, self.springs(x))
+
+
+def on_springs(assembly: Assembly, clamp: Clamp, way: Way, k: np.ndarray) -> Assembly:
+    """The assembly with a clamp on springs k."""
+    springs = dict(zip(way.components, k.tolist(), strict=True))
+    return with_clamp_on_springs(
+        assembly, clamp.grids, clamp.held, clamp.centre, way.frame, springs
+    )
+
+
+def ways_of(
+    built: Structure, every: tuple[Clamp, ...], frequency: np.ndarray, shapes: np.ndarray,
+    stiff: np.ndarray,
+) -> list[Way]:  # fmt: skip
+    """How each clamp may give, up to three ways each, those first that take most.
+
+    To first order a spring k takes f²/(k λ) of the stiffness of a mode that pulls at it by f. A
+    clamp gives along the principal axes of the forces of all modes, and with each about the axis
+    of the moment that comes with that force.
+
+    Parameters
+    ----------
+    frequency : (r,) Hz, shapes : (n, r)    modes of the structure, M-orthonormal
+    stiff : (clamps, 2)    of :func:`rigid_springs`
+    """
+    n = len(built.system.dofs)
+    K = released(built, every).system.K.real
+    f = (K[n:, :n] @ shapes) / (2 * np.pi * frequency)
+    out = []
+    for k, rigid in enumerate(stiff):
+        force, moment = f[6 * k : 6 * k + 3], f[6 * k + 3 : 6 * k + 6]
+        for d in np.linalg.eigh(force @ force.T)[1].T:
+            x = _axis(d)
+            y = _turning(x, force, moment)
+            pull = np.stack([x @ force, y @ moment]) ** 2
+            seen = np.flatnonzero(pull.sum(axis=1) > SEEN * rigid)
+            if 0 in seen:
+                components = tuple((1, 5)[j] for j in seen)
+                frame = np.stack([x, y, np.cross(x, y)])
+                out.append(Way(k, frame, components, rigid[seen], pull[seen]))
+    return sorted(out, key=lambda way: -float((way.pull / way.rigid[:, None]).sum()))
+
+
+def _turning(x: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """The axis across x of the moment that comes with a force along x, else of the largest."""
+    across = np.stack(tangents(x))
+    turn = across @ moment
+    with_x = turn @ (x @ force)
+    sizes = np.linalg.norm(turn), np.linalg.norm(x @ force)
+    if np.linalg.norm(with_x) <= TOGETHER * sizes[0] * sizes[1]:
+        with_x = np.linalg.eigh(turn @ turn.T)[1][:, -1]
+    return _axis(with_x / np.linalg.norm(with_x) @ across)
+
+
+def rigid_springs(
+    assembly: Assembly, every: tuple[Clamp, ...], weight: float, f_max: float
+) -> np.ndarray:
+    """Springs of each clamp on which all of the mass would swing far above the highest line.
+
+    Along [N/m], and about its centre [N m/rad]: (clamps, 2).
+    """
+    k = RIGID * weight * (2 * np.pi * f_max) ** 2
+    arms = [((assembly.points - c.centre) ** 2).sum(axis=1).mean() for c in every]
+    return np.array([(k, k * float(arm)) for arm in arms])
+
+
+def _axis(v: np.ndarray) -> np.ndarray:
+    """A unit vector with its largest component positive, an axis of the basic frame where near."""
+    k = int(np.abs(v).argmax())
+    v = v * np.sign(v[k])
+    return np.eye(3)[k] if v[k] > NEAR_AXIS else v
+
+
+def candidates(context: SearchContext) -> list[Candidate]:
+    """The two ways of clamps that explain most, each about the nominal and the calibrated model.
+
+    What the clamp gives may have been calibrated into E and t, and a fit finds no way back.
+    """
+    where = context.where
+    built = where.groups.structure
+    every = clamps(built.assembly)
+    elastic = where.frequency > 0
+    if not every or not elastic.any():
+        return []
+    stiff = rigid_springs(built.assembly, every, where.setup.weight, where.setup.f_max)
+    ways = ways_of(built, every, where.frequency[elastic], where.shapes[:, elastic], stiff)[:MOST]
+    effects = [_effect(built, every, stiff, way, len(ways)) for way in ways]
+    best = sorted(
+        best_starts(context, effects), key=lambda c: context.scores(c.effect, [c.start]).min()
+    )
+    return [replace(c, base=base) for c in best[:FOLLOWED] for base in context.bases]
+
+
+def _effect(
+    built: Structure, every: tuple[Clamp, ...], stiff: np.ndarray, way: Way, tried: int
+) -> CompliantSupport:
+    clamp, n, first = every[way.clamp], len(built.system.dofs), 6 * way.clamp
+    rows = sp.lil_array((len(way.components), n + 6 * len(every)))
+    rows[:, n + first : n + first + 6] = way.motions()
+    names = {1: ("K", "N/m"), 5: ("K_rot", "N m/rad")}
+    unknown = tuple(
+        Parameter(*names[c], 0.0, SD, k, step=1.0, starts=STARTS, nominal=float(np.log(most / k)))
+        for c, k, most in zip(way.components, way.scale.tolist(), way.rigid, strict=True)
+    )
+    x, y, z = clamp.centre.tolist()
+    return CompliantSupport(
+        unknown, _said(clamp, way), grids=tuple(int(g) for g in clamp.grids), point=(x, y, z),
+        trials_factor=tried, every=every, way=way, rows=sp.csr_array(rows),
+        rigid=np.repeat(stiff, 3),
+    )  # fmt: skip
+
+
+def _said(clamp: Clamp, way: Way) -> str:
+    """Where the clamp is and how it gives."""
+    at = ", ".join(f"{1e3 * v:.0f}" for v in clamp.centre)
+    n = len(clamp.grids)
+    grids = f"grid {clamp.grids[0]}" if n == 1 else f"{n} grids from {clamp.grids[0]} on"
+    how = [
+        f"along {_named(way.frame[0])}" if c == 1 else f"about {_named(way.frame[1])}"
+        for c in way.components
+    ]
+    return f"the supports of {grids} round ({at} mm), {' and '.join(how)}"
+
+
+def _named(axis: np.ndarray) -> str:
+    k = int(np.abs(axis).argmax())
+    return "xyz"[k] if axis[k] > AN_AXIS else f"({', '.join(f'{v:.2f}' for v in axis)})"
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """One of its clamps gives: each of its springs takes 5 to 25 % of a mode's stiffness."""
+    assembly = article.assembly
+    every = clamps(assembly)
+    if not every:
+        raise ModelError("the structure has no supports, so that no clamp of it can give")
+    built = structure(assembly)
+    modes = normal_modes(built.system, DRAWN)
+    elastic = modes.frequency > 0
+    f = modes.frequency[elastic]
+    stiff = rigid_springs(assembly, every, mass_properties(assembly)[0], float(f[-1]))
+    ways = ways_of(built, every, f, modes.shapes[:, elastic], stiff)
+    chosen = int(rng.integers(len(every)))
+    way = max(
+        (w for w in ways if w.clamp == chosen), key=lambda w: float((w.pull[:, 0] / w.scale).sum())
+    )
+    springs = way.pull.max(axis=1) / rng.uniform(*TAKEN)
+    names = ["K" if c == 1 else "K_rot" for c in way.components]
+    known = dict(zip(names, springs.tolist(), strict=True))
+    truth = {
+        "point_m": every[chosen].centre.tolist(),
+        "value": float(springs[0]),
+        "parameters": known,
+    }
+    loose = on_springs(assembly, every[chosen], way, springs)
+    return replace(article, assembly=loose, truth=truth)
+
+
+FAMILY = Family(
+    CompliantSupport,
+    conceal,
+    candidates=candidates,
+    cards=("GRID", "RBE2", "CELAS2", "SPC", "SPC1", "CORD2R"),
+    settled_by="measure the motion of the fixture itself, with a sensor on the clamp",
+    needs="supports",
+)

@@ -1,0 +1,139 @@
+"""What a shaker does to the structure beside its force: its stinger holds, its gauge weighs.
+
+A stinger is stiff along its axis, where the gauge reads what it does; across the axis, and against
+turning, it holds the drive point as a beam clamped at the armature, 12EI/L³ and 4EI/L, and no
+gauge reads that. What of the gauge lies beyond its crystal rides on the structure (Ewins 2000,
+Modal Testing, 3.3). It acts where the structure is driven and nowhere else.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..fem.assemble import Structure
+from ..fem.locate import Share
+from ..geometry.facets import tangents
+from ..model.assembly import Assembly
+from ..model.ground_springs import with_ground_bushes
+from .effect import Effect, PointTerm
+from .family import Article, Family
+from .points import strength, with_masses
+from .surroundings import Surroundings
+
+MOST = 3  # drive points of shakers that stay where they are; more of them were hit or moved about
+ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad, kg]
+
+
+@dataclass(frozen=True, eq=False)
+class ShakerRestraint(Effect):
+    """x = (ln k_lat, ln k_rot, ln m) at one drive point.
+
+    ``across`` are its rows along two directions square to the drive, ``turns`` the rotations about
+    these, ``moves`` all three translations.
+    """
+
+    name = "shaker-restraint"
+    claim = "the shaker's stinger holds, or its force gauge weighs, beside the force it brings"
+
+    shares: Share = ()
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    across: sp.csr_array | None = None
+    turns: sp.csr_array | None = None
+    moves: sp.csr_array | None = None
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """k_lat [N/m], k_rot [N m/rad], m [kg]."""
+        return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
+
+    def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
+        """k_lat and k_rot across the drive to K, m along all directions to M."""
+        assert self.across is not None
+        assert self.turns is not None
+        assert self.moves is not None
+        held = (("K", self.across), ("K", self.turns), ("M", self.moves))
+        return tuple(
+            PointTerm(matrix, rows, np.full(n, c), np.tile(c * e, (n, 1)))  # type: ignore[arg-type]
+            for (matrix, rows), c, e in zip(held, self.values(x), np.eye(3), strict=True)
+            if (n := rows.shape[0])
+        )
+
+    def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
+        """CBUSH to ground in a frame of the drive, CONM2."""
+        return restrained(assembly, self.shares, self.direction, *self.values(x))
+
+
+def restrained(
+    assembly: Assembly, shares: Share, direction: Any, k_lat: float, k_rot: float, m: float
+) -> Assembly:
+    """The assembly with a stinger's springs [N/m, N m/rad] and a gauge [kg] at one place."""
+    grids, weights = [g for g, _ in shares], np.array([w for _, w in shares])
+    rows = assembly.rows(grids)
+    place = weights @ assembly.points[rows]
+    nearest = rows[[int(np.argmax(weights))]]
+    d = np.asarray(direction, float)[None]
+    k = np.array([[0.0, k_lat, k_lat, 0.0, k_rot, k_rot]])
+    held = with_ground_bushes(assembly, nearest, d, k, place[None])
+    return with_masses(held, grids, m * weights)
+
+
+def shaker_restraint(where: Surroundings) -> list[ShakerRestraint]:
+    """One at each drive point, where there are few enough to be shakers."""
+    drives = tuple(dict.fromkeys(where.setup.drives))
+    if len(drives) > MOST:
+        return []
+    return [_at(where, shares, direction, len(drives)) for shares, direction in drives]
+
+
+def _at(
+    where: Surroundings, shares: Share, direction: tuple[float, float, float], tried: int
+) -> ShakerRestraint:
+    built = where.groups.structure
+    grid = max(shares, key=lambda pair: pair[1])[0]
+    place = sum(w * built.assembly.points[built.assembly.rows([g])[0]] for g, w in shares)
+    x, y, z = np.asarray(place).tolist()
+    ways = np.stack(tangents(np.array(direction)))
+    unknown = (
+        strength("k_lat", "N/m", ACROSS, 2.0, (-2.0, 1.0)),
+        strength("k_rot", "N m/rad", TURNING, 1.5, (-2.0, 1.0)),
+        strength("m", "kg", GAUGE, 1.0, (-1.0, 0.5)),
+    )
+    return ShakerRestraint(
+        unknown, f"at the drive point, grid {grid}", grids=(grid,), point=(x, y, z),
+        trials_factor=tried, shares=shares, direction=direction,
+        across=_rows(built, shares, ways, False), turns=_rows(built, shares, ways, True),
+        moves=_rows(built, shares, np.eye(3), False),
+    )  # fmt: skip
+
+
+def _rows(built: Structure, shares: Share, ways: np.ndarray, turning: bool) -> sp.csr_array:
+    """Motion of a place along, or turning about, each direction (k, 3); those it can (j, n)."""
+    rows = sp.csr_array(
+        sum(w * built.along(np.full(len(ways), grid), ways, turning) for grid, w in shares)
+    )
+    return rows[np.flatnonzero(np.diff(rows.indptr) > 0)]
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """A stiff stinger and a heavy gauge where it is driven, the gauge not weighed."""
+    k_lat = float(np.exp(rng.uniform(np.log(5e3), np.log(5e4))))
+    k_rot = float(np.exp(rng.uniform(np.log(1.0), np.log(10.0))))
+    m = float(rng.uniform(0.005, 0.02)) * article.weight
+    grid, direction = article.drive or (article.shell_grid(rng), (0.0, 0.0, 1.0))
+    (at,) = article.grids_at(np.array([grid]))
+    made = restrained(article.assembly, ((at, 1.0),), direction, k_lat, k_rot, m)
+    point = article.deck.points[article.deck.rows([grid])[0]].tolist()
+    known = {"k_lat": k_lat, "k_rot": k_rot, "m": m}
+    truth = {"point_m": point, "value": k_lat, "parameters": known}
+    return replace(article, assembly=made, truth=truth, off_scale=m)
+
+
+FAMILY = Family(
+    ShakerRestraint,
+    conceal,
+    placed=shaker_restraint,
+    cards=("CBUSH", "PBUSH", "CORD2R", "CONM2"),
+    settled_by="measure again with a hammer, or with a longer and thinner stinger",
+    needs="a shaker",
+)

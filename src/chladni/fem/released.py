@@ -1,0 +1,117 @@
+"""A structure whose supports can move: rigid motions of its clamps as degrees of freedom beside.
+
+u = T q + N g: g (6 a clamp) translates a clamp and turns it about its centre, N is what the points
+it holds do then. Elements' A become [T N]ᵀ A [T N], so that the response of the structure to a
+motion of a clamp, all else held, is -K_qq⁻¹ K_qg (constraint modes; Craig and Bampton 1968, AIAA
+Journal 6, 1313-1319).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..dynamics.system import System
+from ..model.assembly import Assembly, Average, Equation, RigidBody
+from .assemble import Structure, over_all_motions, supported
+from .energy import rigid_motions
+from .sparse_assembly import congruence
+
+
+@dataclass(frozen=True, eq=False)
+class Clamp:
+    """Supports of points that elements join, taken for one rigid thing.
+
+    Attributes
+    ----------
+    grids : (k,) int        ids of the points
+    held : (k, 6) bool      components of each that it holds
+    centre : (3,)           mean of the points [m]
+    """
+
+    grids: np.ndarray
+    held: np.ndarray
+    centre: np.ndarray
+
+
+def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
+    """The clamps of a structure, in the order of their first grids.
+
+    A point belongs to one where a translation is held and elements or rigid bodies end there. What
+    is held at every point, as the rotation about z of a flat model, clamps nothing.
+    """
+    n = len(assembly.points)
+    touching = _elements(assembly)
+    on = np.zeros(n, bool)
+    on[touching.indices] = True
+    held = np.zeros((n, 6), bool)
+    held[assembly.supports[:, 0], assembly.supports[:, 1] - 1] = True
+    held &= on[:, None]
+    held[:, held[on].all(axis=0)] = False
+    rows = np.flatnonzero(held[:, :3].any(axis=1))
+    if not len(rows):
+        return ()
+    mine = sp.csr_array(touching[:, rows])
+    _, which = connected_components(mine.T @ mine, directed=False)
+    return tuple(
+        Clamp(assembly.ids[at], held[at], assembly.points[at].mean(axis=0))
+        for at in (rows[which == k] for k in range(which.max() + 1))
+    )
+
+
+def _elements(assembly: Assembly) -> sp.csr_array:
+    """Which points each element, or rigid body, joins (elements, points)."""
+    tables = [assembly.shells.nodes, assembly.beams.nodes, *(s.nodes for s in assembly.solids)]
+    each = [nodes for table in tables for nodes in table.tolist()]
+    for body in assembly.rigid:
+        if isinstance(body, RigidBody):
+            each.append([body.independent, *body.dependent])
+        elif isinstance(body, Average):
+            each.append([body.reference, *(row for row, _, _ in body.terms)])
+        elif isinstance(body, Equation):
+            each.append(list(body.nodes))
+    ends = np.cumsum([0, *map(len, each)])
+    at = np.array([row for nodes in each for row in nodes], np.int64)
+    return sp.csr_array((np.ones(len(at)), at, ends), shape=(len(each), len(assembly.points)))
+
+
+def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
+    """N (6 n_points, 6 clamps): all points when a clamp translates, or turns about its centre."""
+    T, dofs = supported(assembly)
+    at, component = dofs[:, 0], dofs[:, 1] - 1
+    axes = np.eye(3)[component % 3]
+    if assembly.axes is not None:
+        axes = assembly.axes[at, component % 3]
+    triple = (3 * (component // 3))[:, None] + np.arange(3)
+    columns = []
+    for clamp in held_by:
+        of_clamp = np.zeros((len(assembly.points), 6), bool)
+        of_clamp[assembly.rows(clamp.grids)] = clamp.held
+        about = replace(assembly, points=assembly.points - clamp.centre)
+        R = rigid_motions(about).reshape(-1, 6, 6)[at[:, None], triple]
+        moves = np.where(of_clamp[at, component, None], np.einsum("ka,kaj->kj", axes, R), 0.0)
+        columns.append(T @ sp.csr_array(moves))
+    return sp.csr_array(sp.hstack(columns))
+
+
+def released(
+    built: Structure, held_by: tuple[Clamp, ...], hold: np.ndarray | float = 0.0
+) -> Structure:
+    """The structure with six degrees of freedom more for each of its clamps.
+
+    They stand behind those it has, under the first grid of the clamp.
+
+    Parameters
+    ----------
+    hold : (6 clamps,)    springs to ground they stand on [N/m, N m/rad]
+    """
+    T = sp.csr_array(sp.hstack([built.T, motions_of(built.assembly, held_by)]))
+    M, V, K, loss = over_all_motions(built.assembly)
+    labels = [(int(clamp.grids[0]), c) for clamp in held_by for c in range(1, 7)]
+    dofs = np.concatenate([built.system.dofs, np.array(labels).reshape(-1, 2)])
+    springs = np.zeros(len(dofs))
+    springs[len(built.system.dofs) :] = hold
+    K_held = sp.csr_array(congruence(T, K) + sp.diags_array(springs))
+    system = System(congruence(T, M), congruence(T, V), K_held, dofs)
+    return replace(built, T=T, system=system, loss=congruence(T, loss))
