@@ -14,6 +14,7 @@ from chladni.effects import registry
 from chladni.effects import sensor_fault as sensors
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.effect import Effect
+from chladni.effects.element_groups import element_groups
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed
 from chladni.effects.local_resonator import LocalResonator
@@ -24,7 +25,6 @@ from chladni.effects.ordinary import channel_gain, ordinary, random_field
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.shell_groups import shell_groups
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.surroundings import Setup, Surroundings
 from chladni.effects.suspension import suspension
@@ -277,7 +277,7 @@ def test_reversed_channel_is_reported_with_its_sign(cases):
 
 
 def test_groups_hold_all_of_the_shells(reduced):
-    groups = shell_groups(reduced.structure, 16)
+    groups = element_groups(reduced.structure, 16)
     assert len(groups) == 16
     assert_allclose(groups.area.sum(), 0.12)
     assert_allclose(groups.weight.sum(), 7850 * 0.12 * 1.5e-3)

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.crack import LEAST, LineFinder, candidates, crack, left
+from chladni.effects.element_groups import element_groups
 from chladni.effects.ordinary import ordinary
-from chladni.effects.shell_groups import shell_groups
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni.updating.likelihood import Responses
@@ -60,7 +60,7 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
 def test_a_sheet_too_coarse_for_a_line_has_none():
     """Two by two shells hold no three in a row, and nothing is proposed."""
     coarse = plate(0.2, 0.2, 2, 2, 1e-3)
-    context = SimpleNamespace(where=SimpleNamespace(groups=shell_groups(structure(coarse))))
+    context = SimpleNamespace(where=SimpleNamespace(groups=element_groups(structure(coarse))))
     assert candidates(context) == []
 
 

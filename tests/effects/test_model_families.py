@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.element_groups import element_groups
 from chladni.effects.model_families import model_families
-from chladni.effects.shell_groups import shell_groups
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
 from chladni.updating.reduced_model import evaluate, reduce
@@ -51,7 +51,7 @@ def test_shear_is_the_part_of_the_stiffness_that_residual_bending_softens(jointe
 def test_idle_at_nought_and_positive_far_away(jointed):
     built = structure(jointed)
     basis = normal_modes(built.system, band=2000.0).shapes
-    model, found = reduce(shell_groups(built), basis), model_families(built)
+    model, found = reduce(element_groups(built), basis), model_families(built)
     zero = evaluate(model, found, np.zeros(len(found)))
     assert_allclose(zero.lam, evaluate(model, [], np.zeros(0), False).lam, rtol=1e-9, atol=1e-3)
     for x in (-4.0, 4.0):

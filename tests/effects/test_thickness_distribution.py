@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.effects.element_groups import element_groups
 from chladni.effects.sheet_patch import surface
-from chladni.effects.shell_groups import shell_groups
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Assembly, Shells
@@ -15,7 +15,7 @@ from chladni_specimens.plates import folded_panel, plate
 
 @pytest.fixture(scope="module")
 def panel():
-    return shell_groups(structure(folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3)))
+    return element_groups(structure(folded_panel(0.6, 0.3, 0.04, 0.01, 0.02, 1e-3)))
 
 
 def test_a_fold_does_not_end_a_thinning(panel):
@@ -35,7 +35,7 @@ def test_sheets_that_share_no_grid_are_two():
     """A second plate 1.5 mm above the first keeps its thickness."""
     one = plate(0.4, 0.3, 8, 6, 1e-3)
     two = stacked(one, 1.5e-3)
-    groups = shell_groups(structure(two))
+    groups = element_groups(structure(two))
     assert len(set(groups.connected.tolist())) == 2
     effect = ThicknessDistribution.on(groups, 0, 2)
     shells = two.shells
@@ -73,7 +73,7 @@ def test_the_centre_stays_on_a_curved_sheet():
     flat = plate(0.6, 0.6, 24, 24, 1e-3)
     X = flat.points - [0.3, 0.3, 0.0]
     bowl = replace(flat, points=np.c_[X[:, :2], (X[:, :2] ** 2).sum(axis=1)])
-    groups = shell_groups(structure(bowl))
+    groups = element_groups(structure(bowl))
     own = surface(groups, int(np.argmin((groups.centre**2).sum(axis=1))), 0.6)
     near = bowl.points[((bowl.points - own.origin) ** 2).sum(axis=1) < 0.1**2]
     u = (near - own.origin) @ own.axes.T

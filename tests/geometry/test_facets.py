@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.shell_groups import shell_groups
-from chladni.effects.surroundings import shell_grids
+from chladni.effects.element_groups import element_groups
+from chladni.effects.surroundings import element_grids
 from chladni.fem.assemble import structure
 from chladni.geometry.facets import cell_areas, point_normals, tangents, vector_areas
 from chladni.geometry.grid_normals import grid_normals, normals_at
@@ -85,7 +85,7 @@ def test_label_effect_candidate_and_arrow_agree():
     """12:n of a label, an attachment's, a planned sensor's: one normal, shells turned or not."""
     panel = _turned(folded_panel(), slice(None, None, 5))
     built = structure(panel)
-    attached = shell_grids(shell_groups(built, 8))
+    attached = element_grids(element_groups(built, 8))
     planned = find_sensor_candidates(panel, 40)
     due = normals_at(panel, attached.grids)
     assert_allclose(attached.normal, due, atol=1e-12)

@@ -17,7 +17,7 @@ from .family import Article, Family
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .sheet_pairs import SheetPairs
-from .surroundings import ShellGrids
+from .surroundings import ElementGrids
 
 MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
 STARTS = (-2.0, 0.0, 2.0)
@@ -130,7 +130,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         some = farthest_point_sample(points, BY_POLES)
         chosen = [effects[k] for k in some]
         return best_places(context, chosen, points[some], FOLLOWED, carried=True)
-    places = ShellGrids(
+    places = ElementGrids(
         np.array([e.grids[0] for e in effects]),
         np.array([e.place.along[0] for e in effects if e.place is not None]),
         points,

@@ -18,10 +18,10 @@ from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import WIDER, Effect, MatrixTerm, Parameter
+from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .shell_groups import ShellGroups
 
 LEAST = 0.1  # of the bending stiffness is always left: K stays positive
 SHELLS = 3  # fewer of them are no line
@@ -132,7 +132,7 @@ def left(x: float) -> float:
     return float(LEAST + (1 - LEAST) / (1 + np.exp(x)))
 
 
-def crack(groups: ShellGroups, line: Line, tried: int) -> Crack:
+def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     """A crack along one line of as many as were tried."""
     assembly, on = groups.structure.assembly, line.shells
     K = blocks(groups.cubic[on], groups.nodes[on], len(assembly.points))

@@ -166,7 +166,7 @@ class Effect:
     channels: tuple[str, ...] = field(default=())
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """ShellGroups fields it multiplies."""
+        """Fields of shells and beams it multiplies."""
         return ()
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:

@@ -19,10 +19,10 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.properties import Isotropic, Part, ShellSection, SolidSection
 from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
+from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
 from .ordinary import OF_FIELDS, SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
-from .shell_groups import ShellGroups
 
 UNITS = {
     **OF_FIELDS,
@@ -117,7 +117,7 @@ class Freed(Effect):
         return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
 
 
-def freed(groups: ShellGroups, free: FreeParameter) -> Freed:
+def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
     """The effect of one number a user frees."""
     built = groups.structure
     parts = built.assembly.parts

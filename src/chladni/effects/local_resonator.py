@@ -24,7 +24,7 @@ from .family import Article, Family
 from .movable_attachment import MovableAttachment, around, moved, patch, there
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import ShellGrids, Surroundings
+from .surroundings import ElementGrids, Surroundings
 
 SHARE = 0.015  # of the structure's mass: prior median of the lump's
 TYPICAL = 3.0  # times the prior median of its frequency: the highest line
@@ -167,7 +167,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def _scores(
-    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass and score (n_places, n_hertz); no score where there is no lump."""
     assert context.scan is not None
@@ -176,7 +176,7 @@ def _scores(
 
 
 def _best(
-    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+    context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
 ) -> Candidate:
     """The lump at the best of some places, with the best of some frequencies."""
     where = context.where

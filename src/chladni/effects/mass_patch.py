@@ -9,13 +9,13 @@ from ..geometry.facets import cell_areas
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import Effect, Parameter
+from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .points import strength
 from .property_bands import levels, with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import SheetPatch, patches
-from .shell_groups import ShellGroups
 
 SHARE = 0.03  # of the structure's mass: prior median
 
@@ -34,12 +34,12 @@ class MassPatch(SheetPatch):
     weight_of: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [kg]
 
     @classmethod
-    def strength(cls, groups: ShellGroups) -> Parameter:
+    def strength(cls, groups: ElementGroups) -> Parameter:
         """The mass, of a few per cent of the shells'."""
         return strength("M", "kg", SHARE * float(groups.weight.sum()), 1.2, (-1.0, 0.3))
 
     @classmethod
-    def more(cls, groups: ShellGroups) -> dict[str, Any]:
+    def more(cls, groups: ElementGroups) -> dict[str, Any]:
         """Areas and weights of the groups."""
         return {"area": groups.area, "weight_of": groups.weight}
 

@@ -18,7 +18,7 @@ from ..geometry.facets import tangents
 from .effect import Effect, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import ShellGrids, Surroundings
+from .surroundings import ElementGrids, Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
@@ -220,7 +220,7 @@ def attachments(
     return out
 
 
-def around(grids: ShellGrids, places: ShellGrids, k: int) -> ShellGrids:
+def around(grids: ElementGrids, places: ElementGrids, k: int) -> ElementGrids:
     """A closer sample of the grids round one of the places, as far as the next ones."""
     d = np.linalg.norm(places.point - places.point[k], axis=1)
     reach = np.sort(d)[min(4, len(d) - 1)]

@@ -19,7 +19,7 @@ from ..model.properties import (
     ShellSection,
 )
 from .effect import ChannelChange, Effect, FieldChange, Parameter
-from .shell_groups import ShellGroups
+from .element_groups import ElementGroups
 
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
 OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
@@ -50,7 +50,7 @@ class PartScale(Effect):
 
 
 def ordinary(
-    groups: ShellGroups, quantity: str, positions: Sequence[int], sd: float | None = None
+    groups: ElementGroups, quantity: str, positions: Sequence[int], sd: float | None = None
 ) -> PartScale:
     """One ordinary parameter of these parts, with its prior."""
     parts = groups.structure.assembly.parts
@@ -65,7 +65,7 @@ def ordinary(
     )  # fmt: skip
 
 
-def defaults(groups: ShellGroups) -> list[PartScale]:
+def defaults(groups: ElementGroups) -> list[PartScale]:
     """E and t (of tubes: the wall) of every part, rho of every material: what may be calibrated.
 
     A part may have been given the wrong sheet, so that E is each part's own; weighing tells one
@@ -183,7 +183,7 @@ class RandomField(Effect):
 
 
 def random_field(
-    groups: ShellGroups, quantity: str, sd: float, length: float = 0.3, most: int = 12
+    groups: ElementGroups, quantity: str, sd: float, length: float = 0.3, most: int = 12
 ) -> RandomField:
     """Gaussian scatter of standard deviation sd within each part, mean removed.
 
@@ -207,7 +207,7 @@ def random_field(
 
 
 def _functions(
-    groups: ShellGroups, inside: np.ndarray, sd: float, length: float, most: int
+    groups: ElementGroups, inside: np.ndarray, sd: float, length: float, most: int
 ) -> list[np.ndarray]:
     """Eigenfunctions of the area-weighted covariance of one part, scaled to sd."""
     X, area = groups.centre[inside], groups.area[inside]

@@ -8,10 +8,10 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
 from .effect import WIDER, Effect, FieldChange, Parameter
+from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .material_class import is_metal, orthotropy
-from .shell_groups import ShellGroups
 from .surroundings import Surroundings
 
 
@@ -107,7 +107,7 @@ def _about(mean: float, sd: float) -> tuple[float, ...]:
 
 
 def orthotropic(
-    groups: ShellGroups, positions: tuple[int, ...], axis: np.ndarray
+    groups: ElementGroups, positions: tuple[int, ...], axis: np.ndarray
 ) -> OrthotropicMaterial:
     """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame.
 
@@ -173,7 +173,7 @@ def isotropic(part: Part) -> Isotropic | None:
     return material if isinstance(material, Isotropic) else None
 
 
-def _extents(groups: ShellGroups, inside: np.ndarray) -> list[np.ndarray]:
+def _extents(groups: ElementGroups, inside: np.ndarray) -> list[np.ndarray]:
     """Principal directions of some groups, longest first, or the coordinate axes they all but are.
 
     The third, if any, is across the sheet.

@@ -12,7 +12,7 @@ import numpy as np
 
 from .effect import Effect
 from .joints import Connection
-from .surroundings import ShellGrids, Surroundings
+from .surroundings import ElementGrids, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ResponseScan(Protocol):
         """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines."""
 
     def point_scores(
-        self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
+        self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths).
 
@@ -43,7 +43,7 @@ class ResponseScan(Protocol):
         """
 
     def oscillator_scores(
-        self, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+        self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz).
 

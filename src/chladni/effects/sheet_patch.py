@@ -11,9 +11,9 @@ import numpy as np
 
 from ..geometry.sampling import farthest_point_sample
 from .effect import Effect, FieldChange, Parameter
+from .element_groups import ElementGroups
 from .estimate import Location
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .shell_groups import ShellGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ def _quadric(u: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(u)), x, y, x * x, x * y, y * y], axis=1)
 
 
-def surface(groups: ShellGroups, group: int, size: float) -> Quadric:
+def surface(groups: ElementGroups, group: int, size: float) -> Quadric:
     """The quadric through the corners of the part's shells, near ones counting most."""
     assembly = groups.structure.assembly
     own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
@@ -81,7 +81,7 @@ class SheetPatch(Effect):
     spacing: float = 0.0  # of these grids [m]
 
     @classmethod
-    def strength(cls, groups: ShellGroups) -> Parameter:
+    def strength(cls, groups: ElementGroups) -> Parameter:
         """The first parameter."""
         raise NotImplementedError
 
@@ -95,7 +95,7 @@ class SheetPatch(Effect):
         raise NotImplementedError
 
     @classmethod
-    def on(cls, groups: ShellGroups, group: int, trials_factor: int) -> Self:
+    def on(cls, groups: ElementGroups, group: int, trials_factor: int) -> Self:
         """A patch of the sheet one group of shells belongs to, searched from that group on.
 
         The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
@@ -122,7 +122,7 @@ class SheetPatch(Effect):
         )  # fmt: skip
 
     @classmethod
-    def more(cls, groups: ShellGroups) -> dict[str, Any]:
+    def more(cls, groups: ElementGroups) -> dict[str, Any]:
         """Fields of its own that a subclass fills from the groups."""
         return {}
 

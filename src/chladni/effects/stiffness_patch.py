@@ -13,13 +13,13 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Part
 from .effect import WIDER, Effect, Parameter
+from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .ordinary import scaled
 from .property_bands import with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import SheetPatch, patches
-from .shell_groups import ShellGroups
 
 MOST = 0.9  # of the stiffness may be lost in the middle
 
@@ -36,7 +36,7 @@ class StiffnessPatch(SheetPatch):
     grows = (0.1, np.inf)  # less of it, or a stiffening, is no such patch
 
     @classmethod
-    def strength(cls, groups: ShellGroups) -> Parameter:
+    def strength(cls, groups: ElementGroups) -> Parameter:
         """The logit of β / 0.9: a third of the stiffness is lost, within 8 and 70 %."""
         return Parameter(
             "E", "of the deck's", -0.5, 1.2, 1.0, "linear", 0.8, starts=(-0.5,), nominal=-40.0

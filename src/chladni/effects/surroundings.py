@@ -12,7 +12,7 @@ from ..fem.locate import Share
 from ..geometry.beam_lines import lines
 from ..geometry.facets import point_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample
-from .shell_groups import ShellGroups
+from .element_groups import ElementGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class ShellGrids:
+class ElementGrids:
     """Grids of shells and beams where something unknown may sit, each with a direction.
 
     A grid of shells stands here once, with the normal of the surface; one of beams once for every
@@ -90,7 +90,7 @@ class ShellGrids:
         return np.concatenate([np.zeros(0, int), *order])
 
 
-def shell_grids(groups: ShellGroups) -> ShellGrids:
+def element_grids(groups: ElementGroups) -> ElementGrids:
     """All grids of shells that can move along the normal there, and of beams that can across."""
     assembly = groups.structure.assembly
     normal = point_normals(assembly.points, assembly.shells.nodes)
@@ -103,7 +103,7 @@ def shell_grids(groups: ShellGroups) -> ShellGrids:
     )
     rows = groups.structure.along(assembly.ids[at], ways)
     moving = np.flatnonzero(np.diff(rows.indptr) > 0)
-    found = ShellGrids(assembly.ids[at], ways, assembly.points[at], rows, line, along)
+    found = ElementGrids(assembly.ids[at], ways, assembly.points[at], rows, line, along)
     return found.only(moving)
 
 
@@ -111,7 +111,7 @@ SAME = 0.95  # cosine between directions across two beams of one grid that count
 
 
 def _across_beams(
-    groups: ShellGroups,
+    groups: ElementGroups,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Points on beams alone, with direction, line and its way there: (k,), (k, 3), (k,), (k, 3)."""
     assembly = groups.structure.assembly
@@ -141,15 +141,15 @@ class Surroundings:
     Attributes
     ----------
     groups : shells and beams in groups
-    grids : ShellGrids        all of them
-    places : ShellGrids       a sample of them, tried where a place is unknown
+    grids : ElementGrids        all of them
+    places : ElementGrids       a sample of them, tried where a place is unknown
     setup : Setup             of the test
     frequency : (r,) Hz, shapes : (n, r)    modes of the deck up to the highest line
     """
 
-    groups: ShellGroups
-    grids: ShellGrids
-    places: ShellGrids
+    groups: ElementGroups
+    grids: ElementGrids
+    places: ElementGrids
     setup: Setup
     frequency: np.ndarray = field(default_factory=lambda: np.zeros(0))
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))

@@ -6,11 +6,11 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from .effect import WIDER, Effect, Parameter
+from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 from .sheet_patch import SheetPatch, patches
-from .shell_groups import ShellGroups
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class ThicknessDistribution(SheetPatch):
     grows = (0.05, np.inf)  # less of it, or a thickening, is no thinning
 
     @classmethod
-    def strength(cls, groups: ShellGroups) -> Parameter:
+    def strength(cls, groups: ElementGroups) -> Parameter:
         """The logit of α / 0.6."""
         return Parameter(
             "thinning", "-", -1.6, 1.2, 1.0, "linear", 0.8, starts=(-1.0,), nominal=-40.0

@@ -11,8 +11,8 @@ import numpy as np
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import rigid_modes
 from ..dynamics.reduction import orthonormal
+from ..effects.element_groups import element_groups
 from ..effects.ordinary import PartScale, ordinary, thickness_of
-from ..effects.shell_groups import shell_groups
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..progress import Progress, silent
@@ -57,7 +57,7 @@ def ensemble(
     progress("models with drawn thickness", 0.0)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
     modal = normal_modes(built.system, band=REACH * f_max, points=where)
-    groups = shell_groups(built, 1)
+    groups = element_groups(built, 1)
     parts = built.assembly.parts
     effects = tuple(
         ordinary(groups, t, [p], spread)

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..case import Case
 from ..effects.effect import Effect
+from ..effects.element_groups import element_groups
 from ..effects.family import Family
 from ..effects.movable_attachment import MovableAttachment
 from ..effects.registry import family, names
-from ..effects.shell_groups import shell_groups
-from ..effects.surroundings import Setup, Surroundings, shell_grids
+from ..effects.surroundings import Setup, Surroundings, element_grids
 from ..errors import FileError
 from ..fem.assemble import structure
 from ..fem.energy import mass_properties
@@ -113,8 +113,8 @@ def _refused(text: str, kind: Family) -> FileError:
 def _surroundings(assembly: Assembly, case: Case | None) -> Surroundings:
     sensors: Any = () if case is None else case.outputs.shares(assembly)
     hangers = () if case is None else tuple(case.setup.hangers)
-    groups = shell_groups(structure(assembly), 1)
-    grids = shell_grids(groups)
+    groups = element_groups(structure(assembly), 1)
+    grids = element_grids(groups)
     setup = Setup(tuple(sensors), hangers, mass_properties(assembly)[0], _TOP)
     return Surroundings(groups, grids, grids, setup)
 

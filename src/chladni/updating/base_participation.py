@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from ..effects.effect import MatrixTerm, PointTerm
-from ..effects.shell_groups import ShellGroups
+from ..effects.element_groups import ElementGroups
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
 
@@ -34,14 +34,16 @@ class BaseParticipation:
         """The same of a structure with more dofs, which no vector of the basis moves yet."""
         return replace(self, motion=self.motion.over(built))
 
-    def extended(self, shells: ShellGroups, new: np.ndarray) -> Self:
+    def extended(self, shells: ElementGroups, new: np.ndarray) -> Self:
         """The same over a basis that also holds these vectors (n, m)."""
         more = participation(shells, new, self.motion)
         groups = np.concatenate([self.groups, more.groups], axis=1)
         return replace(self, groups=groups, rest=np.concatenate([self.rest, more.rest]))
 
 
-def participation(shells: ShellGroups, basis: np.ndarray, motion: BaseMotion) -> BaseParticipation:
+def participation(
+    shells: ElementGroups, basis: np.ndarray, motion: BaseMotion
+) -> BaseParticipation:
     """What the base does to each vector of a basis (n, r)."""
     groups = shells.carried(basis, motion.whole)
     return BaseParticipation(motion, groups, basis.T @ motion.force - groups.sum(axis=0))

@@ -10,7 +10,7 @@ from ..effects.effect import Effect
 from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
-from ..effects.surroundings import ShellGrids, Surroundings
+from ..effects.surroundings import ElementGrids, Surroundings
 from ..errors import ModelError
 from .fastener_scan import Loosened, fastener_scores, loosened
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
@@ -213,7 +213,7 @@ class Scan:
         return self.data.deviation(self.context.null_fit.fit.state)[self.data.use.any(axis=1)]
 
     def point_scores(
-        self, about: int, matrix: str, strengths: np.ndarray, places: ShellGrids | None = None
+        self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
     ) -> np.ndarray:
         """Score of a mass ("M", kg) or spring ("K", N/m) at each place (n_places, n_strengths)."""
         reduced = self.context.problem.reduced
@@ -223,7 +223,7 @@ class Scan:
         return point_scores(base, reduced.model, self.data, places, matrix, strengths, rest)
 
     def oscillator_scores(
-        self, about: int, mass: float, hertz: np.ndarray, places: ShellGrids
+        self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
         """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz)."""
         reduced, base = self.context.problem.reduced, self.context.baselines[about]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.shell_groups import ShellGroups
+from ..effects.element_groups import ElementGroups
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Responses
 from .map_fit import MassMeasurement
@@ -69,7 +69,7 @@ def left_where(
     return _told(groups, gain)
 
 
-def bumps(groups: ShellGroups) -> np.ndarray:
+def bumps(groups: ElementGroups) -> np.ndarray:
     """A smooth change round each group, on its own sheet (g, g): one column each."""
     sheet = groups.connected
     area = np.bincount(sheet, groups.area)[sheet]
@@ -78,7 +78,7 @@ def bumps(groups: ShellGroups) -> np.ndarray:
     return np.where(sheet[:, None] == sheet[None], near, 0.0)
 
 
-def _told(groups: ShellGroups, gain: np.ndarray) -> LeftWhere:
+def _told(groups: ElementGroups, gain: np.ndarray) -> LeftWhere:
     assembly = groups.structure.assembly
     best = int(np.nanargmax(gain))
     known = np.where(np.isnan(gain), -np.inf, gain)

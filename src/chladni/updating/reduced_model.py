@@ -15,8 +15,8 @@ import scipy.sparse as sp
 
 from ..dynamics.reduction import orthonormal
 from ..effects.effect import Effect, count
+from ..effects.element_groups import ElementGroups
 from ..effects.shell_components import COMPONENTS
-from ..effects.shell_groups import ShellGroups
 from ..errors import ModelError
 from ..fem.assemble import Structure
 from ..fem.base_motion import BaseMotion
@@ -42,7 +42,7 @@ class Reduced:
     following : (n, clamps)   how the structure follows unit motions of clamps that were let go
     """
 
-    groups: ShellGroups
+    groups: ElementGroups
     basis: np.ndarray
     linear: Mapping[str, MatrixStack]
     cubic: Mapping[str, MatrixStack]
@@ -152,7 +152,7 @@ class Reduced:
         return replace(self, linear=linear, cubic=cubic)
 
 
-def reduce(groups: ShellGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
+def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
     """Project a structure on a basis; ``base`` where its supports are what moves."""
     system = groups.structure.system
     linear, cubic = groups.project(groups.linear, basis), groups.project(groups.cubic, basis)

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from ..dynamics.eigen import normal_modes
 from ..dynamics.reduction import attachments, orthonormal, shifted
 from ..effects.effect import Effect
-from ..effects.shell_groups import ShellGroups, shell_groups
-from ..effects.surroundings import ShellGrids, shell_grids
+from ..effects.element_groups import ElementGroups, element_groups
+from ..effects.surroundings import ElementGrids, element_grids
 from ..fem.assemble import Structure
 from ..fem.base_motion import base_motion
 from ..fem.modelled import Modelled, modelled
@@ -30,22 +30,22 @@ class ReducedProblem:
     ----------
     frequency : (r,) Hz      of the nominal model's modes, rigid ones included
     f_max : highest frequency of interest [Hz]
-    candidates : ShellGrids  a sample of all of ``grids``
+    candidates : ElementGrids  a sample of all of ``grids``
     flexibility : (k,)       static response at each candidate beyond the basis [m/N]
     hertz : shift of the static responses
     """
 
     structure: Structure
-    groups: ShellGroups
+    groups: ElementGroups
     model: Reduced
     frequency: np.ndarray
     factor: Factor
     hertz: float
-    grids: ShellGrids
-    candidates: ShellGrids
+    grids: ElementGrids
+    candidates: ElementGrids
     f_max: float
 
-    def flexibility(self, where: ShellGrids) -> np.ndarray:
+    def flexibility(self, where: ElementGrids) -> np.ndarray:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
         exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
         b = self.model.rows(where.rows)
@@ -135,8 +135,8 @@ def reduced_problem(
     if moved is not None:
         blocks.append(factor.solve(moved.force))
     basis = orthonormal(built.system.M, blocks, kept=modes.shapes.shape[1])
-    shells = shell_groups(built, groups)
-    grids = shell_grids(shells)
+    shells = element_groups(built, groups)
+    grids = element_grids(shells)
     chosen = grids.only(grids.spread(most))
     return ReducedProblem(
         built,

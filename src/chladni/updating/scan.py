@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.effect import Effect, FieldChange, Parameter
-from ..effects.surroundings import ShellGrids
+from ..effects.surroundings import ElementGrids
 from .likelihood import LN10, Data, Responses
 from .map_fit import MassMeasurement, unknowns
 from .reduced_model import Reduced, State, evaluate
@@ -71,7 +71,7 @@ def baseline(
 
 
 def point_scores(
-    base: Baseline, model: Reduced, data: Responses, places: ShellGrids, matrix: str,
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids, matrix: str,
     strengths: np.ndarray, residual_flexibility: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Score of one mass or spring of each strength at each place (n_places, n_strengths).
@@ -90,7 +90,7 @@ def point_scores(
 
 
 def oscillator_scores(
-    base: Baseline, model: Reduced, data: Responses, places: ShellGrids, mass: float,
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids, mass: float,
     hertz: np.ndarray, residual_flexibility: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Best mass of a lump on a spring at each place, and the score with it (n_places, n_hertz).
@@ -138,7 +138,7 @@ class Reanalysis:
 
 
 def reanalysis(
-    base: Baseline, model: Reduced, data: Responses, places: ShellGrids,
+    base: Baseline, model: Reduced, data: Responses, places: ElementGrids,
     residual_flexibility: np.ndarray, massive: bool,
 ) -> Reanalysis:  # fmt: skip
     """Receptances between the places, the outputs and the inputs.

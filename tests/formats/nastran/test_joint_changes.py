@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.effects.element_groups import element_groups
 from chladni.effects.freed import freed
-from chladni.effects.shell_groups import shell_groups
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes
@@ -96,7 +96,7 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
     found, before = deck
     given, cards = KINDS[kind]
     at = tuple(position(before, id) for id in given.get("parts", ()))
-    groups = shell_groups(structure(before), 4)
+    groups = element_groups(structure(before), 4)
     what = {k: v for k, v in given.items() if k != "parts"}
     effect = freed(groups, FreeParameter(kind, positions=at, **what))
     after = effect.apply(before, np.array([0.05]))
@@ -113,7 +113,7 @@ def test_what_was_freed_is_in_the_deck(deck, kind):
 def test_a_bush_that_changed_alone_gets_a_property_of_its_own(deck):
     """The other bush of PBUSH 7 keeps the card as it was; a short field holds seven digits."""
     found, before = deck
-    effect = freed(shell_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
+    effect = freed(element_groups(structure(before), 4), FreeParameter("K", "K", bushes=(0,)))
     after = effect.apply(before, np.array([0.2]))
     got, _ = rewritten(found, before, after)
     due, is_now = (structure(a).system.K.toarray() for a in (after, got))

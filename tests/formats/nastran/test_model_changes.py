@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.element_groups import element_groups
 from chladni.effects.ordinary import ordinary
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.points import with_masses, with_springs
-from chladni.effects.shell_groups import shell_groups
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck
@@ -67,7 +67,7 @@ def test_nothing_to_repair(deck):
 def test_ordinary_value_of_all_parts(deck, quantity, card):
     """One line a card: a shared material is one line, thickness is one a part."""
     made, before, units = deck
-    effect = ordinary(shell_groups(structure(before), 8), quantity, (0, 1))
+    effect = ordinary(element_groups(structure(before), 8), quantity, (0, 1))
     after = effect.apply(before, np.array([0.0712345678]))
     found, _, gone = repaired(made, before, after, units)
     same(found, after, before)
@@ -79,7 +79,7 @@ def test_ordinary_value_of_all_parts(deck, quantity, card):
 def test_ordinary_value_of_one_part(deck, quantity):
     """A material two parts share is changed for the one that changed, not for the other."""
     made, before, units = deck
-    effect = ordinary(shell_groups(structure(before), 8), quantity, (1,))
+    effect = ordinary(element_groups(structure(before), 8), quantity, (1,))
     after = effect.apply(before, np.array([-0.2]))
     found, _, gone = repaired(made, before, after, units)
     same(found, after, before)
@@ -116,7 +116,7 @@ def test_thickness_of_triangles(tmp_path):
 def test_grain(deck, positions, axis):
     """MAT1 becomes MAT8 along a direction; a part that keeps the MAT1 keeps it."""
     made, before, units = deck
-    effect = orthotropic(shell_groups(structure(before), 8), positions, np.array(axis))
+    effect = orthotropic(element_groups(structure(before), 8), positions, np.array(axis))
     after = effect.apply(before, np.array([0.15, -0.1, 0.05, 0.1]))
     found, _, _ = repaired(made, before, after, units)
     same(found, after, before)
@@ -130,7 +130,7 @@ def test_grain_keeps_its_loss_factor(tmp_path):
     lossy = replace(section.membrane, damping=0.02)
     first = before.with_parts((before.parts[0].with_section(membrane=lossy, bending=lossy),))
     deck, before, units = opened(first, tmp_path)
-    effect = orthotropic(shell_groups(structure(before), 4), (0,), np.eye(3)[0])
+    effect = orthotropic(element_groups(structure(before), 4), (0,), np.eye(3)[0])
     found, _, _ = repaired(deck, before, effect.apply(before, np.full(4, 0.1)), units)
     assert found.parts[0].section.membrane.damping == pytest.approx(0.02)
 
@@ -138,7 +138,7 @@ def test_grain_keeps_its_loss_factor(tmp_path):
 def test_grain_that_is_there_already(tmp_path):
     """A MAT8's moduli, nu12 and density."""
     deck, before, units = opened(plate(0.3, 0.2, 4, 3, 1e-3), tmp_path)
-    effect = orthotropic(shell_groups(structure(before), 4), (0,), np.eye(3)[1])
+    effect = orthotropic(element_groups(structure(before), 4), (0,), np.eye(3)[1])
     first, second = (effect.apply(before, np.array(x)) for x in ([0.1] * 4, [0.3, 0.1, 0, 0.4]))
     deck, before, units = opened(first, tmp_path)
     id = before.parts[0].section.membrane.id
@@ -172,7 +172,7 @@ def test_material_a_bar_shares(tmp_path):
     made = replace(made, parts=(*made.parts, bar), beams=beams)
     deck, before, units = opened(made, tmp_path)
     k = next(k for k, p in enumerate(before.parts) if isinstance(p.section, ShellSection))
-    effect = ordinary(shell_groups(structure(before), 4), "E", (k,))
+    effect = ordinary(element_groups(structure(before), 4), "E", (k,))
     after = effect.apply(before, np.array([0.2]))
     found, _, _ = repaired(deck, before, after, units)
     same(found, after, before)
@@ -217,7 +217,7 @@ def test_plane_stiffness(tmp_path, quantity):
     made = plate(0.3, 0.2, 4, 3, 1e-3, Anisotropic(Q, rho=7850.0))
     made = made.with_parts((made.parts[0].with_section(rigid_shear=True),))
     deck, before, units = opened(made, tmp_path)
-    effect = ordinary(shell_groups(structure(before), 4), quantity, (0,))
+    effect = ordinary(element_groups(structure(before), 4), quantity, (0,))
     after = effect.apply(before, np.array([0.1]))
     found, _, _ = repaired(deck, before, after, units)
     same(found, after, before)
@@ -260,7 +260,7 @@ def test_the_wall_of_a_tube_stands_in_its_card(tmp_path, kind):
     units, found = UNITS["mm-t-s"], read_deck(path)
     before = assembly(found, units)
     tube = before.part(7)
-    groups = shell_groups(structure(before))
+    groups = element_groups(structure(before))
     stiff, wall = (ordinary(groups, q, [tube]) for q in ("E", "wall"))
     after = wall.apply(stiff.apply(before, np.array([0.1])), np.array([-0.2]))
     again, fresh, gone = repaired(found, before, after, units)

@@ -26,7 +26,7 @@ from .shell_components import component_matrices, thickness_split
 
 
 @dataclass(frozen=True, eq=False)
-class ShellGroups:
+class ElementGroups:
     """Element matrices of all shells, then of all member beams, and the groups they are in.
 
     No fastener is among the beams: what is wrong with these is asked of joints. A beam has the rows
@@ -139,7 +139,7 @@ def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
     return [order[: len(order) // 2], order[len(order) // 2 :]]
 
 
-def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
+def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
     """The shells of a structure, and likewise its beams, gathered in about ``most`` groups.
 
     Transverse shear with residual bending flexibility grows with a power of t between one and
@@ -160,7 +160,7 @@ def shell_groups(structure: Structure, most: int = 64) -> ShellGroups:
     weight = np.einsum("eij,i,j->e", mass, _along_x(), _along_x())
     part = np.zeros(n, dtype=int)
     part[group] = of
-    return ShellGroups(
+    return ElementGroups(
         structure, linear, cubic, mass, nodes, group, middle, extent,
         np.bincount(group, weight, minlength=n), part,
     )  # fmt: skip
