@@ -52,31 +52,50 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 
 @pytest.mark.parametrize(
-    ("ahead", "heard", "harm", "called"),
+    ("ahead", "heard", "left", "called"),  # left of Q: of what was fitted, of what was not
     [
-        (1000.0, HeldOutEvidence(0.0, 0.0, 0.0), 1.0, NAMED),  # no vote of what cannot feel it
-        (1000.0, HeldOutEvidence(), 1.0, NAMED),  # nor has what was not held out
-        (1000.0, HeldOutEvidence(-DUE - 1, 500.0, 500.0), 1.0, REST),
-        (1000.0, HeldOutEvidence(500.0, -DUE - 1, 500.0), 1.0, REST),
-        (1000.0, HeldOutEvidence(500.0, 500.0, -DUE - 1), 1.0, REST),
-        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), 2.0, REST),
-        (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), 1.0, NAMED),
-        (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), 1.0, LITTLE),
-        (1.9 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), 1.1, LITTLE),  # faint, and serves no better
-        (2.1 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), 1.1, NAMED),
-        (1.9 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, LITTLE),
-        (2.1 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), 1.0, REST),  # the data are at odds
+        (
+            1000.0,
+            HeldOutEvidence(0.0, 0.0, 0.0),
+            (0.1, 1.0),
+            NAMED,
+        ),  # no vote of what cannot feel it
+        (1000.0, HeldOutEvidence(), (0.1, 1.0), NAMED),  # nor has what was not held out
+        (1000.0, HeldOutEvidence(-DUE - 1, 500.0, 500.0), (0.1, 1.0), REST),
+        (1000.0, HeldOutEvidence(500.0, -DUE - 1, 500.0), (0.1, 1.0), REST),
+        (1000.0, HeldOutEvidence(500.0, 500.0, -DUE - 1), (0.1, 1.0), REST),
+        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.1, 2.0), REST),
+        (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), (0.1, 1.0), NAMED),
+        (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), (0.1, 1.0), LITTLE),
+        (
+            1.9 * DUE,
+            HeldOutEvidence(0.0, 0.0, 0.0),
+            (0.1, 1.1),
+            LITTLE,
+        ),  # faint, and serves no better
+        (2.1 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), (0.1, 1.1), NAMED),
+        (1.9 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), (0.1, 1.0), LITTLE),
+        (2.1 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), (0.1, 1.0), REST),  # the data are at odds
+        (
+            1000.0,
+            HeldOutEvidence(500.0, 500.0, 500.0),
+            (0.6, 0.6),
+            REST,
+        ),  # more left than explained
+        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.4, 0.6), NAMED),
+        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.6, 0.4), NAMED),
+        (1.9 * DUE, HeldOutEvidence(9.0, 9.0, 9.0), (0.6, 0.6), LITTLE),
     ],
 )
-def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, harm, called):
+def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, left, called):
     """No name then, and nothing of it in the deck that is reported.
 
     Where all data together, or what was fitted by far, still refute calibration alone, something is
     missing all the same.
     """
     monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
-    scores = FittedScores(1.0, harm, 1.0)
-    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: (scores, scores))
+    scores = tuple(FittedScores(1.0, share, 1.0) for share in left)
+    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: scores)
     null = HypothesisFit(
         Effect(),
         replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead),

@@ -232,7 +232,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
     effects = []
     for part in parts:
         bare = prestress(built, part, len(parts))
-        lam, K = context.stiffened(bare, np.zeros(2))
+        lam, K = context.modal_operators(bare, np.zeros(2))
         critical = np.array([buckling(lam, each) for each in K])
         if np.isfinite(critical).all():
             effects.append(replace(bare, critical=critical))

@@ -109,8 +109,8 @@ class SearchContext(Protocol):
         as it is for a fit.
         """
 
-    def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ (m,) of the calibrated model with an effect at x, and φᵀ ∂K/∂x φ (n_p, m, m)."""
+    def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Where poles alone are known: the lowest minima over the effect's whole prior."""

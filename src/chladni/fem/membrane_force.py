@@ -112,5 +112,5 @@ def geometric_stiffness(built: Structure, force: MembraneForce, rim: np.ndarray)
     B = sp.csr_array((mean.factor, where), shape=(6, 6 * len(grown.points)))
     B = B[3:, : built.T.shape[0]]
     KRB = force.moments @ B
-    K = _over_motions(force.net) - KRB - KRB.T + B.T @ (force.turning @ B)
+    K = _over_motions(force.net) - KRB - KRB.T + B.T @ sp.csr_array(force.turning) @ B
     return congruence(built.T, sp.csr_array(K))

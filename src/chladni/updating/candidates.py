@@ -184,11 +184,14 @@ class UpdatingContext:
                 out[0, k] = base.score(replace(base, state=state).with_mass(r[:, None], 0.0))[0]
         return out
 
-    def stiffened(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ (m,) of the calibrated model with an effect at x, and φᵀ ∂K/∂x φ (n_p, m, m)."""
-        base, model = self.baselines[-1], self.problem.reduced.model.split_for(effect, x)
-        state = evaluate(model, [*base.effects, effect], np.concatenate([base.x, x]))
-        return state.lam, state.dK[len(base.x) :]
+    def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
+        base, model = self.baselines[-1], self.problem.reduced.model
+        state = evaluate(model, base.effects, base.x, False)
+        terms = effect.matrices(x)
+        return state.lam, np.array(
+            [state.phi.T @ model.operator(t.operator) @ state.phi for t in terms]
+        )
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
         """Lowest minima of an effect over its whole prior, where poles alone are known."""

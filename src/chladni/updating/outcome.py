@@ -86,6 +86,9 @@ def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
 
 CONFLICT = 2.0  # times the gain due: what was fitted refutes calibration, whatever else says
 HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
+MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
+AGAINST = "the data that no fit saw speak against it"
+MORE_LEFT = "but with it in place more is left than it explains"
 
 
 def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
@@ -94,8 +97,9 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     The fitted data must carry a name after the fit was renewed.  The others refuse it as surely:
     where they speak against it by the gain that would be needed to name it, where less than that is
     left of all data together, or where the deck with the effect does harm: by far, or at all where
-    the fitted data bear the name by less than twice the gain due.  Data that cannot feel the effect
-    are predicted alike without it and have no vote.  Where all data together, or what was fitted by
+    the fitted data bear the name by less than twice the gain due.  Nor is named what leaves more
+    than it explains, of what was fitted and of what was not.  Data that cannot feel the effect are
+    predicted alike without it and have no vote.  Where all data together, or what was fitted by
     far, still want more than calibration, what is missing is not in the catalogue.
     """
     if diagnosis.found is None:
@@ -104,18 +108,20 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     heard = held_out_evidence(problem, prepared.unseen, diagnosis.null, lead)
     gain = diagnosis.two_log_bayes_factor(lead)
     diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
-    held = fitted_scores(prepared, diagnosis)[1]
+    seen, held = fitted_scores(prepared, diagnosis)
     together = gain + (heard.held_out or 0.0)
     due = threshold(diagnosis.null.data)
     borne = carried(gain, heard, due) and not held.effect > HARM * held.calibrated
     faint = gain < CONFLICT * due and held.effect > held.calibrated
-    if borne and not faint:
+    left = all(q.effect > MOST_LEFT * q.calibrated for q in (seen, held)) and lead.physics
+    if borne and not (faint or left):
         notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
+    why = "leaves more than it explains" if borne else "left the data no fit saw worse explained"
     note = (
-        f"{lead.name} gained {gain:.0f} in -2 ln evidence but left the data no fit saw "
-        f"worse explained ({said(heard)}; held-out Q {held.calibrated:.3g} calibrated, "
-        f"{held.effect:.3g} with it), so it is not named"
+        f"{lead.name} gained {gain:.0f} in -2 ln evidence but {why} ({said(heard)}; held-out Q "
+        f"{held.calibrated:.3g} calibrated, {held.effect:.3g} with it; of what was fitted "
+        f"{seen.calibrated:.3g} and {seen.effect:.3g}), so it is not named"
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
@@ -123,7 +129,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     if together > due and not borne:
         return _unexplained(refused, lead, together, "all data")
     if gain > CONFLICT * due:
-        return _unexplained(refused, lead, gain, "what was fitted")
+        return _unexplained(refused, lead, gain, "what was fitted", MORE_LEFT if borne else AGAINST)
     return tested(refused, problem)
 
 
@@ -133,13 +139,13 @@ def carried(gain: float, heard: HeldOutEvidence, due: float) -> bool:
     return min(gain, together) > due and not any(g < -due for g in heard.votes.values())
 
 
-def _unexplained(diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str) -> Diagnosis:
-    """Calibration alone is refuted by some data, and what refuted it is refused by others."""
+def _unexplained(
+    diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str,
+    but: str = AGAINST,
+) -> Diagnosis:  # fmt: skip
+    """Calibration alone is refuted by some data, and what refuted it does not stand either."""
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
-    what = (
-        f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; "
-        "the data that no fit saw speak against it"
-    )
+    what = f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; {but}"
     fits = FitTest(False, p, what, lead.effect.text)
     note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
     notes = (*diagnosis.notes, note)
