@@ -75,6 +75,11 @@ class Diagnosis:
         named = self.verdict in ("missing physics", "measurement fault")
         return self.hypotheses[0] if named and self.hypotheses else None
 
+    @property
+    def due(self) -> float:
+        """Gain in -2 ln evidence that is needed to name one of the families that were tried."""
+        return threshold(self.null.data, len(self.hypotheses))
+
     def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence
@@ -114,7 +119,7 @@ def _searched_beside(problem: UpdatingProblem, found: Diagnosis, progress: Progr
     many = isinstance(data, Responses) and data.error is not None
     if not (many and found.hypotheses) or (found.found is None and not unfit):
         return alone
-    search = several(problem, found.hypotheses, threshold(data), unfit, progress)
+    search = several(problem, found.hypotheses, found.due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
 
@@ -166,22 +171,23 @@ def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
     return problem, null
 
 
-def threshold(data: object) -> float:
+def threshold(data: object, tried: int | None = None) -> float:
     """The gain in -2 ln evidence that is needed to name anything from responses or from poles.
 
     Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
-    (Markov); the families share the chance of a false alarm.
+    (Markov); the families that were ``tried`` share the chance of a false alarm, all that are known
+    where it is not said: what proposes nothing on a structure raises none.
     """
     chance = FALSE_ALARM_FRF if isinstance(data, Responses) else FALSE_ALARM
-    return float(2 * np.log(len(families()) / chance))
+    return float(2 * np.log((tried or len(families())) / chance))
 
 
 def verdict(
     nominal: HypothesisFit, null: HypothesisFit, hypotheses: Sequence[HypothesisFit]
 ) -> str:
     """The public verdict."""
-    best = hypotheses[0] if hypotheses else None
-    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > threshold(null.data):
+    best, due = hypotheses[0] if hypotheses else None, threshold(null.data, len(hypotheses))
+    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > due:
         return "missing physics" if best.physics else "measurement fault"
     changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
     return "calibration only" if changed else "nothing missing"

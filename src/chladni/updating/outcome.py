@@ -11,7 +11,7 @@ from ..effects.registry import families
 from ..ema.odds import evidence_in_words
 from ..model.assembly import Assembly
 from .adequacy import FitTest
-from .diagnosis import Diagnosis, tested, threshold, verdict
+from .diagnosis import Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
 from .likelihood import Poles
@@ -110,7 +110,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
     seen, held = fitted_scores(prepared, diagnosis)
     together = gain + (heard.held_out or 0.0)
-    due = threshold(diagnosis.null.data)
+    due = diagnosis.due
     borne = carried(gain, heard, due) and not held.effect > HARM * held.calibrated
     faint = gain < CONFLICT * due and held.effect > held.calibrated
     left = all(q.effect > MOST_LEFT * q.calibrated for q in (seen, held)) and lead.physics

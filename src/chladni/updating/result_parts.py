@@ -4,7 +4,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..ema.odds import evidence_in_words
-from .diagnosis import Diagnosis, threshold
+from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
 from .joint_fit import JointFit
 from .likelihood import LN10, Poles
@@ -67,7 +67,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
 
 def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
     """Why a hypothesis was not named, with a number."""
-    gain, due = diagnosis.two_log_bayes_factor(hypothesis), threshold(diagnosis.null.data)
+    gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due
     if diagnosis.found is None and gain > due:
         return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
     if diagnosis.found is None:
@@ -100,7 +100,7 @@ def agreement(
         what,
         None if found is None else diagnosis.two_log_bayes_factor(found),
         max(factors, default=None),
-        threshold(diagnosis.null.data),
+        diagnosis.due,
     )
 
 
