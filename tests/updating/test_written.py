@@ -11,6 +11,7 @@ from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
+from chladni.errors import ModelError
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
@@ -139,6 +140,28 @@ def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
         prepared, Diagnosis(plain, plain, plain, (), "calibration only")
     )
     assert (found.plain is not plain) == kept
+
+
+def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses):
+    """A stiffness that is no longer positive has no Q: the calibration stays, without a fault."""
+    data = responses.over(reduced.model)
+    base = (ordinary(reduced.groups, "E", [0]),)
+    found = fit(reduced.model, base, data, None, np.array([0.04]), max_steps=0)
+    plain = HypothesisFit(Effect(), found, reduced.model)
+    none = HypothesisFit(Effect(), replace(found, x=np.array([np.inf])), reduced.model)
+    real = outcome.evaluate
+
+    def evaluated(model, effects, x, gradient):
+        if not np.isfinite(x).all():
+            raise ModelError("an effect left negative stiffness")
+        return real(model, effects, x, gradient)
+
+    monkeypatch.setattr(outcome, "evaluate", evaluated)
+    monkeypatch.setattr(outcome, "as_written", lambda null, mass: none)
+    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
+    prepared = SimpleNamespace(problem=problem, score=data)
+    diagnosis = Diagnosis(plain, plain, plain, (), "calibration only")
+    assert outcome.prudently_calibrated(prepared, diagnosis).plain is plain
 
 
 def test_what_makes_another_material_is_written_before_what_divides_a_part(reduced):

@@ -9,6 +9,7 @@ from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..ema.odds import evidence_in_words
+from ..errors import ModelError
 from ..model.assembly import Assembly
 from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, verdict
@@ -167,7 +168,11 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     decks = (problem.base, _given(problem, null)), (prudent.fit.effects, prudent.fit.x)
 
     def Q(effects: Sequence[Effect], x: np.ndarray) -> float:
-        return data.Q(evaluate(null.model, effects, x, False), data.use)
+        try:
+            state = evaluate(null.model, effects, x, False)
+        except ModelError:  # no structure at all: nothing speaks for it
+            return np.inf
+        return data.Q(state, data.use)
 
     before, after = (Q(effects, x) for effects, x in decks)
     bare_before, bare_after = (Q(effects, _mesh_idle(effects, x)) for effects, x in decks)
