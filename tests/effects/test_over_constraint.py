@@ -1,6 +1,7 @@
 """A rigid tie that gives: reduced against full, its limits, which ties there are, the deck."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +13,13 @@ from chladni.effects.ordinary import ordinary
 from chladni.effects.over_constraint import RIGID, over_constraint
 from chladni.effects.rigid_ties import on_firm_springs, rigid_ties
 from chladni.fem.assemble import structure
+from chladni.fem.modelled import modelled
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import RigidBody
 from chladni.updating.fastener_scan import loosened
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
+from chladni.workflows.diagnosis_pipeline import as_it_is
 from chladni_specimens.forms.mesh_pieces import of_pieces, rectangle, stops
 from chladni_specimens.joints.bolts import screw
 from chladni_specimens.plates import STEEL
@@ -133,3 +136,12 @@ def test_which_ties_there_are():
     body = floating.rigid[0]
     on_one = replace(body, dependent=body.dependent[:4], components=body.components[:4])
     assert rigid_ties(replace(floating, rigid=(on_one,))) == []
+
+
+def test_what_is_scored_is_the_deck_without_firm_springs(plates):
+    """Q and frequencies of the deck are its own: a firm spring is of the search alone."""
+    asked = SimpleNamespace(assembly=plates, tested=lambda assembly: assembly)
+    own = as_it_is(asked, modelled(on_firm_springs(plates), TOP))
+    assert own.assembly is plates
+    assert own.band == TOP
+    assert as_it_is(asked, own) is own

@@ -13,9 +13,8 @@ import numpy as np
 
 from .adequacy import LEAST, FitTest
 from .damping_scatter import FEWEST, ModalDamping
-from .discrepancy import RIGID
 from .hypothesis_fit import HypothesisFit
-from .reduced_model import evaluate
+from .reduced_model import evaluate, slices
 
 NEAR = 0.05  # relative distance of natural frequencies beyond which a pole is none of the model's
 
@@ -27,13 +26,14 @@ def heard_of_damping(
     elastic = [e.name for e in hypothesis.effects if e.elastic]
     if damping is None or not elastic:
         return test
-    frequency, share = softened(hypothesis)
-    ratio = np.abs(frequency / damping.frequency[:, None] - 1)
-    own = ratio.min(axis=1, initial=np.inf) < NEAR
+    lowest = float(damping.frequency.min(initial=np.inf))
+    frequency, share = softened(hypothesis, (1 - NEAR) * lowest)
+    off = np.abs(frequency / damping.frequency[:, None] - 1)
+    own = off.min(axis=1, initial=np.inf) < NEAR
     if own.sum() < FEWEST:
         return test
     kept = damping.of(own)
-    p, row = kept.following(share[ratio[own].argmin(axis=1)])
+    p, row = kept.following(share[off[own].argmin(axis=1)])
     test = replace(test, statistics=(*test.statistics, row))
     if p >= min(test.p, LEAST):
         return test
@@ -45,21 +45,18 @@ def heard_of_damping(
     return replace(test, passes=False, p=p, what=what, where=hypothesis.effect.text)
 
 
-def softened(hypothesis: HypothesisFit) -> tuple[np.ndarray, np.ndarray]:
-    """Natural frequencies [Hz] of the flexible modes (m,), and how far the effect lowers λ of each.
+def softened(hypothesis: HypothesisFit, above: float) -> tuple[np.ndarray, np.ndarray]:
+    """Natural frequencies [Hz] above one (m,), and how far the effect lowers λ of each mode.
 
     φᵀK₀φ / φᵀM₀φ / λ - 1 >= 0 of the modes φ as they are, K₀ and M₀ with the effect idle.
     """
-    fit = hypothesis.fit
-    x, at = fit.x.copy(), 0
-    for effect in fit.effects:
-        n = len(effect.parameters)
+    fit, x = hypothesis.fit, hypothesis.fit.x.copy()
+    for effect, at in slices(fit.effects):
         if effect in hypothesis.effects and effect.elastic:
-            x[at : at + n] = [p.nominal for p in effect.parameters]
-        at += n
+            x[at] = [p.nominal for p in effect.parameters]
     idle, state = evaluate(hypothesis.model, fit.effects, x, False), fit.state
-    T = np.linalg.solve(idle.vectors, state.vectors)
+    frequency = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+    kept = frequency > above
+    T = np.linalg.solve(idle.vectors, state.vectors[:, kept])
     energy, mass = idle.lam @ T**2, (T**2).sum(axis=0)
-    flexible = state.lam > RIGID**2 * np.median(state.lam)
-    lam = state.lam[flexible]
-    return np.sqrt(lam) / (2 * np.pi), np.maximum((energy / mass)[flexible] / lam - 1, 0.0)
+    return frequency[kept], np.maximum(energy / mass / state.lam[kept] - 1, 0.0)

@@ -141,9 +141,8 @@ def carried(gain: float, heard: HeldOutEvidence, due: float) -> bool:
 
 
 def _unexplained(
-    diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str,
-    but: str = AGAINST,
-) -> Diagnosis:  # fmt: skip
+    diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str, but: str = AGAINST
+) -> Diagnosis:
     """Calibration alone is refuted by some data, and what refuted it does not stand either."""
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; {but}"

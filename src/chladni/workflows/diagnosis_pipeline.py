@@ -165,13 +165,24 @@ def _updated(
     case: Case, asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[UpdatedModels, list[str]]:
     """The structures before and after, each solved once, changed ones as their decks have them."""
-    stages, nominal = models(asked, found), prepared.nominal
+    stages, nominal = models(asked, found), as_it_is(asked, prepared.nominal)
     calibrated, lost = _deck(case, asked, nominal, stages.calibrated)
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, asked, nominal, stages.final)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
+
+
+def as_it_is(asked: Question, searched: Modelled) -> Modelled:
+    """The deck's own structure: what is searched has firm springs in rigid ties, if there are any.
+
+    What is scored is what whoever runs the deck finds.
+    """
+    given = asked.tested(asked.assembly)
+    if len(given.points) == len(searched.assembly.points):
+        return searched
+    return modelled(given, searched.band)
 
 
 def _deck(
