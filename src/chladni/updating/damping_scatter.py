@@ -62,14 +62,15 @@ class ModalDamping:
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
         """Chance that damping follows a share (n,) of the modes by scatter alone; its statistic.
 
-        The component of ln ζ along the share, both less their means.
+        exp of the component of ln ζ along the share, which is of unit norm and mean zero: by what
+        factor those modes are damped more that have more of it.
         """
         along = share - share.mean()
         along = along / max(float(np.linalg.norm(along)), 1e-300)
         rng = np.random.default_rng(20250105)
         scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
-        own = (np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))) @ along
-        seen = float(np.log(self.ratio) @ along)
+        drawn = np.hypot(scatter, self.sd) * rng.normal(size=(DRAWS, len(share)))
+        own, seen = np.exp(drawn @ along), float(np.exp(np.log(self.ratio) @ along))
         median, low, high = np.quantile(own, (0.5, 0.005, 0.995))
         row = FitStatistic("damping where it gives", seen, float(median), float(low), float(high))
         return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
