@@ -22,10 +22,11 @@ from chladni.dynamics.frf import FRF
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import tangents, unit
 from chladni.geometry.sampling import nearest_points
+from chladni.model.assembly import Assembly
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import Bench
-from .footing import Footing, Spots, footing
+from .footing import Footing, Spots, still_there
 from .hidden import Hidden
 from .response_of_article import seen
 
@@ -59,13 +60,13 @@ def can_be_benched(hidden: Hidden, modes: ArticleModes) -> bool:
 
 
 def benched_recording(
-    bench: Bench, hidden: Hidden, zeta: np.ndarray, by: Recorder, solver: Solver,
+    bench: Bench, whole: Assembly, hidden: Hidden, zeta: np.ndarray, by: Recorder, solver: Solver,
     residual_bending: bool, cache: Path | None, rng: np.random.Generator,
 ) -> Benched:  # fmt: skip
-    """The article with what is hidden in it, tested over the bench's lines."""
+    """The article with what is hidden in it, tested over the lines; ``whole`` is it before."""
     setup = BenchSetup(rubber=True)
     article = _article(
-        bench, hidden, zeta, setup.accelerometer, solver, residual_bending, cache, rng
+        bench, whole, hidden, zeta, setup.accelerometer, solver, residual_bending, cache, rng
     )
     rig = bench_rig(article, setup)
     band = (float(bench.lines[0]), float(bench.lines[-1]))
@@ -85,13 +86,13 @@ def benched_recording(
 
 
 def _article(
-    bench: Bench, hidden: Hidden, zeta: np.ndarray, kind: AccelerometerType, solver: Solver,
-    residual_bending: bool, cache: Path | None, rng: np.random.Generator,
+    bench: Bench, whole: Assembly, hidden: Hidden, zeta: np.ndarray, kind: AccelerometerType,
+    solver: Solver, residual_bending: bool, cache: Path | None, rng: np.random.Generator,
 ) -> BenchArticle:  # fmt: skip
     """Its modes at true places; of rotations at the shaker nothing is known, so none is held."""
     a = hidden.article
     true = _true(bench.outputs, kind, rng)
-    out, drive = footing(a, true), footing(a, bench.drive)
+    out, drive = still_there(a, whole, true), still_there(a, whole, bench.drive)
     hung = nearest_points(a.points, bench.deck.points[bench.deck.rows(list(bench.hangers))])
     rows = np.concatenate([out.rows.ravel(), hung])
     modes = article_modes(

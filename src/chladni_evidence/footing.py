@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.errors import ModelError
 from chladni.geometry.nearest import ShellSurface
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
@@ -65,6 +66,23 @@ def footing(assembly: Assembly, spots: Spots) -> Footing:
             rows[mine] = nearest_rows(assembly, p, spots.points[mine])[:, None]
             weights[mine] = [1.0, 0.0, 0.0]
     return Footing(rows, weights)
+
+
+def still_there(article: Assembly, whole: Assembly, spots: Spots) -> Footing:
+    """Where the spots are on an article: at the points they had before something was hidden in it.
+
+    What is hidden makes parts of its own out of a sheet, and a sensor that stands on one of them
+    is not on the nearest shell of what is left of the sheet.
+
+    Raises
+    ------
+    ModelError
+        If the points are others, so that no spot can be found again.
+    """
+    n = len(whole.points)
+    if len(article.points) < n or not np.array_equal(article.points[:n], whole.points):
+        raise ModelError("what is hidden in an article has moved its points")
+    return footing(whole, spots)
 
 
 def rows_of_part(assembly: Assembly, p: int) -> np.ndarray:

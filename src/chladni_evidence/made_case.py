@@ -25,7 +25,7 @@ from chladni.units import units
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
 from .benched_recording import PLAIN, Benched, Recorder, benched_recording, can_be_benched
-from .footing import Spots, footing
+from .footing import Spots, still_there
 from .held_kinds import HELD
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind
@@ -66,6 +66,7 @@ class _Rig:
     """Solves articles of one case for their noiseless responses at the sensors."""
 
     bench: Bench
+    article: Assembly  # before anything is hidden in it
     zeta: np.ndarray
     cache: Path | None
     residual_bending: bool
@@ -75,7 +76,8 @@ class _Rig:
     ) -> tuple[np.ndarray, ArticleModes]:
         """Accelerance (n_f, n_out, 1) and the modes it was made of."""
         a = hidden.article
-        out, drive = footing(a, self.bench.outputs), footing(a, self.bench.drive)
+        out = still_there(a, self.article, self.bench.outputs)
+        drive = still_there(a, self.article, self.bench.drive)
         tied = [c.rows for c in hidden.couplings]
         modes = article_modes(
             a,
@@ -113,7 +115,7 @@ def made_case(
     plain = bench.meshes[mesh]()
     article, scales = scattered(plain, rng)  # one article a seed: whatever is hidden, it is in it
     zeta = ZETA * np.exp(DAMPING_SPREAD * rng.normal(size=2000))
-    rig = _Rig(bench, zeta, cache, bool(rng.integers(2)))
+    rig = _Rig(bench, article, zeta, cache, bool(rng.integers(2)))
     site = _site(bench, article)
     band = bench.lines[(bench.lines >= bench.fit[0]) & (bench.lines <= bench.fit[1])]
     band = band[:: max(1, len(band) // COARSE)]
@@ -134,7 +136,7 @@ def made_case(
     tested = None
     if recorder != PLAIN and can_be_benched(hidden, modes):
         tested = benched_recording(
-            bench, hidden, zeta, recorder, solver, rig.residual_bending, cache, noise
+            bench, article, hidden, zeta, recorder, solver, rig.residual_bending, cache, noise
         )
         frf = tested.frf
     else:

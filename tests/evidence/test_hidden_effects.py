@@ -10,7 +10,7 @@ from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.bench_of_structure import panel_bench
-from chladni_evidence.footing import Spots, footing
+from chladni_evidence.footing import Spots, footing, still_there
 from chladni_evidence.held_kinds import HELD
 from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import (
@@ -18,7 +18,9 @@ from chladni_evidence.hidden_kinds import (
     calibration,
     crack,
     local_resonator,
+    mass_patch,
     orthotropic,
+    stiffness_patch,
     thinning,
 )
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
@@ -59,7 +61,7 @@ def site():
 
 def response(site, hidden, damping=0.01):
     """Accelerance of four sensors to a force at the first."""
-    foot = footing(hidden.article, site.outputs)
+    foot = still_there(hidden.article, site.article, site.outputs)
     tied = [c.rows for c in hidden.couplings]
     rows = np.concatenate([foot.rows.ravel(), *tied])
     modes = article_modes(hidden.article, rows, rows, TOP)
@@ -177,6 +179,28 @@ def test_more_is_more(site, kind):
         for s in (0.1, 0.2)
     )
     assert 0 < small < large
+
+
+@pytest.mark.parametrize("hide", [stiffness_patch, mass_patch])
+def test_sensors_stand_on_a_patch_as_they_stood_on_the_sheet(site, hide):
+    """A patch that changes nothing changes no response, though it is a part of its own."""
+    a, names = site.article, site.outputs.parts
+    idle = hide(replace(site, sheets=("panel",)), np.random.default_rng(3), 0.0)
+    patch = a.shells.nodes[idle.article.shells.part == idle.article.part("patch")]
+    rows, count = np.unique(patch, return_counts=True)
+    rows = rows[np.argsort(-count, kind="stable")[: len(names)]]
+    on = replace(site.outputs, grids=a.ids[rows], points=a.points[rows], parts=("panel",) * 4)
+    there = replace(site, outputs=on)
+    np.testing.assert_allclose(
+        response(there, idle), response(there, Hidden(a, {})), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_points_that_moved_are_no_place_of_a_sensor(site):
+    """A sensor is found again by the points it stands on, or not at all."""
+    a = site.article
+    with pytest.raises(ModelError, match="moved"):
+        still_there(replace(a, points=a.points + 1e-3), a, site.outputs)
 
 
 def test_truth_is_what_was_done(site):
