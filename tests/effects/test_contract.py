@@ -73,7 +73,7 @@ def cases(reduced):
     where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
     k = reduced.grids.position(25)
     line = LineFinder.of(reduced.structure.assembly).drawn(np.array([20]), (1.7,))[0]
-    local = np.array([-1.0, np.log(0.3), 0.1, 0.05])
+    local = np.array([-1.0, np.log(0.3), 0.1, 0.05, 0.3])
     ortho = material_axes(where)[0]
     pulled = replace(prestress(reduced.structure, 0), critical=np.array([2000.0, 1500.0]))
     over = mesh.mesh_errors(solved(reduced.structure, 2 * TOP), TOP)[0]

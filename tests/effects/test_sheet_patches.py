@@ -27,7 +27,7 @@ def lam(reduced, effect, x):
 
 def test_a_patch_as_large_as_the_sheet_is_its_modulus(reduced):
     patch, E = StiffnessPatch.on(reduced.groups, 0, 1), ordinary(reduced.groups, "E", [0])
-    got, due = lam(reduced, patch, [0.3, WIDE, 0, 0]), lam(reduced, E, [np.log(1 - lost(0.3))])
+    got, due = lam(reduced, patch, [0.3, WIDE, 0, 0, 0]), lam(reduced, E, [np.log(1 - lost(0.3))])
     assert_allclose(got[6:], due[6:], rtol=1e-6)
 
 
@@ -35,18 +35,34 @@ def test_a_mass_as_large_as_the_sheet_is_its_density(reduced):
     patch, rho = MassPatch.on(reduced.groups, 0, 1), ordinary(reduced.groups, "rho", [0])
     m = patch.parameters[0].value(0.5)
     due = lam(reduced, rho, [np.log1p(m / reduced.groups.weight.sum())])
-    assert_allclose(lam(reduced, patch, [0.5, WIDE, 0, 0])[6:], due[6:], rtol=1e-6)
+    assert_allclose(lam(reduced, patch, [0.5, WIDE, 0, 0, 0])[6:], due[6:], rtol=1e-6)
 
 
 @pytest.mark.parametrize("ln_R", [-3.0, -1.5, 0.0])
 def test_the_mass_is_all_there_whatever_its_radius(reduced, ln_R):
     """In the reduced model and in the deck; and on a folded sheet its groups share it."""
-    patch, x = MassPatch.on(reduced.groups, 5, 1), np.array([0.2, ln_R, 0.05, 0.02])
+    patch, x = MassPatch.on(reduced.groups, 5, 1), np.array([0.2, ln_R, 0.05, 0.02, 0.4])
     m = patch.parameters[0].value(0.2)
     plain = float(reduced.groups.weight.sum())
     assert evaluate(reduced.model, [patch], x, False).weight == pytest.approx(plain + m, rel=1e-9)
     written = patch.apply(reduced.structure.assembly, x)
     assert mass_properties(written)[0] == pytest.approx(plain + m, rel=1e-9)
+
+
+def test_a_patch_has_a_rim_from_a_bell_to_a_disc(reduced):
+    """p = 1: a Gaussian; p large: 1 within √2 R, 0 beyond, and 1/e at √2 R whatever it is."""
+    patch = StiffnessPatch.on(reduced.groups, 5, 1)
+    ln_R, R = np.log(0.2), 0.2 * patch.size
+
+    def q(p, away):
+        x = np.array([0.3, ln_R, 0.0, 0.0, np.log(p)])
+        return patch.bump(x, patch.at(x) + np.outer(away, patch.surface.axes[0]))
+
+    away = np.array([0.0, 0.5, 1.3, 2.0]) * R
+    assert_allclose(q(1.0, away), np.exp(-(away**2) / (2 * R**2)), rtol=1e-12)
+    assert_allclose(q(50.0, away), [1, 1, 1, 0], atol=1e-2)
+    for p in (0.7, 1.0, 3.0):
+        assert_allclose(q(p, np.sqrt([2.0]) * R), np.exp(-1), rtol=1e-9)
 
 
 def test_bands_hold_the_mass_and_every_shell_within_half_a_step():

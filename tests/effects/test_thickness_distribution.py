@@ -22,7 +22,7 @@ def test_a_fold_does_not_end_a_thinning(panel):
     """Begun beside the fold: shells of both parts grow thinner, by what their distance says."""
     group = int(np.argmin(((panel.centre - [0.3, 0.28, 0.0]) ** 2).sum(axis=1)))
     effect = ThicknessDistribution.on(panel, group, 1)
-    x = np.array([0.0, np.log(0.06 / effect.size), 0.0, 0.0])
+    x = np.array([0.0, np.log(0.06 / effect.size), 0.0, 0.0, 0.0])
     assembly = panel.structure.assembly
     changed = effect.apply(assembly, x).shells.thickness / assembly.shells.thickness
     X = assembly.points[assembly.shells.nodes]
@@ -39,7 +39,7 @@ def test_sheets_that_share_no_grid_are_two():
     assert len(set(groups.connected.tolist())) == 2
     effect = ThicknessDistribution.on(groups, 0, 2)
     shells = two.shells
-    changed = effect.apply(two, np.array([1.0, -1.0, 0.0, 0.0])).shells.thickness
+    changed = effect.apply(two, np.array([1.0, -1.0, 0.0, 0.0, 0.0])).shells.thickness
     ratio = (changed / shells.thickness).min(axis=1)
     mine = shells.part == groups.part[0]
     assert ratio[mine].min() < 0.9
@@ -85,9 +85,9 @@ def test_a_centre_off_the_sheet_is_reported_on_it(panel):
     group = int(np.argmin(((panel.centre - [0.05, 0.15, 0.0]) ** 2).sum(axis=1)))
     effect = ThicknessDistribution.on(panel, group, 1)
     away = (np.array([-0.1, 0.15, 0.0]) - effect.surface.origin) @ effect.surface.axes.T
-    x = np.array([0.0, np.log(0.1 / effect.size), *(away / effect.size)])
+    x = np.array([0.0, np.log(0.1 / effect.size), *(away / effect.size), 0.3])
     place = np.array(effect.location(x).point_m)
-    depth = effect.reported(x, np.zeros(4))[0].value
+    depth = effect.reported(x, np.zeros(5))[0].value
     assembly = panel.structure.assembly
     thinnest = (effect.apply(assembly, x).shells.thickness / assembly.shells.thickness).min()
     assert abs(place[0]) < 1e-9
@@ -98,5 +98,5 @@ def test_a_small_patch_between_grids_stays_where_it_is(panel):
     """Of a radius below the mesh's the centre is on the sheet though no grid is near."""
     group = int(np.argmin(((panel.centre - [0.3, 0.15, 0.0]) ** 2).sum(axis=1)))
     effect = ThicknessDistribution.on(panel, group, 1)
-    x = np.array([0.0, np.log(0.003 / effect.size), 0.0, 0.0])
+    x = np.array([0.0, np.log(0.003 / effect.size), 0.0, 0.0, 0.0])
     assert effect.location(x).point_m == pytest.approx(effect.at(x), abs=1e-12)

@@ -34,7 +34,7 @@ def changes(reduced):
     setup = Setup(tuple(((int(g), 1.0),) for g in sensors), (), float(groups.weight.sum()), TOP)
     where = Surroundings(groups, reduced.grids, reduced.candidates, setup)
     k = reduced.grids.position(int(reduced.candidates.grids[5]))
-    start = np.array([0.5, np.log(0.15), 0.1, 0.0])
+    start = np.array([0.5, np.log(0.15), 0.1, 0.0, 0.2])
     return {
         "thickness": (ordinary(groups, "t", [0]), np.array([0.2])),
         "thinner": (ordinary(groups, "t", [1]), np.array([-0.2])),

@@ -168,7 +168,10 @@ def test_what_makes_another_material_is_written_before_what_divides_a_part(reduc
     """Otherwise a patch would keep the material that the rest has lost."""
     sheet = orthotropic(reduced.groups, (0,), np.array([1.0, 0, 0]))
     patch = StiffnessPatch.on(reduced.groups, 0, 1)
-    x = {id(sheet): np.array([0.2, -0.2, 0.0, 0.0]), id(patch): np.array([1.0, -1.5, 0.0, 0.0])}
+    x = {
+        id(sheet): np.array([0.2, -0.2, 0.0, 0.0]),
+        id(patch): np.array([1.0, -1.5, 0.0, 0.0, 0.5]),
+    }
 
     def written(*order):
         fit = SimpleNamespace(effects=order, of=lambda e: x[id(e)])

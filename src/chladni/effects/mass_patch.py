@@ -15,7 +15,7 @@ from .family import Article, Family
 from .points import strength
 from .property_bands import levels, with_bands
 from .search_context import Candidate, SearchContext
-from .sheet_patch import SheetPatch, patches
+from .sheet_patch import RIMMED, SheetPatch, patches
 
 SHARE = 0.03  # of the structure's mass: prior median
 
@@ -29,6 +29,7 @@ class MassPatch(SheetPatch):
     quantity = "rho"
     scanned = -1.0
     grows = (0.05, np.inf)  # of the mass scanned: less of it, or a negative one, is none
+    rim = RIMMED
 
     area: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [m²]
     weight_of: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [kg]

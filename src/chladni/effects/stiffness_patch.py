@@ -19,7 +19,7 @@ from .family import Article, Family
 from .ordinary import scaled
 from .property_bands import with_bands
 from .search_context import Candidate, SearchContext
-from .sheet_patch import SheetPatch, patches
+from .sheet_patch import RIMMED, SheetPatch, patches
 
 MOST = 0.9  # of the stiffness may be lost in the middle
 
@@ -34,6 +34,7 @@ class StiffnessPatch(SheetPatch):
     quantity = "E"
     scanned = -1.0
     grows = (0.1, np.inf)  # less of it, or a stiffening, is no such patch
+    rim = RIMMED
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
