@@ -16,6 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import binom, norm
 
+from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
 from .discrepancy import LOG_SD, MEDIAN, RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
@@ -95,13 +96,14 @@ def adequacy(
     labels: tuple[str, ...],
     draws: int = DRAWS,
     damping: ModalDamping | None = None,
+    coupling: ModeCoupling | None = None,
 ) -> FitTest | None:
     """The test of one explanation; None where errors of the model have no place.
 
     Parameters
     ----------
     labels : of the outputs, to say where
-    damping : of the modes, which is tested beside the fit where it is given
+    damping, coupling : of the modes, which are tested beside the fit where they are given
     """
     data, fit = hypothesis.data, hypothesis.fit
     if isinstance(data, Poles):
@@ -124,7 +126,9 @@ def adequacy(
     )
     what = NAMES[least].format(seen[least])
     test = FitTest(p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
-    return test if damping is None else _evenly_damped(test, damping.above(_first(data, fit.state)))
+    if damping is not None:
+        test = _evenly_damped(test, damping.above(_first(data, fit.state)))
+    return test if coupling is None else _alive(test, coupling)
 
 
 def _first(data: Responses, state: State) -> float:
@@ -143,6 +147,17 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     if p >= min(test.p, LEAST):
         return test
     what, where, modes = damping.said()
+    return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
+
+
+def _alive(test: FitTest, coupling: ModeCoupling) -> FitTest:
+    """The test, or that of complex modes where it is the less likely of the two."""
+    p, row, what, modes = coupling.tested()
+    test = replace(test, statistics=(*test.statistics, row))
+    if p >= min(test.p, LEAST):
+        return test
+    what += ": something spins, or moves by a drive of its own, or channels lag one another"
+    where = "near " + ", ".join(f"{f:.4g}" for f in modes[:8]) + " Hz"
     return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
 
 

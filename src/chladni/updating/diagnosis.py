@@ -129,7 +129,10 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     winner = diagnosis.found or diagnosis.null
     if diagnosis.found:
         winner = _about_itself(problem, winner)
-    fits = adequacy(winner, problem.mass_measurement, problem.labels, damping=problem.damping)
+    fits = adequacy(
+        winner, problem.mass_measurement, problem.labels, damping=problem.damping,
+        coupling=problem.coupling,
+    )  # fmt: skip
     if fits is None:
         return diagnosis
     name = winner.name if diagnosis.found else "calibration alone"

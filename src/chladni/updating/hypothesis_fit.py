@@ -7,6 +7,7 @@ import numpy as np
 
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
+from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
@@ -69,7 +70,7 @@ class UpdatingProblem:
     ----------
     base : ordinary parameters and nuisances, free in every fit
     nuisance : the nuisances alone
-    damping : of the modes that were identified, where responses are compared
+    damping, coupling : of the modes that were identified, where responses are compared
     found : effects of the base that were found, each with its parameters where it was
     """
 
@@ -81,6 +82,7 @@ class UpdatingProblem:
     setup: Setup
     labels: tuple[str, ...] = ()
     damping: ModalDamping | None = None
+    coupling: ModeCoupling | None = None
     found: tuple[tuple[Effect, np.ndarray], ...] = ()
 
     @property

@@ -29,6 +29,7 @@ from ..fem.assemble import Structure
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
+from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
 from .least_data import too_little
@@ -134,7 +135,8 @@ def _by_responses(question: Question) -> Prepared:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     notes.append(_sensor_note(question))
     notes += _mass_note(question)
-    problem = replace(problem, damping=modal_damping(found, low, fit_max))
+    damping, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
+    problem = replace(problem, damping=damping, coupling=coupling)
     own = AtLevel(question.level, frf, found, question.control)
     studied = level_study([own, *levels(others)])
     notes += [

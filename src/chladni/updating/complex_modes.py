@@ -1,0 +1,126 @@
+"""Whether modes are complex as damping makes them: what spins makes them more, and otherwise.
+
+Forces B proportional to velocity couple the modes φ of a structure (Woodhouse 1998, J. Sound Vib.
+215, 547-569, to first order):
+
+    ψ_j = φ_j + i Σ_k a_jk φ_k,   a_jk = ω_j B_jk / (λ_j - λ_k).
+
+Damping is symmetric and takes energy: a_jk and a_kj have opposite signs, and B_jk² <= B_jj B_kk =
+4 ζ_j ω_j ζ_k ω_k. The forces of something that spins are skew (Meirovitch 1980, Computational
+Methods in Structural Dynamics, 2.10): the signs are equal, and nothing bounds them. No stiffness
+and no mass makes a mode complex at all, so that a name for either is none for what does this.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import binom
+
+from ..ema.identification import Identified
+from ..ema.propagation import standard_deviations
+from ..ema.shapes import driven_shapes
+from .result import FitStatistic
+
+FEWEST = 5  # modes or outputs below which nothing is said
+REACH = 0.05  # prior sd of B_jk over the geometric mean of ω_j and ω_k
+FLOOR = 1e-3  # of a unit shape: no channel is known better
+SURE = 3.0  # standard deviations
+APART = 3.0  # half-bandwidths between modes that are told apart
+MARGIN = 1.5  # times the bound: unit shapes are not quite mass-normalised ones
+EXCUSED = 0.05  # of the modes may be beyond it where the first order fails
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCoupling:
+    """How complex identified modes are.
+
+    Attributes
+    ----------
+    frequency : (r,) Hz
+    complexity : (r,)    norm of the imaginary part of the unit shape that noise does not explain
+    bound : (r,)         what damping, all of it in one place, could make of it
+    alike, coupled : int of the pairs of modes that surely are coupled, both ways, those whose
+        signs are equal, and all
+    """
+
+    frequency: np.ndarray
+    complexity: np.ndarray
+    bound: np.ndarray
+    alike: int
+    coupled: int
+
+    def tested(self) -> tuple[float, FitStatistic, str, tuple[float, ...]]:
+        """The chance of it where only damping couples modes; its statistic; what; modes [Hz].
+
+        The smaller of two chances, twice: of as many modes beyond the bound, and of as many pairs
+        with equal signs, which are as likely as opposite ones where something else than coupling
+        (poles that lie close) makes shapes complex, and less likely where damping does.
+        """
+        n = len(self.frequency)
+        ratio = self.complexity / self.bound
+        over = np.flatnonzero(ratio > MARGIN)
+        most = float(binom.sf(len(over) - 1, n, EXCUSED))
+        skew = float(binom.sf(self.alike - 1, self.coupled, 0.5)) if self.coupled else 1.0
+        allowed = float(binom.ppf(0.995, n, EXCUSED))
+        row = FitStatistic("complex modes", float(len(over)), n * EXCUSED, 0.0, allowed)
+        if most <= skew:
+            what = (
+                f"{len(over)} of {n} modes are more complex than any damping of theirs makes them"
+            )
+        else:
+            over = np.argsort(-ratio)[:1]
+            what = (
+                f"{self.alike} of {self.coupled} pairs of modes are coupled the way something that "
+                "spins couples them, not the way damping does"
+            )
+        return min(1.0, 2 * min(most, skew)), row, what, tuple(self.frequency[over].tolist())
+
+
+def mode_coupling(identified: Identified, low: float, high: float) -> ModeCoupling | None:
+    """How complex the modes between two frequencies [Hz] are; None where too few are known.
+
+    The modes beside the band take part in what they may be coupled with.
+    """
+    inside = (identified.frequency >= low) & (identified.frequency <= high)
+    known = identified.covariance is not None and len(identified.outputs) >= FEWEST
+    if inside.sum() < FEWEST or not known:
+        return None
+    omega, zeta = np.abs(identified.poles), -identified.poles.real / np.abs(identified.poles)
+    half = np.abs(zeta) * omega
+    psi = _turned(identified)
+    noise = standard_deviations(identified, lambda moved: _turned(moved).imag.T).T
+    away = omega[:, None] ** 2 - omega**2
+    np.fill_diagonal(away, np.inf)
+    each = 2 * np.sqrt(half[:, None] * half) * omega[:, None] / np.abs(away)
+    sure = SURE * np.linalg.norm(noise, axis=0)
+    complexity = np.maximum(np.linalg.norm(psi.imag, axis=0) - sure, 0.0)
+    t = _significance(psi, np.maximum(noise, FLOOR), omega, away)
+    pairs = np.triu(np.minimum(np.abs(t), np.abs(t.T)) > SURE, 1) & inside & inside[:, None]
+    pairs &= np.abs(omega[:, None] - omega) > APART * (half[:, None] + half)
+    return ModeCoupling(
+        identified.frequency[inside], complexity[inside],
+        np.maximum(np.linalg.norm(each, axis=1), FLOOR)[inside],
+        int((t * t.T > 0)[pairs].sum()), int(pairs.sum()),
+    )  # fmt: skip
+
+
+def _turned(identified: Identified) -> np.ndarray:
+    """Unit shapes (n_out, r), each turned so that its real part is as large as it can be."""
+    psi = driven_shapes(identified)
+    psi = psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300)
+    return psi * np.exp(-0.5j * np.angle((psi**2).sum(axis=0)))
+
+
+def _significance(
+    psi: np.ndarray, noise: np.ndarray, omega: np.ndarray, away: np.ndarray
+) -> np.ndarray:
+    """a_jk over its standard deviation (r, r): the imaginary parts as sums of the real shapes."""
+    r = len(omega)
+    t = np.zeros((r, r))
+    for j in range(r):
+        k = np.delete(np.arange(r), j)
+        prior = REACH * omega[j] * omega[k] / np.abs(away[j, k])
+        M = psi.real[:, k] / noise[:, j : j + 1]
+        P = np.linalg.inv(M.T @ M + np.diag(1 / prior**2))
+        t[j, k] = P @ (M.T @ (psi.imag[:, j] / noise[:, j])) / np.sqrt(np.diag(P))
+    return t
