@@ -139,10 +139,7 @@ def _by_responses(question: Question) -> Prepared:
     problem = replace(problem, damping=damping, coupling=coupling)
     own = AtLevel(question.level, frf, found, question.control)
     studied = level_study([own, *levels(others)])
-    notes += [
-        *said, *spread_note(spreads[1], data[1].use, others),
-        *level_notes(studied),
-    ]  # fmt: skip
+    notes += [*said, *spread_note(spreads[1], data[1].use, others), *level_notes(studied)]
     floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
         floor = np.maximum(floor, spreads[1] ** 2)
