@@ -69,7 +69,7 @@ def normal_modes(
     """
     n = len(system.dofs)
     limit = np.inf if band is None else (2 * np.pi * band) ** 2 * _JUST_ABOVE
-    K, M = (sp.csr_array(A.real).astype(float) for A in (system.K, system.M))
+    K, M = (sp.csr_array(A).astype(float, copy=False) for A in (system.elastic, system.M))
     massive = np.abs(M).sum(axis=1) > 0
     if n <= _DENSE or (count is not None and 3 * count > n):
         lam, phi = _dense(K, M, system.dofs, count, limit)

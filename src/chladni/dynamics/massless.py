@@ -33,7 +33,7 @@ def static_solver(
     ModelError
         If something hangs on nothing, or a column of B drives a motion that nothing resists.
     """
-    K, M, nodes = sp.csr_array(system.K.real), system.M, system.dofs[:, 0]
+    K, M, nodes = sp.csr_array(system.elastic), system.M, system.dofs[:, 0]
     try:
         return factorise(K - sigma * M, points, nodes=nodes).solve
     except NotDefinite:

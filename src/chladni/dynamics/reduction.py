@@ -7,6 +7,8 @@ Craig and Kurdila (2006), Fundamentals of Structural Dynamics, ch. 17.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +20,7 @@ from ..sparse.multifrontal import NotDefinite
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
+ROWS = 4096  # of an operator that are multiplied at once, or the product is as large as a basis
 
 
 def orthonormal(
@@ -28,19 +31,81 @@ def orthonormal(
     A vector whose M-norm falls below ``cut`` of what it was, once the earlier ones are taken out
     of it, is dropped.  The first ``kept`` columns are M-orthonormal already and stay as they are.
     """
-    basis = blocks[0][:, :kept]
-    rest = [blocks[0][:, kept:], *blocks[1:]]
-    for block in (b for b in rest if b.shape[1]):
-        V = block / np.sqrt(np.maximum(np.einsum("ij,ij->j", block, M @ block), 1e-300))
-        for _ in range(2):
-            V = V - basis @ (basis.T @ (M @ V))
-        w, U = np.linalg.eigh(V.T @ (M @ V))
-        keep = w > cut**2
-        V = V @ (U[:, keep] / np.sqrt(w[keep]))
-        for _ in range(2):
-            V = V - basis @ (basis.T @ (M @ V))
-        basis = np.hstack([basis, V])
-    return basis
+    out = [blocks[0][:, :kept]]
+    for block in (blocks[0][:, kept:], *blocks[1:]):
+        out.append(beyond(M, out, block, cut))
+    return np.hstack(out)
+
+
+def beyond(
+    M: sp.csr_array, known: Sequence[np.ndarray], block: np.ndarray, cut: float = CUT
+) -> np.ndarray:
+    """What a block (n, m) adds to M-orthonormal ones, M-orthonormal itself (n, k)."""
+    if not block.shape[1]:
+        return block
+    V = block / np.sqrt(np.maximum(np.einsum("ij,ij->j", block, M @ block), 1e-300))
+    V = _without(M, known, V)
+    w, U = np.linalg.eigh(V.T @ (M @ V))
+    keep = w > cut**2
+    return _without(M, known, V @ (U[:, keep] / np.sqrt(w[keep])))
+
+
+def _without(M: sp.csr_array, known: Sequence[np.ndarray], V: np.ndarray) -> np.ndarray:
+    """V less what M-orthonormal blocks have of it, twice: once leaves rounding of the large."""
+    for _ in range(2):
+        MV = M @ V
+        for Q in known:
+            V = V - Q @ (Q.T @ MV)
+    return V
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Φ (n, r) in blocks of columns, which every basis that grows from this one shares with it.
+
+    Vectors of the structure are what a search has most of; every hypothesis has a few of its own.
+    """
+
+    blocks: tuple[np.ndarray, ...]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n, r)."""
+        return len(self.blocks[0]), sum(block.shape[1] for block in self.blocks)
+
+    def grown(self, block: np.ndarray) -> Self:
+        """With more columns (n, k)."""
+        return type(self)((*self.blocks, np.ascontiguousarray(block)))
+
+    def padded(self, more: int) -> Self:
+        """Over so many more dofs, which no vector moves."""
+        return type(self)(tuple(np.pad(block, ((0, more), (0, 0))) for block in self.blocks))
+
+    def at(self, dofs: np.ndarray) -> np.ndarray:
+        """Φ at some dofs (k, r)."""
+        return np.hstack([block[dofs] for block in self.blocks])
+
+    def seen(self, rows: sp.csr_array) -> np.ndarray:
+        """B Φ of rows over all dofs or the first of them (k, r)."""
+        return np.hstack([rows @ block[: rows.shape[1]] for block in self.blocks])
+
+    def combined(self, q: np.ndarray) -> np.ndarray:
+        """Φ q (n, k)."""
+        ends = np.cumsum([block.shape[1] for block in self.blocks])[:-1]
+        return sum(V @ part for V, part in zip(self.blocks, np.split(q, ends), strict=True))
+
+    def projected(self, F: np.ndarray) -> np.ndarray:
+        """Φᵀ F of loads on all dofs or the first of them (r, k)."""
+        return np.concatenate([block[: len(F)].T @ F for block in self.blocks])
+
+    def reduced(self, A: sp.csr_array) -> np.ndarray:
+        """Φᵀ A Φ of a symmetric operator (r, r), which costs what A has of rows with entries."""
+        busy = np.flatnonzero(np.diff(A.indptr))
+        out = np.zeros((self.shape[1],) * 2)
+        for start in range(0, len(busy), ROWS):
+            some = busy[start : start + ROWS]
+            out += self.at(some).T @ self.seen(A[some])
+        return (out + out.T) / 2
 
 
 def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:

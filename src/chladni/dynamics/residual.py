@@ -27,7 +27,7 @@ def with_residual_vectors(
     ----------
     load : (n, k)   P, real load patterns over the free dofs
     """
-    phi, K, M = modal.shapes, system.K.real, system.M
+    phi, K, M = modal.shapes, system.elastic, system.M
     top = float((2 * np.pi * modal.frequency[-1]) ** 2) or 1.0
     solve = static_solver(system, -_NEAR_STATIC * top, points)
     R = solve(load - M @ (phi @ (phi.T @ load)))

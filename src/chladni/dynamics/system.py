@@ -33,3 +33,8 @@ class System:
             if getattr(self, name).shape != (n, n):
                 raise ShapeError(f"{name} is {getattr(self, name).shape}, {n} dofs need {(n, n)}")
         object.__setattr__(self, "dofs", readonly(np.asarray(self.dofs, dtype=np.int64)))
+
+    @property
+    def elastic(self) -> sp.csr_array:
+        """The real part of K; K itself where it is real, which SciPy's ``real`` would copy."""
+        return self.K.real if np.iscomplexobj(self.K.data) else self.K

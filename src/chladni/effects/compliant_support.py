@@ -133,7 +133,7 @@ def ways_of(
     stiff : (clamps, 2)    of :func:`rigid_springs`
     """
     n = len(built.system.dofs)
-    K = released(built, every).system.K.real
+    K = released(built, every).system.elastic
     f = (K[n:, :n] @ shapes) / (2 * np.pi * frequency)
     out = []
     for k, rigid in enumerate(stiff):

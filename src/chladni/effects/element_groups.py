@@ -8,14 +8,17 @@ Of a beam t is the wall of a thin tube: A (shear areas with it), I1, I2, I12 and
 that its stiffness is E t A and its mass ρ t m exactly.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from ..arrays import alike
+from ..dynamics.reduction import Basis
 from ..fem import beam, shell
 from ..fem.assemble import Structure
 from ..fem.shell_section import section_arrays
@@ -86,29 +89,77 @@ class ElementGroups:
         return out
 
     def project(
-        self, matrices: np.ndarray, left: np.ndarray, right: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Σ_{e in g} V_eᵀ A_e W_e for every group g (n_groups, r_left, r_right)."""
-        one = self.structure.T @ left
-        two = one if right is None else self.structure.T @ right
-        out = self._by_group(matrices, one, two)
-        return (out + out.transpose(0, 2, 1)) / 2 if right is None else out
+        self, kinds: Sequence[np.ndarray], basis: Basis, last: int | None = None
+    ) -> list[np.ndarray]:
+        """Φᵀ A_g W of every group g (n_groups, r, last) and of each kind of element matrices.
 
-    def carried(self, left: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Σ_{e in g} V_eᵀ m_e R_e of a motion of all points (6 n_points, k): (n_groups, r, k)."""
-        return self._by_group(self.mass, self.structure.T @ left, motion)
-
-    def _by_group(self, matrices: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
-        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
-        order = np.argsort(self.group, kind="stable")
-        ends = np.searchsorted(self.group[order], np.arange(len(self) + 1))
-        out = np.empty((len(self), one.shape[1], two.shape[1]))
-        for g in range(len(self)):
-            members = order[ends[g] : ends[g + 1]]
-            V = one[dofs[members]].reshape(-1, one.shape[1])
-            AW = matrices[members] @ two[dofs[members]]
-            out[g] = V.T @ AW.reshape(-1, two.shape[1])
+        W are the last columns of Φ; all of them where it is not said how many.
+        """
+        r = basis.shape[1]
+        k = r if last is None else last
+        out = [np.empty((len(self), r, k)) for _ in kinds]
+        for g, place in enumerate(self._places):
+            V = place.motion(basis)
+            for stack, matrices in zip(out, kinds, strict=True):
+                own = V.T @ place.forces(matrices, V[:, r - k :])
+                stack[g] = own if k < r else (own + own.T) / 2
         return out
+
+    def carried(self, basis: Basis, motion: np.ndarray) -> np.ndarray:
+        """Φᵀ m_g R of a motion of all points (6 n_points, k) and every group: (n_groups, r, k)."""
+        of_each = [
+            place.motion(basis).T @ place.forces(self.mass, motion[place.dofs])
+            for place in self._places
+        ]
+        return np.array(of_each).reshape(len(self), basis.shape[1], motion.shape[1])
+
+    @cached_property
+    def _places(self) -> list["_Place"]:
+        """Of every group where its elements are."""
+        dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
+        return [_Place.of(on, dofs[on], self.structure.T) for on in alike(self.group)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Elements of a group and the motion of their points, without the rest of the structure.
+
+    Attributes
+    ----------
+    elements : (m,) int
+    dofs : (p,) int       motions of their points, 6 a point
+    at : (m, 24) int      of each element among these
+    sum : (p, 24 m)       of the forces of all elements
+    T : (p, k), free : (k,)   the motions by these free dofs of the structure
+    """
+
+    elements: np.ndarray
+    dofs: np.ndarray
+    at: np.ndarray
+    sum: sp.csr_array
+    T: sp.csr_array
+    free: np.ndarray
+
+    @classmethod
+    def of(cls, elements: np.ndarray, dofs: np.ndarray, T: sp.csr_array) -> Self:
+        """Of elements with these dofs (m, 24)."""
+        mine, at = np.unique(dofs, return_inverse=True)
+        at = at.reshape(dofs.shape)
+        entries = (np.ones(at.size), (at.ravel(), np.arange(at.size)))
+        total = sp.csr_array(entries, shape=(len(mine), at.size))
+        rows = T[mine]
+        free, column = np.unique(rows.indices, return_inverse=True)
+        narrow = sp.csr_array((rows.data, column, rows.indptr), shape=(len(mine), len(free)))
+        return cls(elements, mine, at, total, narrow, free)
+
+    def motion(self, basis: Basis) -> np.ndarray:
+        """T Φ (p, r)."""
+        return self.T @ basis.at(self.free)
+
+    def forces(self, matrices: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Σ_e A_e W_e on the motions of the points (p, k)."""
+        each = matrices[self.elements] @ motion[self.at]
+        return self.sum @ each.reshape(-1, motion.shape[1])
 
 
 def group_of_shells(

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ..dynamics.reduction import orthonormal
+from ..dynamics.reduction import beyond
 from ..effects.effect import Effect
 from .effect_dofs import own_part, own_positions
 from .reduced_model import Reduced, State, evaluate, log_fields, mass_log, slices, stiffness_log
@@ -82,9 +82,8 @@ def _improved(
 ) -> np.ndarray:
     """λ of Rayleigh-Ritz on the basis and what it lacks, in increasing order."""
     M = model.groups.structure.system.M
-    missing = np.pad(missing, ((0, len(model.basis) - len(missing)), (0, 0)))
-    both = orthonormal(M, [model.basis, missing], kept=model.basis.shape[1])
-    Z = np.pad(both[:, model.basis.shape[1] :], ((0, len(state.own)), (0, 0)))
+    missing = np.pad(missing, ((0, M.shape[0] - len(missing)), (0, 0)))
+    Z = np.pad(beyond(M, model.vectors.blocks, missing), ((0, len(state.own)), (0, 0)))
     if not Z.shape[1]:
         return state.lam
     modes = _modes(model, state)
@@ -99,7 +98,7 @@ def _improved(
 
 def _modes(model: Reduced, state: State) -> np.ndarray:
     """Modes at all dofs of the structure, below them those that effects bring (n + n_own, m)."""
-    return np.concatenate([model.basis @ state.phi, state.own])
+    return np.concatenate([model.vectors.combined(state.phi), state.own])
 
 
 def products(
@@ -107,9 +106,9 @@ def products(
 ) -> tuple[np.ndarray, np.ndarray]:
     """K(x) q and M(x) q (n + n_own, k) on the full operators, never assembled."""
     system, groups = model.groups.structure.system, model.groups
-    n = len(model.basis)
+    n = model.vectors.shape[0]
     n_own, u = len(q) - n, q[:n]
-    K, M = system.K.real @ u, system.M @ u
+    K, M = system.elastic @ u, system.M @ u
     logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
     change: np.ndarray | float = 0.0
     for name, pair in model.pieces().items():

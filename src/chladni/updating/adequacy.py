@@ -22,7 +22,7 @@ from .discrepancy import LOG_SD, MEDIAN, RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
-from .reduced_model import State
+from .reduced_model import State, evaluate
 from .result import FitStatistic
 
 LEAST = 0.01  # p below which an explanation does not fit
@@ -110,8 +110,9 @@ def adequacy(
         return of_poles(data, fit.state)
     if not isinstance(data, Responses) or data.error is None:
         return None
-    r, J = data.scaled(fit.state, True)
-    r0, J0 = beside(fit.effects, mass_measurement, fit.x, fit.state)
+    state = evaluate(hypothesis.model, fit.effects, fit.x)
+    r, J = data.scaled(state, True)
+    r0, J0 = beside(fit.effects, mass_measurement, fit.x, state)
     model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)

@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from ..dynamics.reduction import Basis
 from ..effects.effect import MatrixTerm, PointTerm
 from ..effects.element_groups import ElementGroups
 from ..fem.assemble import Structure
@@ -36,17 +37,15 @@ class BaseParticipation:
 
     def extended(self, shells: ElementGroups, new: np.ndarray) -> Self:
         """The same over a basis that also holds these vectors (n, m)."""
-        more = participation(shells, new, self.motion)
+        more = participation(shells, Basis((new,)), self.motion)
         groups = np.concatenate([self.groups, more.groups], axis=1)
         return replace(self, groups=groups, rest=np.concatenate([self.rest, more.rest]))
 
 
-def participation(
-    shells: ElementGroups, basis: np.ndarray, motion: BaseMotion
-) -> BaseParticipation:
+def participation(shells: ElementGroups, basis: Basis, motion: BaseMotion) -> BaseParticipation:
     """What the base does to each vector of a basis (n, r)."""
     groups = shells.carried(basis, motion.whole)
-    return BaseParticipation(motion, groups, basis.T @ motion.force - groups.sum(axis=0))
+    return BaseParticipation(motion, groups, basis.projected(motion.force) - groups.sum(axis=0))
 
 
 class Participating:
@@ -79,12 +78,12 @@ class Participating:
             c = term.coefficient
             self.slope[at.start + p] += (db.T * c) @ along + (b.T * c) @ d_along
 
-    def add_operator(self, part: MatrixTerm, basis: np.ndarray, at: slice) -> None:
+    def add_operator(self, part: MatrixTerm, basis: Basis, at: slice) -> None:
         """A part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
-        rows = basis[: part.operator.shape[0]].T
-        l = np.pad(rows @ self.motion.carried(part.operator), ((0, self.n_own), (0, 0)))
+        load = basis.projected(self.motion.carried(part.operator))
+        l = np.pad(load, ((0, self.n_own), (0, 0)))
         self.value = self.value + part.coefficient * l
         self.slope[at] += part.gradient[:, None, None] * l
 

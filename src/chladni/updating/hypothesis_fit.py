@@ -153,10 +153,12 @@ def fitted(
 ) -> Fit:  # fmt: skip
     """A fit; for poles, the spread that no model reaches is found with it."""
     if isinstance(data, Poles):
-        return _fit_poles(model, effects, data, mass_measurement, x)
-    if isinstance(data, Responses) and data.error is not None:
-        return _fit_responses(model, effects, data, mass_measurement, x, max_steps)
-    return fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
+        found = _fit_poles(model, effects, data, mass_measurement, x)
+    elif isinstance(data, Responses) and data.error is not None:
+        found = _fit_responses(model, effects, data, mass_measurement, x, max_steps)
+    else:
+        found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
+    return found.kept()
 
 
 ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
@@ -263,7 +265,7 @@ def as_written(
     start = np.concatenate([hypothesis.fit.of(e) for e in kept])
     effects = [held.get(id(e), e) for e in kept]
     model = hypothesis.model
-    found = fit(model, effects, hypothesis.data, mass_measurement, start)
+    found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
     effect, *beside = held.values()
     return HypothesisFit(effect, found, model, tuple(beside))
 

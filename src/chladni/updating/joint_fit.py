@@ -130,7 +130,7 @@ def of_the_object(effect: Effect) -> bool:
 def _of_state(
     one: HypothesisFit, x: np.ndarray, covariance: np.ndarray, state: State
 ) -> HypothesisFit:
-    fit = replace(one.fit, x=x, covariance=covariance, state=state)
+    fit = replace(one.fit, x=x, covariance=covariance, state=state).kept()
     return replace(one, fit=fit)
 
 

@@ -173,19 +173,24 @@ class Responses:
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dφ_i is that of a moving base; dφ_o and dφ_i of shapes that change where they are measured.
+        dK and dM are met over the basis, with Φ D φ_i on their right, so that none is taken into
+        the modes whole. dφ_i is that of a moving base; dφ_o and dφ_i of shapes that change where
+        they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
         H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
         H = H + self.direct / self.s[:, None, None] ** self.power
+        assert state.dK is not None
+        assert state.dM is not None
         out = np.empty((len(state.dK), *H.shape), complex)
+        left = phi_o * d[:, None]  # φ_o D (n_f, n_out, r)
+        from_basis, vectors = left @ state.vectors.T, state.vectors
         for j in range(len(phi_i)):
-            q = (phi_i[j] * d).T
+            q = vectors @ (phi_i[j] * d).T
             W = _each_times(state.dK, q) + _each_times(state.dM, q * self.s**2)
+            out[:, :, :, j] = -(from_basis @ W.transpose(2, 1, 0)).transpose(2, 0, 1)
             if state.ddrive is not None:
-                W = W - state.ddrive[:, j, :, None]
-            W = W * d.T
-            out[:, :, :, j] = -np.einsum("or,prf->pfo", phi_o, W, optimize=True)
+                out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
             out[p] += np.einsum("or,fr,ir->foi", moved_o, d, phi_i, optimize=True)
@@ -210,10 +215,15 @@ class Responses:
 def _each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
     """A_p z of real matrices (n_p, r, r), many of them zero, and a complex z (r, n_f)."""
     out = np.zeros((*A.shape[:2], z.shape[1]), complex)
-    acts = A.any(axis=(1, 2))
-    B = A[acts].reshape(-1, A.shape[2])
-    out[acts] = (B @ z.real + 1j * (B @ z.imag)).reshape(-1, *out.shape[1:])
+    both = np.ascontiguousarray(z).view(float)  # real and imaginary parts side by side
+    for p in np.flatnonzero(A.any(axis=(1, 2))):
+        out[p] = (A[p] @ both).view(complex)
     return out
+
+
+def _along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
+    return np.einsum("rk,prk->pk", phi, A @ phi)
 
 
 SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes
@@ -305,12 +315,15 @@ class Poles:
         delta = np.log(np.sqrt(lam) / (2 * np.pi) / self.frequency[test])
         sd = self.std()
         r = np.append(np.sqrt(self._price_unpaired()), np.sqrt(unpaired))
-        J = np.zeros((len(r), len(state.dK)))
         r[test] = delta / sd[test]
-        if gradient:
-            dlam = state.dK[:, model, model] - lam * state.dM[:, model, model]
-            J[test] = (dlam / (2 * lam) / sd[test]).T
         use = np.append(self.use, True)
+        if not gradient:
+            return r[use], np.zeros((int(use.sum()), 0))
+        assert state.dK is not None
+        assert state.dM is not None
+        J, phi = np.zeros((len(r), len(state.dK))), state.vectors[:, model]
+        dlam = _along(state.dK, phi) - lam * _along(state.dM, phi)
+        J[test] = (dlam / (2 * lam) / sd[test]).T
         return r[use], J[use]
 
     scaled = residual  # poles are independent

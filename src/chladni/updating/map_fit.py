@@ -5,9 +5,9 @@
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -69,6 +69,10 @@ class Fit:
                 return slice(at, at + len(other.parameters))
             at += len(other.parameters)
         raise ModelError(f"{effect.name} is not part of this fit")
+
+    def kept(self) -> Self:
+        """The fit as a search keeps many of them: its state has let go of ∂K and ∂M."""
+        return replace(self, state=self.state.without_slopes())
 
     def sd(self, effect: Effect) -> np.ndarray:
         """Standard deviations of an effect's parameters."""

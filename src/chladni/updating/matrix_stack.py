@@ -38,6 +38,13 @@ class Whole:
         return np.asarray(weights @ self.values.reshape(g, r * r)).reshape(-1, r, r)
 
 
+def bordered(inner: MatrixStack, border: np.ndarray) -> "Bordered":
+    """Of matrices (g, r + k, k) that are what further vectors of a basis add."""
+    r = inner.shape[1]
+    corner = border[:, r:]
+    return Bordered(inner, border[:, :r], (corner + corner.transpose(0, 2, 1)) / 2)
+
+
 @dataclass(frozen=True, eq=False)
 class Bordered:
     """[[A, S], [Sᵀ, C]] for every group.

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ..dynamics.reduction import orthonormal
+from ..dynamics.reduction import Basis, beyond
 from ..effects.effect import Effect, count
 from ..effects.element_groups import ElementGroups
 from ..effects.shell_components import COMPONENTS
@@ -23,7 +23,7 @@ from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import own_part, own_positions, row, with_own
-from .matrix_stack import Bordered, MatrixStack, Whole
+from .matrix_stack import MatrixStack, Whole, bordered
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Reduced:
     Attributes
     ----------
     groups : of the structure's shells and beams
-    basis : (n, r)            M-orthonormal; behind the dofs of the deck those of clamps let go
+    vectors : Φ (n, r)        M-orthonormal; behind the dofs of the deck those of clamps let go
     linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
     mass : (g, r)             these three are stacks of r by r matrices, one for each group
     K0, M0 : (r, r)           all that is in no group
@@ -43,7 +43,7 @@ class Reduced:
     """
 
     groups: ElementGroups
-    basis: np.ndarray
+    vectors: Basis
     linear: Mapping[str, MatrixStack]
     cubic: Mapping[str, MatrixStack]
     mass: MatrixStack
@@ -55,14 +55,20 @@ class Reduced:
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
     _within: "Reduced | None" = None  # over the first vectors of this basis: what it knows is kept
 
+    @property
+    def basis(self) -> np.ndarray:
+        """Φ in one array, made anew at each call."""
+        return np.hstack(self.vectors.blocks)
+
     def rows(self, rows: sp.csr_array, keep: bool = True, strained: bool = False) -> np.ndarray:
         """Rows of the structure in the basis (k, r); projected once where they are to be kept.
 
         Rows over the dofs of the deck see no clamp's own; ``strained`` ones see what deforms.
         """
         wide = self.wide(rows, strained)
-        basis = self.basis[: wide.shape[1]]
-        return self._once(rows, lambda: wide @ basis) if keep else wide @ basis
+        if keep:
+            return self._once(rows, lambda: self.vectors.seen(wide))
+        return self.vectors.seen(wide)
 
     def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
         """The rows; ``strained`` ones over clamps as well, less what follows them."""
@@ -78,12 +84,13 @@ class Reduced:
         return self._once(A, lambda: self._projected(A))
 
     def _projected(self, A: sp.csr_array) -> np.ndarray:
-        basis = self.basis[: A.shape[0]]
         if self._within is None:
-            return _symmetric(basis.T @ (A @ basis))
+            return self.vectors.reduced(A)
         old = self._within.operator(A)
         r = len(old)
-        border = basis.T @ (A @ basis[:, r:])
+        if r == self.vectors.shape[1]:  # of the same basis: clamps let go
+            return old
+        border = self.vectors.projected(A @ self.vectors.blocks[-1][: A.shape[0]])
         return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
 
     def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
@@ -94,41 +101,35 @@ class Reduced:
 
     def released(self, built: Structure, following: np.ndarray) -> Self:
         """The same model of a structure with more dofs, which no vector of the basis moves yet."""
-        more = len(built.system.dofs) - len(self.basis)
+        more = len(built.system.dofs) - self.vectors.shape[0]
         return replace(
             self, groups=replace(self.groups, structure=built), following=following,
-            basis=np.pad(self.basis, ((0, more), (0, 0))),
+            vectors=self.vectors.padded(more),
             base=None if self.base is None else self.base.over(built), _seen={}, _within=self,
         )  # fmt: skip
 
     def extended(self, vectors: np.ndarray) -> Self:
         """The same model over a basis that holds these (n, k) as well; short ones move no clamp."""
-        system = self.groups.structure.system
-        vectors = np.pad(vectors, ((0, len(self.basis) - len(vectors)), (0, 0)))
-        basis = orthonormal(system.M, [self.basis, vectors], kept=self.basis.shape[1])
-        new = basis[:, self.basis.shape[1] :]
+        system, (n, r) = self.groups.structure.system, self.vectors.shape
+        vectors = np.pad(vectors, ((0, n - len(vectors)), (0, 0)))
+        new = beyond(system.M, self.vectors.blocks, vectors)
         if not new.shape[1]:
             return self
+        basis, pieces = self.vectors.grown(new), self.pieces()
+        kinds = [*(A for A, _ in pieces.values()), *(B for _, B in pieces.values())]
+        *stiff, heavy = self.groups.project([*kinds, self.groups.mass], basis, new.shape[1])
+        of_t, of_t3 = stiff[: len(pieces)], stiff[len(pieces) :]
 
-        def grown(old: MatrixStack, matrices: np.ndarray) -> Bordered:
-            side = self.groups.project(matrices, self.basis, new)
-            return Bordered(old, side, self.groups.project(matrices, new))
+        def rest(old: np.ndarray, A: sp.csr_array, shells: Sequence[np.ndarray]) -> np.ndarray:
+            full = basis.projected(A @ new) - sum(stack.sum(axis=0) for stack in shells)
+            return np.block([[old, full[:r]], [full[:r].T, full[r:]]])
 
-        def rest(old: np.ndarray, A: sp.csr_array, shells: Sequence[Bordered]) -> np.ndarray:
-            r = len(old)
-            full = basis.T @ (A @ new)
-            side = full[:r] - sum(stack.side.sum(axis=0) for stack in shells)
-            corner = full[r:] - sum(stack.corner.sum(axis=0) for stack in shells)
-            return np.block([[old, side], [side.T, corner]])
-
-        pieces = self.pieces()
-        linear = {k: grown(self.linear[k], A) for k, (A, _) in pieces.items()}
-        cubic = {k: grown(self.cubic[k], B) for k, (_, B) in pieces.items()}
-        mass = grown(self.mass, self.groups.mass)
-        stiff = [*linear.values(), *cubic.values()]
         return replace(
-            self, basis=basis, linear=linear, cubic=cubic, mass=mass,
-            K0=rest(self.K0, system.K.real, stiff), M0=rest(self.M0, system.M, [mass]),
+            self, vectors=basis,
+            linear={k: bordered(self.linear[k], A) for k, A in zip(pieces, of_t, strict=True)},
+            cubic={k: bordered(self.cubic[k], B) for k, B in zip(pieces, of_t3, strict=True)},
+            mass=bordered(self.mass, heavy),
+            K0=rest(self.K0, system.elastic, stiff), M0=rest(self.M0, system.M, [heavy]),
             base=None if self.base is None else self.base.extended(self.groups, new), _seen={},
             _within=self,
         )  # fmt: skip
@@ -146,25 +147,23 @@ class Reduced:
 
     def with_components(self) -> Self:
         """The same model with the plane stiffness split into its four components."""
-        pieces = self.groups.components()
-        linear = {k: Whole(self.groups.project(A, self.basis)) for k, (A, _) in pieces.items()}
-        cubic = {k: Whole(self.groups.project(B, self.basis)) for k, (_, B) in pieces.items()}
+        linear: dict[str, MatrixStack] = {}
+        cubic: dict[str, MatrixStack] = {}
+        for name, pair in self.groups.components().items():
+            linear[name], cubic[name] = map(Whole, self.groups.project(pair, self.vectors))
         return replace(self, linear=linear, cubic=cubic)
 
 
 def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
     """Project a structure on a basis; ``base`` where its supports are what moves."""
-    system = groups.structure.system
-    linear, cubic = groups.project(groups.linear, basis), groups.project(groups.cubic, basis)
-    mass = groups.project(groups.mass, basis)
-    K = basis.T @ (system.K.real @ basis)
-    M = basis.T @ (system.M @ basis)
+    system, vectors = groups.structure.system, Basis((np.ascontiguousarray(basis),))
+    linear, cubic, mass = groups.project((groups.linear, groups.cubic, groups.mass), vectors)
+    K, M = vectors.reduced(system.elastic), vectors.reduced(system.M)
     rest = mass_properties(groups.structure.assembly)[0] - float(groups.weight.sum())
     return Reduced(
-        groups, basis, {"": Whole(linear)}, {"": Whole(cubic)}, Whole(mass),
-        _symmetric(K - linear.sum(axis=0) - cubic.sum(axis=0)),
-        _symmetric(M - mass.sum(axis=0)), max(rest, 0.0),
-        None if base is None else participation(groups, basis, base),
+        groups, vectors, {"": Whole(linear)}, {"": Whole(cubic)}, Whole(mass),
+        K - linear.sum(axis=0) - cubic.sum(axis=0), M - mass.sum(axis=0), max(rest, 0.0),
+        None if base is None else participation(groups, vectors, base),
     )  # fmt: skip
 
 
@@ -177,7 +176,7 @@ class State:
     lam : (m,)             ω² [rad²/s²]; m = r and the degrees of freedom that effects bring
     phi : (r, m)           eigenvectors in the basis
     own : (m - r, m)       eigenvectors at the degrees of freedom of effects
-    dK, dM : (n_p, m, m)   derivatives in *modal* coordinates φᵀ(∂K)φ, where asked for
+    dK, dM : (n_p, m, m)   ∂K, ∂M over the basis and what effects bring; None where not asked for
     weight, dweight        mass on the scales [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
@@ -188,8 +187,8 @@ class State:
     lam: np.ndarray
     phi: np.ndarray
     own: np.ndarray
-    dK: np.ndarray
-    dM: np.ndarray
+    dK: np.ndarray | None
+    dM: np.ndarray | None
     weight: float
     dweight: np.ndarray
     offset: np.ndarray | None
@@ -203,6 +202,10 @@ class State:
     def vectors(self) -> np.ndarray:
         """Eigenvectors at all degrees of freedom, those of effects last (m, m)."""
         return np.concatenate([self.phi, self.own])
+
+    def without_slopes(self) -> Self:
+        """The same without ∂K and ∂M, which weigh ten times the rest."""
+        return replace(self, dK=None, dM=None)
 
 
 def evaluate(
@@ -246,7 +249,7 @@ def evaluate(
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
             target += part.coefficient * A
             if base is not None:
-                base.add_operator(part, model.basis, at)
+                base.add_operator(part, model.vectors, at)
             if gradient:
                 slope[at] += part.gradient[:, None, None] * A
         extra, d_extra = effect.weight(x[at])
@@ -257,20 +260,12 @@ def evaluate(
                 doffset = np.zeros((len(change.value), n_p), complex)
             offset, doffset[:, at] = offset + change.value, change.gradient
     lam, phi = _eigen(K, M)
-    if gradient:
-        dK, dM = _in_modes(dK, phi), _in_modes(dM, phi)
     drive, ddrive = (None, None) if base is None else base.loads(phi)
-    return State(
+    state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
         *_moved(model, effects, x, phi[:r]),
     )  # fmt: skip
-
-
-def _in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """φᵀ A φ of every slope (n_p, m, m); most parameters move stiffness or mass alone."""
-    acts = slopes.any(axis=(1, 2))
-    slopes[acts] = phi.T @ slopes[acts] @ phi
-    return slopes
+    return state if gradient else state.without_slopes()
 
 
 def _moved(
@@ -360,8 +355,8 @@ def mass_log(fields: dict[str, np.ndarray]) -> np.ndarray:
 def _shells(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """K, M and their derivatives (n_p, r, r) from the fields."""
-    r, n_p = len(model.K0), slopes["t"].shape[1]
+    """K, M and, where asked for, their derivatives (n_p, r, r) from the fields."""
+    r, n_p = len(model.K0), slopes["t"].shape[1] if gradient else 0
     K, M, dK, dM = model.K0.copy(), model.M0.copy(), np.zeros((n_p, r, r)), np.zeros((n_p, r, r))
     for stacks, power in ((model.linear, 1), (model.cubic, 3)):
         for name, stack in stacks.items():

@@ -1,5 +1,6 @@
 """A structure made ready for trying hypotheses: groups of elements, basis, factor, places."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from .reduced_model import Reduced, reduce
 
 FEWEST = 12  # modes of a basis whose structure has no flexible one below that: six, and six rigid
 FOLLOWED = 10  # rounds in which the response to a clamp's motion is found with a shifted factor
+AT_ONCE = 32  # places whose static responses are in memory at a time
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
@@ -47,10 +49,12 @@ class ReducedProblem:
 
     def flexibility(self, where: ElementGrids) -> np.ndarray:
         """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
-        exact = np.einsum("kn,nk->k", where.rows.toarray(), attachments(self.factor, where.rows))
-        b = self.model.rows(where.rows)
-        basis = self.model.basis
-        K = basis.T @ (self.model.groups.structure.system.K.real @ basis)
+        exact = np.concatenate(
+            [(rows @ attachments(self.factor, rows)).diagonal() for rows in _pieces(where.rows)]
+        )
+        b, K = self.model.rows(where.rows), self.model.K0.copy()
+        for stack in (*self.model.linear.values(), *self.model.cubic.values()):
+            K += stack.weighted(np.ones((1, stack.shape[0])))[0]
         shifted_K = K + (2 * np.pi * self.hertz) ** 2 * np.eye(len(K))
         inside = np.einsum("kr,kr->k", b, np.linalg.solve(shifted_K, b.T).T)
         return np.maximum(exact - inside, 0.0)
@@ -74,15 +78,15 @@ class ReducedProblem:
         for _ in range(effect.rounds):
             loads = effect.reloads(blocks[-1], self.structure.system.M)
             blocks.append(self.factor.solve(loads))
-        n = len(model.basis)
+        n = model.vectors.shape[0]
         every = [np.pad(block, ((0, n - len(block)), (0, 0))) for block in blocks]
         return model.extended(np.hstack(every)).split_for(effect, x)
 
     @property
     def shapes(self) -> np.ndarray:
         """Modes of the nominal model up to the highest frequency of interest (n, r)."""
-        low = np.flatnonzero(self.frequency <= self.f_max)
-        return self.model.basis[: len(self.structure.system.dofs), low]
+        low = int(np.sum(self.frequency <= self.f_max))
+        return self.model.vectors.blocks[0][: len(self.structure.system.dofs), :low]
 
     def _released(self, effect: Effect) -> Reduced:
         """The reduced model with clamps let go, which the structure follows by -K⁻¹ K_qg.
@@ -91,13 +95,18 @@ class ReducedProblem:
         """
         if self.model.following is not None:
             return self.model
-        built, K = effect.released(self.structure), self.structure.system.K.real
+        built, K = effect.released(self.structure), self.structure.system.elastic
         n = len(self.structure.system.dofs)
-        force = -built.system.K.real[:n, n:].toarray()
+        force = -built.system.elastic[:n, n:].toarray()
         R = self.factor.solve(force)
         for _ in range(FOLLOWED):
             R = R + self.factor.solve(force - K @ R)
         return self.model.released(built, R)
+
+
+def _pieces(rows: sp.csr_array) -> Iterator[sp.csr_array]:
+    """Some rows at a time: their static responses are as large as the structure each."""
+    yield from (rows[k : k + AT_ONCE] for k in range(0, rows.shape[0], AT_ONCE))
 
 
 def reduced_problem(

@@ -202,16 +202,16 @@ def bending_slopes(
     base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
 ) -> np.ndarray:
     """∂r/∂a of a B added to K, B the bending stiffness of each set of shells (n, n_sets)."""
-    groups, r = model.groups, len(base.state.lam)
-    U = groups.structure.T @ (model.basis @ base.state.phi)
+    groups, r, m = model.groups, model.vectors.shape[1], len(base.state.lam)
     dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
     out = [np.zeros((len(base.residual), 0))]
     for k in range(0, len(sets), AT_ONCE):
         chunk = sets[k : k + AT_ONCE]
-        dK = np.empty((len(chunk), r, r))
+        dK = np.zeros((len(chunk), m, m))
         for j, shells in enumerate(chunk):
-            V = U[dofs[shells]]
-            dK[j] = V.reshape(-1, r).T @ (groups.cubic[shells] @ V).reshape(-1, r)
+            V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
+            bent = groups.cubic[shells] @ V.reshape(len(shells), 24, r)
+            dK[j, :r, :r] = V.T @ bent.reshape(-1, r)
         # stiffness moves no load of a base and no shape beside those of the modes
         still = replace(base.state, doffset=None, ddrive=None, dmoved={})
         state = replace(still, dK=dK, dM=np.zeros_like(dK))

@@ -81,7 +81,7 @@ def seen(
         shifted(built.system, hertz, node_points(built)), sp.csr_array(sp.vstack([rows_o, rows_i]))
     )
     basis = orthonormal(built.system.M, [basis, still], kept=basis.shape[1])
-    K, M = (basis.T @ (A @ basis) for A in (built.system.K.real, built.system.M))
+    K, M = (basis.T @ (A @ basis) for A in (built.system.elastic, built.system.M))
     lam, phi = sl.eigh((K + K.T) / 2, (M + M.T) / 2)
     return replace(score, a=rows_o @ basis, b=rows_i @ basis), _state(lam, phi)
 
