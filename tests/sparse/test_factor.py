@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import structural_rank
 
-from chladni.errors import LabelError, ModelError, ShapeError
+from chladni.errors import AccuracyError, LabelError, ModelError, ShapeError
 from chladni.sparse import dissection
 from chladni.sparse.factor import backward_error, factorise, inertia
-from chladni.sparse.multifrontal import Multifrontal, NotDefinite
+from chladni.sparse.multifrontal import Multifrontal, NotDefinite, counted
 
 
 def grid(nx, ny, dofs=2):
@@ -146,3 +146,23 @@ def test_misuse_is_named():
         factorise(A, backend="mumps")
     with pytest.raises(ShapeError, match=r"5 points.*32 rows"):
         factorise(A, points[:5], nodes=nodes)
+
+
+def test_what_a_count_lets_go_of_still_makes_the_matrix():
+    """Its fronts multiplied out are A, definite ones and indefinite ones."""
+    A, points, nodes = grid(20, 14, dofs=3)
+    for shift in (0.0, 1.3, 4.1):
+        S = sp.csr_array(A - shift * sp.eye_array(A.shape[0]))
+        negative, error = counted(S, points, nodes)
+        assert negative == np.sum(np.linalg.eigvalsh(S.toarray()) < 0)
+        assert error < 1e-12  # a tenth of what proves a count
+
+
+def test_a_count_whose_pivots_grow_proves_nothing():
+    """With an eigenvalue of the first front's own block at zero, its inverse is rounding alone."""
+    A, points, nodes = grid(20, 14)
+    fronts = dissection.analyse(A, points, nodes)
+    first = fronts.order[: fronts.start[1]]
+    own = np.linalg.eigvalsh(A.toarray()[np.ix_(first, first)])[1]
+    with pytest.raises(AccuracyError, match="prove no inertia"):
+        inertia(A - own * sp.eye_array(A.shape[0]), points, nodes=nodes)

@@ -77,9 +77,8 @@ def normal_modes(
         lam, phi = _condensed(K, M, system.dofs, massive, count, limit)
     else:
         fronts = analyse(pattern(K, M), points, system.dofs[:, 0])
-        order = fronts.order  # all is done in the order of elimination
-        K_o, M_o = (A[order][:, order] for A in (K, M))
-        problem = _Problem(K_o, M_o, system.dofs[order], backend, fronts.ordered())
+        order = fronts.order  # Lanczos runs in the order of elimination
+        problem = _Problem(K, M, M[order][:, order], system.dofs, backend, fronts)
         lam, phi = _held(lambda p: _sparse(p, count, limit, shift, proof), problem)
         phi = phi[np.argsort(order)]
     keep = (lam <= limit) & (np.arange(len(lam)) < (len(lam) if count is None else count))
@@ -92,21 +91,28 @@ def normal_modes(
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """K and M, real, and the elimination order that serves every K - σM."""
+    """K and M, real, and the elimination order that serves every K - σM; M in that order too."""
 
     K: sp.csr_array
     M: sp.csr_array
+    M_o: sp.csr_array
     dofs: np.ndarray
     backend: Backend
     fronts: Fronts
 
+    def shifted(self, K: sp.csr_array, sigma: float) -> sp.csr_array:
+        """K - σM in the order of elimination."""
+        A = sp.csr_array(K - sigma * self.M)
+        A = A[self.fronts.order]
+        return A[:, self.fronts.order]
+
     def factor(self, sigma: float) -> Factor:
-        """Positive definite factorisation of K - σM; who is at fault is named."""
-        A = sp.csr_array(self.K - sigma * self.M)
+        """Positive definite factorisation of K - σM in that order; who is at fault is named."""
+        A = self.shifted(self.K, sigma)
         try:
-            return factorise(A, backend=self.backend, fronts=self.fronts)
+            return factorise(A, backend=self.backend, fronts=self.fronts.ordered())
         except NotDefinite as error:
-            at = label(*self.dofs[error.row])
+            at = label(*self.dofs[self.fronts.order[error.row]])
             raise ModelError(
                 f"K - σM is not positive definite at σ = {sigma:.2e} (seen at {at}): "
                 "a part hangs on nothing, or a stiffness is negative"
@@ -117,7 +123,7 @@ class _Problem:
         for firm, nudge in product((False, True), (0.0, 1e-7, -1e-7)):
             K = stiffened(self.K) if firm else self.K
             try:
-                return inertia(K - s * (1 + nudge) * self.M, fronts=self.fronts)[0]
+                return inertia(self.shifted(K, s * (1 + nudge)), fronts=self.fronts.ordered())[0]
             except AccuracyError:
                 continue
         raise AccuracyError(f"no Sturm count at {np.sqrt(abs(s)) / (2 * np.pi):.6g} Hz")
@@ -283,7 +289,7 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
         sigma = -_GUESS * _scale(problem.K, problem.M, problem.dofs).typical
     for _ in range(2):
         factor = problem.factor(sigma)
-        ritz = block_lanczos(factor.solve, problem.M, k)
+        ritz = block_lanczos(factor.solve, problem.M_o, k)
         known = ritz.theta[ritz.error < 1e-2]
         top = sigma + 1 / known[-1] if len(known) else 0.0
         if shift is not None or _NEAR * top < -sigma < _FAR * top:
@@ -322,7 +328,7 @@ def _completed(
     for attempt in range(1, 5):
         if (missing := due - int(np.sum(lam < s))) <= 0:
             break
-        ritz = block_lanczos(factor.solve, problem.M, missing, locked=phi, seed=attempt)
+        ritz = block_lanczos(factor.solve, problem.M_o, missing, locked=phi, seed=attempt)
         good = np.flatnonzero(ritz.error[:missing] < _LOOSE)
         lam = np.r_[lam, sigma + 1 / ritz.theta[good]]
         phi = np.hstack([phi, ritz.vectors(missing)[:, good]])
@@ -339,8 +345,9 @@ def _check_residual(
 ) -> None:
     """|A⁻¹M Φ θ⁻¹ g - Φ g|_M / |g| for random g, A = K - σM, θ = 1/(λ - σ): all modes at once."""
     g = np.random.default_rng(1).standard_normal((len(lam), 4))
-    r = factor.solve(problem.M @ (phi @ (g * (lam - sigma)[:, None]))) - phi @ g
-    size = np.sqrt(np.einsum("ij,ij->j", r, problem.M @ r) / np.einsum("ij,ij->j", g, g)).max()
+    M = problem.M_o
+    r = factor.solve(M @ (phi @ (g * (lam - sigma)[:, None]))) - phi @ g
+    size = np.sqrt(np.einsum("ij,ij->j", r, M @ r) / np.einsum("ij,ij->j", g, g)).max()
     if size > _RESIDUAL:
         raise AccuracyError(f"modes do not solve K φ = λ M φ: relative residual {size:.1e}")
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 
 from ..errors import AccuracyError, LabelError, ModelError
 from .dissection import Fronts
-from .multifrontal import Multifrontal, NotDefinite
+from .multifrontal import Multifrontal, NotDefinite, counted
 
 Backend = Literal["multifrontal", "cholmod", "superlu"]
 _BACKWARD = 1e-11  # |A x - b| / (|A| |x| + |b|) a factorisation without global pivoting must keep
@@ -164,7 +164,7 @@ def inertia(
     AccuracyError
         If A is so near to singular that the signs of its pivots prove nothing.
     """
-    factor = Multifrontal(A, points, nodes, definite=False, fronts=fronts)
-    if (error := backward_error(A, factor)) > _BACKWARD:
+    negative, error = counted(A, points, nodes, fronts)
+    if error > _BACKWARD:
         raise AccuracyError(f"pivots prove no inertia: backward error {error:.1e}")
-    return factor.negative, A.shape[0] - factor.negative
+    return negative, A.shape[0] - negative

@@ -5,7 +5,9 @@ take the same road: pivots are chosen within a front (Bunch-Kaufman), never acro
 suits K - ω²M of structures because only few fronts have negative pivots.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +25,7 @@ class _Cholesky:
 
     L11: np.ndarray
     L21: np.ndarray
+    negative: ClassVar[int] = 0  # pivots
 
     def forward(self, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What stays with the pivots and what goes to the boundary."""
@@ -32,6 +35,11 @@ class _Cholesky:
     def backward(self, y: np.ndarray, x2: np.ndarray) -> np.ndarray:
         """x_1 = L11⁻ᵀ (y - L21ᵀ x_2)."""
         return blas.dtrsm(1.0, self.L11, y.T - x2.T @ self.L21, side=1, lower=1).T
+
+    def product(self, v1: np.ndarray, v2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What this front has of A v, at its pivots and at its boundary."""
+        y = self.L11.T @ v1 + self.L21.T @ v2
+        return self.L11 @ y, self.L21 @ y
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +63,22 @@ class _Ldl:
         w = self.T.T @ (self.sign * (y - self.Z @ x2))
         x[self.order] = _unit_lower(self.L, w, transposed=True)
         return x
+
+    def product(self, v1: np.ndarray, v2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What this front has of A v: [G; Zᵀ S] S [Gᵀ v_1 + S Z v_2], G = Pᵀ L T⁻¹.
+
+        T⁻¹ = Tᵀ N⁻¹, for rows of T are orthogonal; N are their squared lengths.
+        """
+        N = np.asarray((self.T * self.T).sum(axis=1))[:, None]
+        y = self.sign * ((self.T @ (self.L.T @ v1[self.order])) / N) + self.Z @ v2
+        out = np.empty_like(v1)
+        out[self.order] = self.L @ (self.T.T @ (y / N))
+        return out, self.Z.T @ (self.sign * y)
+
+    @property
+    def negative(self) -> int:
+        """Negative pivots."""
+        return int(np.sum(self.sign < 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +115,6 @@ class Multifrontal:
     Attributes
     ----------
     fronts : Fronts   the order
-    negative : int    negative pivots (real matrices): the inertia
     """
 
     def __init__(
@@ -106,9 +129,8 @@ class Multifrontal:
         A = sp.csr_array(A)
         self.definite = definite
         self.fronts = analyse(A, points, nodes) if fronts is None else fronts
-        self.negative = 0
-        self._in_order = bool(np.all(np.diff(self.fronts.order) == 1))
-        self._parts = self._eliminate(A)
+        self._in_order = _in_order(self.fronts)
+        self._parts = list(_eliminated(A, self.fronts, definite))
 
     @property
     def nnz(self) -> int:
@@ -118,37 +140,6 @@ class Multifrontal:
     def renewed(self, A: sp.sparray) -> "Multifrontal":
         """The factorisation of another matrix whose pattern lies within this one's."""
         return Multifrontal(A, definite=self.definite, fronts=self.fronts)
-
-    def _eliminate(self, A: sp.csr_array) -> list[_Part]:
-        fronts = self.fronts
-        updates: dict[int, np.ndarray] = {}
-        A = A if self._in_order else A[fronts.order][:, fronts.order]
-        where = np.empty(A.shape[0], np.int64)
-        parts: list[_Part] = []
-        for i, children in enumerate(fronts.children):
-            begin, end, rows = fronts.start[i], fronts.start[i + 1], fronts.boundary[i]
-            where[begin:end] = np.arange(end - begin)
-            where[rows] = np.arange(end - begin, end - begin + len(rows))
-            F = _gathered(A, begin, end, where, len(rows))
-            for c in (c for c in children if c in updates):
-                _extend_add(F, where[fronts.boundary[c]], updates.pop(c))
-            parts.append(self._front(F, i))
-            if len(rows):
-                updates[i] = F[2]
-        return parts
-
-    def _front(self, F: _Blocks, i: int) -> _Part:
-        """Eliminate the pivots of one front; F22 becomes the Schur complement in place."""
-        if np.iscomplexobj(F[0]):
-            return _lu(F)
-        L11, info = lapack.dpotrf(F[0], lower=1, clean=1, overwrite_a=self.definite)
-        if info == 0:
-            return _cholesky(L11, F)
-        if self.definite:
-            raise NotDefinite(int(self.fronts.order[self.fronts.start[i] + info - 1]))
-        part = _ldl(F)
-        self.negative += int(np.sum(part.sign < 0))
-        return part
 
     def solve(self, B: np.ndarray) -> np.ndarray:
         """X = A⁻¹ B for one (n,) or several (n, k) right sides."""
@@ -166,6 +157,67 @@ class Multifrontal:
             X, solved = np.empty_like(X), X
             X[fronts.order] = solved
         return X.reshape(B.shape)
+
+
+def counted(
+    A: sp.sparray,
+    points: np.ndarray | None = None,
+    nodes: np.ndarray | None = None,
+    fronts: Fronts | None = None,
+) -> tuple[int, float]:
+    """Negative pivots of a real symmetric A, and |A v - L D Lᵀ v| / (|A| |v|) of a random v.
+
+    Fronts are let go of as they are eliminated: a count of eigenvalues needs none of them again.
+    """
+    A = sp.csr_array(A)
+    fronts = analyse(A, points, nodes) if fronts is None else fronts
+    v = np.random.default_rng(0).standard_normal((A.shape[0], 1))
+    size = np.abs(A).sum(axis=1).max() * np.abs(v).max()
+    negative, rest = 0, A[fronts.order] @ v
+    v = v[fronts.order]
+    for i, part in enumerate(_eliminated(A, fronts, definite=False)):
+        assert not isinstance(part, _Lu)
+        own, rows = slice(fronts.start[i], fronts.start[i + 1]), fronts.boundary[i]
+        here, there = part.product(v[own], v[rows])
+        rest[own] -= here
+        rest[rows] -= there
+        negative += part.negative
+    error = np.abs(rest).max() / size
+    return negative, float(error) if np.isfinite(error) else np.inf
+
+
+def _in_order(fronts: Fronts) -> bool:
+    return bool(np.all(np.diff(fronts.order) == 1))
+
+
+def _eliminated(A: sp.csr_array, fronts: Fronts, definite: bool) -> Iterator[_Part]:
+    """One front after another."""
+    updates: dict[int, np.ndarray] = {}
+    A = A if _in_order(fronts) else A[fronts.order][:, fronts.order]
+    where = np.empty(A.shape[0], np.int64)
+    for i, children in enumerate(fronts.children):
+        begin, end, rows = fronts.start[i], fronts.start[i + 1], fronts.boundary[i]
+        where[begin:end] = np.arange(end - begin)
+        where[rows] = np.arange(end - begin, end - begin + len(rows))
+        F = _gathered(A, begin, end, where, len(rows))
+        for c in (c for c in children if c in updates):
+            _extend_add(F, where[fronts.boundary[c]], updates.pop(c))
+        part = _front(F, definite, fronts.order[begin:end])
+        if len(rows):
+            updates[i] = F[2]
+        yield part
+
+
+def _front(F: _Blocks, definite: bool, pivots: np.ndarray) -> _Part:
+    """Eliminate the pivots of one front; F22 becomes the Schur complement in place."""
+    if np.iscomplexobj(F[0]):
+        return _lu(F)
+    L11, info = lapack.dpotrf(F[0], lower=1, clean=1, overwrite_a=definite)
+    if info == 0:
+        return _cholesky(L11, F)
+    if definite:
+        raise NotDefinite(int(pivots[info - 1]))
+    return _ldl(F)
 
 
 def _gathered(A: sp.csr_array, begin: int, end: int, where: np.ndarray, b: int) -> _Blocks:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..dynamics.modes import rigid_modes
 from ..ema.chain_checks import level_checks, modal_gains
@@ -136,8 +137,8 @@ def _turned(
     return values[seen], [n for n, s in zip(names, seen, strict=True) if s]
 
 
-def _rows(built: Structure, grids: np.ndarray, point: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    return np.asarray(rows_of(built, grids, np.tile(point, (len(ways), 1)), ways).toarray())
+def _rows(built: Structure, grids: np.ndarray, point: np.ndarray, ways: np.ndarray) -> sp.csr_array:
+    return rows_of(built, grids, np.tile(point, (len(ways), 1)), ways)
 
 
 def _elsewhere(
