@@ -16,12 +16,11 @@ from ..fem.modelled import modelled
 from .diagnosis import threshold
 from .left_where import bumps
 from .likelihood import LN10, Responses
+from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import (
     SOLVED,
     ZETA,
     equalised_lines,
-    measured_on,
-    nuisances,
     ready_for_responses,
     updating_problem,
 )
@@ -73,6 +72,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
     nominal = modelled(asked.searched(asked.assembly), SOLVED * f_max)
     built = nominal.structure
     rows = asked.outputs.rows(built), asked.inputs.rows(built)
+    mesh = mesh_hidden(nominal, f_max, measured_on(asked))
     reduced = ready_for_responses(asked, nominal, f_max)
     f = equalised_lines((low, f_max), asked.exclude, ZETA)
     s = 2 * np.pi * f * (ZETA + 1j)
@@ -82,7 +82,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
         noise=np.full(shape, noise / LN10), direct=asked.outputs.carried_by(asked.inputs),
         sensors=sensor_errors(asked.outputs, asked.inputs, built, asked.accuracy),
     ).over(reduced.model)  # fmt: skip
-    nuisance = nuisances(reduced, nominal, f_max, measured_on(asked))
+    nuisance = nuisances(reduced, nominal, mesh)
     problem = updating_problem(asked, reduced, unit, nuisance, f_max)
     x = problem.mean()
     state = evaluate(reduced.model, problem.base, x)

@@ -9,13 +9,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..effects.discretisation import Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
 from ..effects.freed import UNITS, defaults_of_solids, freed, freed_effect
-from ..effects.model_families import joint_nuisances, model_families
-from ..effects.ordinary import channel_gain, defaults, random_field
+from ..effects.model_families import joint_nuisances
+from ..effects.ordinary import channel_gain, defaults
 from ..effects.registry import family
 from ..effects.surroundings import Setup, Surroundings
 from ..ema.identification import Identified, equalised, identify
@@ -25,7 +23,6 @@ from ..ema.level_words import level_notes
 from ..ema.recording_noise import equalised_noise, sample_noise
 from ..ema.response_variance import noise_source
 from ..errors import FileError
-from ..fem.assemble import Structure
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
@@ -36,6 +33,7 @@ from .least_data import too_little
 from .likelihood import LN10, Poles, Responses
 from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
+from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
 from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
 from .question import Prepared, Question
@@ -44,7 +42,6 @@ from .sensor_errors import sensor_errors
 
 ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
 ZETA_Q = 0.02  # of the line on which Q is reported
-SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
 POSITION_UNCERTAIN = 5e-3  # [m]
 SAME_PLACE = 1e-6  # [m]: a sensor at the shaker
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
@@ -86,6 +83,7 @@ def _by_responses(question: Question) -> Prepared:
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
     reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
@@ -103,7 +101,7 @@ def _by_responses(question: Question) -> Prepared:
             direct=question.outputs.carried_by(question.inputs), sensors=wrong,
         )  # fmt: skip
         data.append(read.over(reduced.model))
-    nuisance = nuisances(reduced, nominal, f_max, measured_on(question))
+    nuisance = nuisances(reduced, nominal, mesh)
     if not question.gain_known:
         nuisance.append(channel_gain(len(question.outputs.labels), 1.0))
     problem = updating_problem(question, reduced, data[0], nuisance, f_max)
@@ -246,7 +244,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))
-    built = nominal.structure
+    built, mesh = nominal.structure, mesh_hidden(nominal, f_max)
     reduced = reduced_problem(nominal, f_max, groups=48, reach=FAR)
     reduced = carrying(reduced, freed_by(question, reduced, f_max))
     held = np.zeros(len(frequency), bool)
@@ -261,7 +259,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
         spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
     ).over(reduced.model)  # fmt: skip
-    nuisance = nuisances(reduced, nominal, f_max)
+    nuisance = nuisances(reduced, nominal, mesh, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
     what = f"{int(held.sum())} of {len(held)} frequencies" if held.any() else "nothing"
     notes = (*notes, *_unscored(question), *_mass_note(question))
@@ -275,34 +273,6 @@ def _unscored(question: Question) -> list[str]:
         return []
     names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
     return [f"not used, for natural frequencies are compared: {names}"]
-
-
-def measured_on(question: Question) -> Places:
-    """Rows of outputs and inputs on any mesh of the structure."""
-
-    def rows(built: Structure) -> sp.csr_array:
-        return sp.csr_array(sp.vstack([question.outputs.rows(built), question.inputs.rows(built)]))
-
-    return rows
-
-
-def nuisances(
-    reduced: ReducedProblem, model: Modelled, f_max: float, measured: Places | None = None
-) -> list[Effect]:
-    """Scatter within parts, mesh error, joints and shear: what calibration cannot remove.
-
-    Responses, which are ``measured`` somewhere, need no modal discrepancy: their likelihood allows
-    any small error of modal stiffness and mass. What is structured in that error stands beside it,
-    joints and shear of the shells by families.
-    """
-    mesh = mesh_errors(model, f_max, measured)
-    out: list[Effect] = [
-        random_field(reduced.groups, "t", SCATTER_T), random_field(reduced.groups, "E", SCATTER_E),
-        *mesh,
-    ]  # fmt: skip
-    if measured is None:
-        return [*out, modal_discrepancy(model, f_max, mesh[0] if mesh else None)]
-    return [*out, *model_families(model.structure)]
 
 
 def updating_problem(

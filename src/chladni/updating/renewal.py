@@ -11,7 +11,8 @@ from .accuracy import LIMIT, Accuracy, accuracy
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from .joint_fit import with_priors
 from .likelihood import Poles, Responses
-from .preparation import SOLVED, measured_on, nuisances, updating_problem
+from .nuisances import measured_on, mesh_hidden, nuisances
+from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
 from .reduced_problem import reduced_problem
 
@@ -101,6 +102,7 @@ def _on_new_structure(
     assert isinstance(data, (Responses, Poles))
     model = modelled(changed.searched(changed.assembly), SOLVED * f_max)
     rows = (data.outputs, data.inputs) if isinstance(data, Responses) else ()
+    mesh = mesh_hidden(model, f_max, measured_on(changed) if rows else None)
     reduced = reduced_problem(
         model, f_max, sp.csr_array(sp.vstack(rows)) if rows else None, groups=64 if rows else 48,
         base=question.base,
@@ -110,7 +112,7 @@ def _on_new_structure(
         changed,
         reduced,
         data.over(reduced.model),
-        [*nuisances(reduced, model, f_max, measured_on(changed) if rows else None), *of_test],
+        [*nuisances(reduced, model, mesh, None if rows else f_max), *of_test],
         f_max,
     )
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))

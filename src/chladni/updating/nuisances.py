@@ -1,0 +1,58 @@
+"""What no calibration removes and every fit has to allow for: scatter, mesh, joints, shear."""
+
+import scipy.sparse as sp
+
+from ..effects.discretisation import MeshError, Places, mesh_errors, modal_discrepancy
+from ..effects.effect import Effect
+from ..effects.model_families import model_families
+from ..effects.ordinary import random_field
+from ..fem.assemble import Structure
+from ..fem.modelled import Modelled
+from ..sparse.freed_memory import give_back_freed_memory
+from .question import Question
+from .reduced_problem import ReducedProblem
+
+SCATTER_T, SCATTER_E = 0.008, 0.010  # prior sd of smooth scatter within a part
+
+
+def measured_on(question: Question) -> Places:
+    """Rows of outputs and inputs on any mesh of the structure."""
+
+    def rows(built: Structure) -> sp.csr_array:
+        return sp.csr_array(sp.vstack([question.outputs.rows(built), question.inputs.rows(built)]))
+
+    return rows
+
+
+def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -> list[MeshError]:
+    """What the mesh hides: asked first, for a mesh twice as fine takes more memory than all else.
+
+    Parameters
+    ----------
+    measured : where responses were measured; frequencies alone have no place
+    """
+    errors = mesh_errors(model, f_max, measured)
+    give_back_freed_memory()
+    return errors
+
+
+def nuisances(
+    reduced: ReducedProblem, model: Modelled, mesh: list[MeshError], poles_to: float | None = None
+) -> list[Effect]:
+    """Scatter within parts, mesh error, joints and shear: what calibration cannot remove.
+
+    Responses need no modal discrepancy: their likelihood allows any small error of modal stiffness
+    and mass. What is structured in that error stands beside it, joints and shear of the shells by
+    families.
+
+    Parameters
+    ----------
+    poles_to : the highest natural frequency [Hz], where these alone are compared
+    """
+    out: list[Effect] = [
+        random_field(reduced.groups, "t", SCATTER_T), random_field(reduced.groups, "E", SCATTER_E),
+        *mesh,
+    ]  # fmt: skip
+    if poles_to is not None:
+        return [*out, modal_discrepancy(model, poles_to, mesh[0] if mesh else None)]
+    return [*out, *model_families(model.structure)]
