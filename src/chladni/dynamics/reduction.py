@@ -100,12 +100,20 @@ class Basis:
 
     def reduced(self, A: sp.csr_array) -> np.ndarray:
         """Φᵀ A Φ of a symmetric operator (r, r), which costs what A has of rows with entries."""
+        out = self._times(A, self)
+        return (out + out.T) / 2
+
+    def bordering(self, A: sp.csr_array) -> np.ndarray:
+        """Φᵀ A V of the block V that came last (r, k)."""
+        return self._times(A, type(self)(self.blocks[-1:]))
+
+    def _times(self, A: sp.csr_array, right: Self) -> np.ndarray:
         busy = np.flatnonzero(np.diff(A.indptr))
-        out = np.zeros((self.shape[1],) * 2)
+        out = np.zeros((self.shape[1], right.shape[1]))
         for start in range(0, len(busy), ROWS):
             some = busy[start : start + ROWS]
-            out += self.at(some).T @ self.seen(A[some])
-        return (out + out.T) / 2
+            out += self.at(some).T @ right.seen(A[some])
+        return out
 
 
 def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:

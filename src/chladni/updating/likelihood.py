@@ -187,8 +187,10 @@ class Responses:
         from_basis, vectors = left @ state.vectors.T, state.vectors
         for j in range(len(phi_i)):
             q = vectors @ (phi_i[j] * d).T
-            W = _each_times(state.dK, q) + _each_times(state.dM, q * self.s**2)
-            out[:, :, :, j] = -(from_basis @ W.transpose(2, 1, 0)).transpose(2, 0, 1)
+            W = _each_times(state.dK, q)
+            W += _each_times(state.dM, q * self.s**2)
+            W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
+            out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
             if state.ddrive is not None:
                 out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
         for p, moved in state.dmoved.items():

@@ -65,10 +65,19 @@ class Reduced:
 
         Rows over the dofs of the deck see no clamp's own; ``strained`` ones see what deforms.
         """
-        wide = self.wide(rows, strained)
         if keep:
-            return self._once(rows, lambda: self.vectors.seen(wide))
-        return self.vectors.seen(wide)
+            return self._once(rows, lambda: self._rows(rows, strained))
+        return self.vectors.seen(self.wide(rows, strained))
+
+    def _rows(self, rows: sp.csr_array, strained: bool) -> np.ndarray:
+        """All of them; an extended model looks at its new vectors alone."""
+        wide, inner = self.wide(rows, strained), self._within
+        if inner is None or wide.shape[1] > inner.vectors.shape[0]:
+            return self.vectors.seen(wide)
+        old = inner.rows(rows, True, strained)
+        if old.shape[1] == self.vectors.shape[1]:
+            return old
+        return np.hstack([old, wide @ self.vectors.blocks[-1][: wide.shape[1]]])
 
     def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
         """The rows; ``strained`` ones over clamps as well, less what follows them."""
@@ -90,7 +99,7 @@ class Reduced:
         r = len(old)
         if r == self.vectors.shape[1]:  # of the same basis: clamps let go
             return old
-        border = self.vectors.projected(A @ self.vectors.blocks[-1][: A.shape[0]])
+        border = self.vectors.bordering(A)
         return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
 
     def _once(self, key: sp.csr_array, made: Callable[[], np.ndarray]) -> np.ndarray:
@@ -380,7 +389,8 @@ def _add(
         w = np.vstack([w, change[:, active].T])
     every = stack.weighted(np.atleast_2d(w))
     A += every[0]
-    dA[active] += every[1:]
+    for p, slope in zip(active, every[1:], strict=True):  # in place, a matrix at a time
+        dA[p] += slope
 
 
 def _weight(
