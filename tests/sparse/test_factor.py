@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -166,3 +168,16 @@ def test_a_count_whose_pivots_grow_proves_nothing():
     own = np.linalg.eigvalsh(A.toarray()[np.ix_(first, first)])[1]
     with pytest.raises(AccuracyError, match="prove no inertia"):
         inertia(A - own * sp.eye_array(A.shape[0]), points, nodes=nodes)
+
+
+def test_a_count_takes_less_memory_than_the_factor():
+    """Only fronts that wait for their parents are held, O(n) of O(n log n)."""
+    A, points, nodes = grid(60, 60)
+    fronts, peaks = dissection.analyse(A, points, nodes), []
+    for run in (factorise, inertia):
+        tracemalloc.start()
+        kept = run(A, fronts=fronts)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        del kept
+    assert peaks[1] < 0.7 * peaks[0]

@@ -269,10 +269,12 @@ def _sparse(
         return np.zeros(0), np.zeros((len(problem.dofs), 0))
     sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
     sigma, factor, ritz = _converged(problem, k, sigma)
-    k = min(k, len(ritz.theta))
-    lam, phi = sigma + 1 / ritz.theta[:k], ritz.vectors(k)
-    if proof and len(ritz.theta) > k:
-        s, known = _gap_above(sigma + 1 / ritz.theta, ritz.error, k)
+    theta, error = ritz.theta, ritz.error
+    k = min(k, len(theta))
+    lam, phi = sigma + 1 / theta[:k], ritz.vectors(k)
+    del ritz  # half as large as the factor
+    if proof and len(theta) > k:
+        s, known = _gap_above(sigma + 1 / theta, error, k)
         if due is not None:  # the k modes are those below the limit, or some are missing
             s, known = limit, int(np.sum(lam < limit))
         due = problem.below(s) if due is None else due

@@ -8,8 +8,10 @@ from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel
 from ..errors import ModelError
 from ..model.assembly import Assembly
+from ..sparse.freed_memory import give_back_freed_memory
 from .assemble import Structure, structure
 
+LARGE = 100_000  # dofs from which the assembly has freed more than it takes to give that back
 _ROUNDING = 1e-9  # a band may be asked for again as another product of the same numbers
 
 
@@ -50,7 +52,10 @@ class Modelled:
 
 def modelled(assembly: Assembly, band: float) -> Modelled:
     """Assemble a structure and solve its modes up to ``band`` [Hz], the first whatever it is."""
-    return solved(structure(assembly), band)
+    built = structure(assembly)
+    if len(built.system.dofs) > LARGE:
+        give_back_freed_memory()
+    return solved(built, band)
 
 
 def solved(built: Structure, band: float) -> Modelled:

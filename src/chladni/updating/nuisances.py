@@ -31,6 +31,7 @@ def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -
     ----------
     measured : where responses were measured; frequencies alone have no place
     """
+    give_back_freed_memory()
     errors = mesh_errors(model, f_max, measured)
     give_back_freed_memory()
     return errors
