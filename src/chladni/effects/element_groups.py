@@ -8,7 +8,7 @@ Of a beam t is the wall of a thin tube: A (shear areas with it), I1, I2, I12 and
 that its stiffness is E t A and its mass ρ t m exactly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -78,15 +78,16 @@ class ElementGroups:
         ).tocsr()
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
-    def components(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """``linear`` and ``cubic`` by the component of the plane stiffness; beams go with Q66."""
+    def components(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+        """``linear`` and ``cubic`` by the component of the plane stiffness; beams go with Q66.
+
+        One after another: of a large sheet all of them weigh as much as all else that is known.
+        """
         m = len(self.structure.assembly.shells)
-        out = {}
-        for name, pair in component_matrices(self.structure.assembly).items():
+        for name, pair in component_matrices(self.structure.assembly):
             beams = [A[m:] if name == "Q66" else 0 * A[m:] for A in (self.linear, self.cubic)]
             A, B = (_stacked(*both) for both in zip(pair, beams, strict=True))
-            out[name] = A, B
-        return out
+            yield name, (A, B)
 
     def project(
         self, kinds: Sequence[np.ndarray], basis: Basis, last: int | None = None

@@ -5,6 +5,8 @@ t; S Z_s S grows with t and S Z_r S with t³ in value *and* first derivative, so
 split.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..fem import shell
@@ -28,8 +30,8 @@ def thickness_split(
     return linear, shell.stiffness(geo, t, Qb=arrays.Qb, S=residual, reference=reference)
 
 
-def component_matrices(assembly: Assembly) -> dict[str, Pair]:
-    """(A, B) as above for each component: ∂K/∂ln Q_k = A_k + B_k, Σ_k A_k + B_k = K.
+def component_matrices(assembly: Assembly) -> Iterator[tuple[str, Pair]]:
+    """(A, B) as above for one component after another: ∂K/∂ln Q_k = A_k + B_k, Σ_k A_k + B_k = K.
 
     Shear flexibility of the material itself and the drilling stiffness go with Q66.
     """
@@ -37,7 +39,6 @@ def component_matrices(assembly: Assembly) -> dict[str, Pair]:
     arrays = section_arrays(assembly, geo)
     t, reference = assembly.shells.thickness, arrays.Qm
     thin, _ = _shear_split(arrays)
-    out = {}
     for name, entries in COMPONENTS.items():
         Qm, Qb = _only(arrays.Qm, entries), _only(arrays.Qb, entries)
         own = name == "Q66"
@@ -46,8 +47,7 @@ def component_matrices(assembly: Assembly) -> dict[str, Pair]:
             reference=reference,
         )  # fmt: skip
         residual = arrays.shear_by_bending(geo, Qb)
-        out[name] = linear, shell.stiffness(geo, t, Qb=Qb, S=residual, reference=reference)
-    return out
+        yield name, (linear, shell.stiffness(geo, t, Qb=Qb, S=residual, reference=reference))
 
 
 def _shear_split(arrays: SectionArrays) -> Pair:

@@ -16,7 +16,15 @@ from ..errors import LabelError, ModelError
 from ..model.assembly import Assembly
 from . import shell
 from .shell_section import SectionArrays, section_arrays
-from .sparse_assembly import EVERY, INERTIA, accumulate, blocks, congruence, with_rotations
+from .sparse_assembly import (
+    EVERY,
+    INERTIA,
+    accumulate,
+    blocks,
+    congruence,
+    narrowed,
+    with_rotations,
+)
 
 EMPTY = 1e-8  # of the stiffest direction of a point: Nastran's EPZERO of AUTOSPC
 PIECE = 1024  # shells whose matrices are in memory at a time
@@ -108,6 +116,7 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     if idle.any():
         K, M, T, dofs = K[kept][:, kept], M[kept][:, kept], sp.csr_array(T[:, kept]), dofs[kept]
     labels = np.column_stack([assembly.ids[dofs[:, 0]], dofs[:, 1]])
+    K, M, T = map(narrowed, (K, M, T))
     system = System(M, congruence(T, V), K, labels)
     return Structure(assembly, T, system, congruence(T, loss))
 

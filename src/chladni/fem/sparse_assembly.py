@@ -158,6 +158,14 @@ def with_rotations(matrices: np.ndarray) -> np.ndarray:
     return wide.reshape(m, 6 * k, 6 * k)
 
 
+def narrowed(A: sp.csr_array) -> sp.csr_array:
+    """A with indices of four bytes where these suffice: eight make it a third larger."""
+    if A.indices.dtype == np.int32 or max(A.nnz, *A.shape) > np.iinfo(np.int32).max:
+        return A
+    indices, indptr = A.indices.astype(np.int32), A.indptr.astype(np.int32)
+    return sp.csr_array((A.data, indices, indptr), shape=A.shape)
+
+
 def congruence(T: sp.csr_array, A: sp.csr_array) -> sp.csr_array:
     """Tᵀ A T for symmetric A; rows of T that only pick a dof cost no product."""
     if not A.nnz:

@@ -111,7 +111,7 @@ def products(
     K, M = system.elastic @ u, system.M @ u
     logs = {k: v[groups.group, None, None] for k, v in log_fields(model, effects, x)[0].items()}
     change: np.ndarray | float = 0.0
-    for name, pair in model.pieces().items():
+    for name, pair in model.pieces():
         change = change + sum(
             np.expm1(stiffness_log(logs, name, power)) * A
             for A, power in zip(pair, (1, 3), strict=True)

@@ -18,6 +18,7 @@ from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
 from ..progress import within
+from ..sparse.freed_memory import give_back_freed_memory
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
@@ -26,7 +27,7 @@ from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .lossy_place import heard_of_damping
 from .reduced_model import evaluate
-from .search_round import search_round, taken
+from .search_round import on_common_basis, search_round, taken
 from .several import Several, several
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
@@ -101,12 +102,15 @@ def diagnose(
     plain = _plain(problem, null)
     progress("scan of the catalogue", 0.2)
     tried = candidates(problem, null)
+    give_back_freed_memory()
     hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), called, unasked(problem))
-    return _searched_beside(problem, found, within(progress, 0.8, 1.0))
+    found = _searched_beside(problem, found, within(progress, 0.8, 1.0))
+    behind = (on_common_basis(problem, t) for t in found.hypotheses[1:])  # their names are told
+    return replace(found, hypotheses=(*found.hypotheses[:1], *behind))
 
 
 def _searched_beside(problem: UpdatingProblem, found: Diagnosis, progress: Progress) -> Diagnosis:

@@ -5,7 +5,7 @@ likewise; E, t, ρ are the sums of the log fields of all effects at x.  One eval
 dense eigenproblem; derivatives are exact, because K and M are known functions of the fields.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -124,10 +124,10 @@ class Reduced:
         new = beyond(system.M, self.vectors.blocks, vectors)
         if not new.shape[1]:
             return self
-        basis, pieces = self.vectors.grown(new), self.pieces()
-        kinds = [*(A for A, _ in pieces.values()), *(B for _, B in pieces.values())]
-        *stiff, heavy = self.groups.project([*kinds, self.groups.mass], basis, new.shape[1])
-        of_t, of_t3 = stiff[: len(pieces)], stiff[len(pieces) :]
+        basis, k = self.vectors.grown(new), new.shape[1]
+        stiff: dict[str, list[np.ndarray]] = {}
+        for name, pair in self.pieces():  # the mass goes along, which costs less than alone
+            *stiff[name], heavy = self.groups.project([*pair, self.groups.mass], basis, k)
 
         def rest(old: np.ndarray, A: sp.csr_array, shells: Sequence[np.ndarray]) -> np.ndarray:
             full = basis.projected(A @ new) - sum(stack.sum(axis=0) for stack in shells)
@@ -135,19 +135,21 @@ class Reduced:
 
         return replace(
             self, vectors=basis,
-            linear={k: bordered(self.linear[k], A) for k, A in zip(pieces, of_t, strict=True)},
-            cubic={k: bordered(self.cubic[k], B) for k, B in zip(pieces, of_t3, strict=True)},
+            linear={name: bordered(self.linear[name], A) for name, (A, _) in stiff.items()},
+            cubic={name: bordered(self.cubic[name], B) for name, (_, B) in stiff.items()},
             mass=bordered(self.mass, heavy),
-            K0=rest(self.K0, system.elastic, stiff), M0=rest(self.M0, system.M, [heavy]),
+            K0=rest(self.K0, system.elastic, [A for pair in stiff.values() for A in pair]),
+            M0=rest(self.M0, system.M, [heavy]),
             base=None if self.base is None else self.base.extended(self.groups, new), _seen={},
             _within=self,
         )  # fmt: skip
 
-    def pieces(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    def pieces(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
         """Element matrices that grow with t and with t³, by the names of ``linear``."""
         if "" in self.linear:
-            return {"": (self.groups.linear, self.groups.cubic)}
-        return self.groups.components()
+            yield "", (self.groups.linear, self.groups.cubic)
+        else:
+            yield from self.groups.components()
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
         """The same model, split into components where the effect changes one of them."""
@@ -158,7 +160,7 @@ class Reduced:
         """The same model with the plane stiffness split into its four components."""
         linear: dict[str, MatrixStack] = {}
         cubic: dict[str, MatrixStack] = {}
-        for name, pair in self.groups.components().items():
+        for name, pair in self.groups.components():
             linear[name], cubic[name] = map(Whole, self.groups.project(pair, self.vectors))
         return replace(self, linear=linear, cubic=cubic)
 

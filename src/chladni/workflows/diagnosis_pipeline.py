@@ -21,6 +21,7 @@ from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
+from ..sparse.freed_memory import give_back_freed_memory
 from ..updating.confusers import with_confusers
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
@@ -122,6 +123,7 @@ def explained(
 def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """The result of an explanation: the decks as they are written, and every number from them."""
     case, asked, prepared, found = known.case, known.asked, known.prepared, known.found
+    give_back_freed_memory()
     progress("the updated deck", 0.85)
     stages, lost = _updated(case, asked, prepared, found)
     progress("scores", 0.95)
