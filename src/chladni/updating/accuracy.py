@@ -18,7 +18,8 @@ import scipy.sparse as sp
 from ..dynamics.reduction import beyond
 from ..effects.effect import Effect
 from .effect_dofs import own_part, own_positions
-from .reduced_model import Reduced, State, evaluate, log_fields, mass_log, slices, stiffness_log
+from .field_factors import mass_log, stiffness_log
+from .reduced_model import Reduced, State, evaluate, log_fields, slices
 from .reduced_problem import ReducedProblem
 
 LIMIT = 5e-4  # relative frequency error of a basis that still serves

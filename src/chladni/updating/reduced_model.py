@@ -23,6 +23,7 @@ from ..fem.base_motion import BaseMotion
 from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import own_part, own_positions, row, with_own
+from .field_factors import mass_log, stiffness_log
 from .matrix_stack import MatrixStack, Whole, bordered
 
 
@@ -347,20 +348,6 @@ def log_fields(
             logs[change.field] = logs[change.field] + change.value
             slopes[change.field][:, at] += change.gradient
     return logs, slopes
-
-
-def stiffness_log(fields: dict[str, np.ndarray], component: str, power: int) -> np.ndarray:
-    """E + p t + Q: the logarithm of what multiplies stiffness that grows with t^p.
-
-    It is linear in the fields, so it stands for their gradients as well; (g, ...) as they are.
-    """
-    plain = fields["E"] + power * fields["t"]
-    return plain + fields[component] if component else plain
-
-
-def mass_log(fields: dict[str, np.ndarray]) -> np.ndarray:
-    """ρ + t: the logarithm of what multiplies the shells' mass, or its gradient."""
-    return fields["rho"] + fields["t"]
 
 
 def _shells(
