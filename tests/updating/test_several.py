@@ -236,7 +236,7 @@ def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monk
     monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
     monkeypatch.setattr(diagnosing, "adequacy", lambda *given, **more: fits)
     quiet = Diagnosis(null, null, null, (lead,), "nothing missing")
-    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None)
+    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
     found = diagnosing._searched_beside(problem, quiet, lambda text, share: None)
     assert (found.verdict, found.sets) == ("nothing missing", ())
 
