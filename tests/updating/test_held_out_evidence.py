@@ -53,7 +53,7 @@ def test_predictive_density_is_that_of_the_joint_gaussian(reduced, faulty):
     """Every fold given the others, from the covariance of all residuals."""
     data, null, _ = faulty
     fit, data = null.fit, null.data
-    r, J = data.scaled(fit.state, True)
+    r, J = data.scaled(evaluate(null.model, fit.effects, fit.x), True)
     folds = np.arange(len(r)) % 5
     p = fit.effects[0].parameters[0]
     J = np.concatenate([J, fit.state.dweight[None] / SCALES.sd])

@@ -103,7 +103,7 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
         hypothesis.model,
     )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
-    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None)
+    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
     judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
     assert judged.verdict == called
     assert (judged.written is not None) == (called == NAMED)
