@@ -45,6 +45,7 @@ JOINED = {  # structures of the set joints, by what is put into them
     "weld-missing": ("lidded box", "bolted bracket"),
     "adhesive-stiffness": ("bonded plates", "tailgate"),
     "hem-contact": ("tailgate",),
+    "viscoelastic-joint": ("bonded plates",),
 }
 IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support", "point-mass")
 

@@ -10,7 +10,7 @@ from chladni.geometry.facets import point_normals, tangents
 from chladni.model.assembly import Assembly, Masses
 
 from .footing import Spots, nearest_rows, rows_of_part
-from .response_of_article import Coupling
+from .response_of_article import Coupling, Law
 
 FACING = 0.85  # cosine between normals of one face
 LEAST = 12  # points of a patch
@@ -100,6 +100,7 @@ class Hidden:
     couplings : tuple       what depends on frequency or is no symmetric matrix
     spoil : Spoil           what happens to the recording
     unweighed : float       mass that is on the article in the test, not on the balance [kg]
+    law : Law or None       E(s)/E - 1 of the parts that have a loss factor (of 1, as a mark)
     """
 
     article: Assembly
@@ -107,6 +108,7 @@ class Hidden:
     couplings: tuple[Coupling, ...] = ()
     spoil: Spoil = field(default=_same)
     unweighed: float = 0.0
+    law: Law | None = None
 
 
 def with_lumps(assembly: Assembly, rows: np.ndarray, mass: float) -> Assembly:

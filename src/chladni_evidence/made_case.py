@@ -91,7 +91,8 @@ class _Rig:
         phi_o = seen(modes, out, self.bench.outputs.directions)
         phi_i = seen(modes, drive, self.bench.drive.directions)
         zeta = self.zeta[np.minimum(np.arange(phi_o.shape[1]), len(self.zeta) - 1)]
-        return accelerance(modes, phi_o, phi_i, zeta, lines, hidden.couplings), modes
+        H = accelerance(modes, phi_o, phi_i, zeta, lines, hidden.couplings, hidden.law)
+        return H, modes
 
 
 def made_case(

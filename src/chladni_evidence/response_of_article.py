@@ -9,6 +9,7 @@ from .article_modes import ArticleModes
 from .footing import Footing
 
 LINES_AT_ONCE = 64
+Law = Callable[[np.ndarray], np.ndarray]  # complex (n_f,) of s (n_f,) [rad/s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +41,15 @@ def accelerance(
     zeta: np.ndarray,
     frequency: np.ndarray,
     couplings: Sequence[Coupling] = (),
+    law: Law | None = None,
 ) -> np.ndarray:
-    """H = s² Φ_o [s² + 2ζω_r s + ω_r² + iL + Σ BᵀD(s)B]⁻¹ Φ_iᵀ, line by line (n_f, n_out, n_in).
+    """H = s² Φ_o [s² + 2ζω_r s + ω_r² + e(s)L + Σ BᵀD(s)B]⁻¹ Φ_iᵀ, line by line (n_f, n_out, n_in).
 
     Parameters
     ----------
     phi_out, phi_in : (n_out, r), (n_in, r)
     zeta : (r,)
+    law : e(s) of what has losses; i where it is not given
     """
     s = 2j * np.pi * frequency
     w = 2 * np.pi * modes.frequency
@@ -57,7 +60,8 @@ def accelerance(
     out = []
     for k in range(0, len(s), LINES_AT_ONCE):
         part = slice(k, k + LINES_AT_ONCE)
-        Z = d[part, :, None] * np.eye(len(w)) + 1j * modes.loss
+        e = np.full(len(s[part]), 1j) if law is None else law(s[part])
+        Z = d[part, :, None] * np.eye(len(w)) + e[:, None, None] * modes.loss
         for B, stiffness in tied:
             Z = Z + np.einsum("nr,fnm,mq->frq", B, stiffness(s[part]), B, optimize=True)
         out.append(

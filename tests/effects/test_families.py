@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
@@ -13,6 +14,8 @@ from chladni.effects import registry
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.family import Article
+from chladni.effects.identified_damping import IdentifiedDamping
+from chladni.effects.joints import beads, stiffness
 from chladni.effects.model_families import model_families
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
@@ -82,13 +85,23 @@ def recorded(reduced, sensors):
     return replace(data, values=data.model(stiffer) * gains)
 
 
+def damped_at_beads(reduced):
+    """1 % of damping, and more by what the adhesive has of each mode's strain energy."""
+    f, phi = reduced.frequency[FLEXIBLE], reduced.model.basis[:, FLEXIBLE]
+    K = sum(stiffness(reduced.structure, bead) for bead in beads(reduced.structure)[:1])
+    energy = np.einsum("nr,nr->r", phi, K @ phi) if sp.issparse(K) else 0 * f
+    ratio = 0.01 + 0.1 * energy / f**2 / max((energy / f**2).max(), 1e-300)
+    return IdentifiedDamping(f, ratio, np.full(len(f), 0.02))
+
+
 def ground(deck, fine, sensors):
     reduced = reduced_problem(on_firm_springs(deck), TOP)
     hangers = sensors[1], sensors[3]
     shares = tuple(((int(g), 1.0),) for g in sensors)
     drive = int(sensors[4]), (0.0, 0.0, 1.0)
     drives = ((((drive[0], 1.0),), drive[1]),)
-    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP, drives)
+    damping = damped_at_beads(reduced)
+    setup = Setup(shares, hangers, mass_properties(deck)[0], TOP, drives, damping)
     f = reduced.frequency[FLEXIBLE] * 1.02
     every = np.ones(len(f), bool)
     poles = Poles(f, 1e-3 + 0 * f, every, every + 0.0, (5.0, TOP))

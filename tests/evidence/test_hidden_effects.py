@@ -23,6 +23,7 @@ from chladni_evidence.hidden_kinds import (
     stiffness_patch,
     thinning,
 )
+from chladni_evidence.joint_kinds import viscoelastic
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
 from chladni_evidence.pair_kinds import APART, PAIRS, together
 from chladni_evidence.part_scatter import WELDS, scattered
@@ -134,6 +135,31 @@ def test_foam_is_stiffer_and_lossy_between_its_limits(site):
     assert slow == pytest.approx(k, rel=1e-3)
     assert abs(fast) == pytest.approx(k * (1 + relaxed), rel=1e-3)
     assert middle.imag / middle.real > 0.5
+
+
+def test_a_mastic_is_stiffer_and_lossy_between_its_limits():
+    """E(s)/E - 1 of a real part that rises, a loss that is positive, and both as told between."""
+    a = FORMS["bonded plates"].made(0)
+    bonded = Site(a, None, None, None, 1.0, 40.0, TOP, ("lower",), np.zeros(3), ())
+    hidden = viscoelastic(bonded, np.random.default_rng(8), 1.0)
+    truth, f = hidden.truth, np.geomspace(1, 4000, 50)
+    e = 1 + hidden.law(2j * np.pi * f)
+    assert (np.diff(e.real) > 0).all()
+    assert (e.imag > 0).all()
+    middle = 1 + hidden.law(np.array([2j * np.pi * np.sqrt(40.0 * TOP)]))[0]
+    assert middle.real == pytest.approx(1.0)
+    assert middle.imag == pytest.approx(truth["loss factor"])
+    part = hidden.article.parts[hidden.article.part(truth["part"])]
+    assert part.section.material.E == truth["E"]
+    rows = a.rows([1])
+    modes = article_modes(hidden.article, rows, rows, TOP)
+    flat = seen_on(modes, hidden.law)
+    assert np.abs(flat / seen_on(modes, lambda s: 0 * s) - 1).max() > 0.05
+
+
+def seen_on(modes, law):
+    phi = modes.shapes[0, 2:3]
+    return accelerance(modes, phi, phi, np.full(phi.shape[1], 0.01), LINES, law=law)
 
 
 def test_a_crack_takes_bending_alone(site):

@@ -18,7 +18,7 @@ from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
 from chladni.updating.measured_frequencies import widened
 from chladni.updating.preparation import _own_modes
-from chladni.updating.reduced_model import _eigen
+from chladni.updating.real_modes import real_modes
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
 from chladni.workflows.diagnose import diagnose
@@ -196,9 +196,9 @@ def test_a_wide_band_says_nothing_of_what_lies_far_below_it() -> None:
 def test_a_rigid_mode_in_the_middle_is_no_negative_stiffness() -> None:
     """Six rigid modes of seven: rounding about zero is not compared with a rigid mode."""
     lam = np.array([-2e-5, -1e-5, 0, 1e-5, 1e-5, 2e-5, 2.5e6])
-    assert _eigen(np.diag(lam), np.eye(7))[0][-1] == pytest.approx(2.5e6)
+    assert real_modes(np.diag(lam), np.eye(7))[0][-1] == pytest.approx(2.5e6)
     with pytest.raises(ChladniError, match="negative stiffness"):
-        _eigen(np.diag([-100.0, *lam[1:]]), np.eye(7))
+        real_modes(np.diag([-100.0, *lam[1:]]), np.eye(7))
 
 
 def test_what_a_rig_rings_with_bears_no_name():

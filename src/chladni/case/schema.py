@@ -55,7 +55,7 @@ PLACED = (  # where they act is known
     "orthotropic-material", "sensor-mass", "suspension", "shaker-restraint",
 )  # fmt: skip
 PLANNED = (  # names of the public contract that no model stands behind yet
-    "viscoelastic-joint", "rattle", "joint-friction",
+    "rattle", "joint-friction",
 )  # fmt: skip
 FREEABLE = (*FIELDS, *ALIASES, *PLACED)
 

@@ -87,7 +87,7 @@ def _of_one(
     K, sd = family
     own = stiffness(built, bead)
     others = sp.csr_array(K - own)
-    E = _modulus(built.assembly, bead)
+    E = modulus_of(built.assembly, bead)
     unit, scale = ("of the deck's", 1.0) if E is None else ("Pa", E)
     unknown: tuple[Parameter, ...] = (
         Parameter("E", unit, 0.0, SD, scale, step=1.0, starts=STARTS),
@@ -108,7 +108,7 @@ def _parts(assembly: Assembly, bead: Connection) -> list[Part]:
     return [assembly.parts[int(p)] for p in np.unique(group.part[bead.elements])]
 
 
-def _modulus(assembly: Assembly, bead: Connection) -> float | None:
+def modulus_of(assembly: Assembly, bead: Connection) -> float | None:
     """E [Pa] where all of the bead has the same."""
     values = {
         p.section.material.E
@@ -134,7 +134,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
         raise ModelError("the structure has no bead of adhesive")
     bead = found[int(rng.integers(len(found)))]
     factor = float(np.exp(rng.uniform(-3.0, -2.0)))
-    E = (_modulus(article.assembly, bead) or 1.0) * factor
+    E = (modulus_of(article.assembly, bead) or 1.0) * factor
     truth = {"point_m": bead.point.tolist(), "value": E, "parameters": {"E": E}}
     made = with_factor_on(article.assembly, bead, factor)
     return replace(article, assembly=made, truth=truth)

@@ -98,6 +98,35 @@ class PointTerm:
 
 
 @dataclass(frozen=True, eq=False)
+class Rise:
+    """How stiffness c A rises with frequency and dissipates: c G A G in its place, η of it lost.
+
+    G = Φ diag(g) ΦᵀM on the modes Φ of the model as it is without the rise, g = (f/f_0)^p: a mode
+    meets the stiffness of its own frequency, what it mixes with the geometric mean of both. What is
+    so multiplied stays positive.
+
+    Attributes
+    ----------
+    power, gradient : p, (n_parameters,)
+    reference : f_0 [Hz]
+    band : (low, high) Hz beyond which it rises no more: nothing was measured there
+    loss, loss_gradient : η, (n_parameters,)
+    """
+
+    power: float
+    gradient: np.ndarray
+    reference: float
+    band: tuple[float, float]
+    loss: float
+    loss_gradient: np.ndarray
+
+    def log_frequency(self, lam: np.ndarray) -> np.ndarray:
+        """ln f/f_0 within the band, of modes with these λ (m,)."""
+        f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
+        return np.asarray(np.log(np.clip(f, *self.band) / self.reference))
+
+
+@dataclass(frozen=True, eq=False)
 class MatrixTerm:
     """c A added to K or M: A (n, n) symmetric, c, dc/dx (n_parameters,)."""
 
@@ -105,6 +134,21 @@ class MatrixTerm:
     operator: sp.csr_array
     coefficient: float
     gradient: np.ndarray
+    rise: Rise | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What an effect knows of the test beside what is compared: whitened residuals r (k,).
+
+    Their slopes by its own parameters (k, n_parameters), and by λ and by the damping ratio that
+    effects bring of every mode of the state (k, modes).
+    """
+
+    r: np.ndarray
+    gradient: np.ndarray
+    by_lam: np.ndarray
+    by_dissipated: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +229,18 @@ class Effect:
         """What it does to the motion of the very places that were measured."""
         return None
 
+    def beside(self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray) -> Beside | None:
+        """What it is held against beside the data, at λ (m,) and damping that effects bring (m,).
+
+        ``neg2_log_without`` is -2 ln p of the same where it does not act.
+        """
+        return None
+
+    @property
+    def neg2_log_without(self) -> float:
+        """-2 ln p, without the effect, of what :meth:`beside` holds it against."""
+        return 0.0
+
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
@@ -225,6 +281,10 @@ class Effect:
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The structure with the effect written into it."""
         return assembly
+
+    def deck_comment(self, x: np.ndarray) -> str:
+        """What of it no card that is written holds, for whoever runs the deck; "" where none is."""
+        return ""
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Physical values of the parameters with their 95 % intervals.

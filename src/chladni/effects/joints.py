@@ -205,20 +205,28 @@ def _bushes(assembly: Assembly) -> Iterator[Connection]:
         yield Connection("bushes", 0, np.array([row]), ids, assembly.bushes.place[row])
 
 
-def with_factor_on(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
+def with_factor_on(
+    assembly: Assembly, joint: Connection, factor: float, loss: float | None = None
+) -> Assembly:
     """The assembly with the stiffness of a joint times a factor; its mass stays.
 
     Solids and bars get a part of their own, unless all of their part is in the joint.
+
+    Parameters
+    ----------
+    loss : loss factor it has as well; None: that of the deck
     """
     old = members(assembly, joint.kind, joint.group)
     if joint.kind == "bushes":
-        stiffness = old.stiffness.copy()
+        stiffness, lost = old.stiffness.copy(), old.loss.copy()
         stiffness[joint.elements] *= factor
-        return replace(assembly, bushes=replace(assembly.bushes, stiffness=stiffness))
+        if loss is not None:
+            lost[joint.elements] = loss
+        return replace(assembly, bushes=replace(old, stiffness=stiffness, loss=lost))
     parts, part = list(assembly.parts), old.part.copy()
     for p in np.unique(part[joint.elements]):
         mine = joint.elements[part[joint.elements] == p]
-        new = _stiffer(parts[int(p)], factor)
+        new = _stiffer(parts[int(p)], factor, loss)
         if _only_here(assembly, int(p), len(mine)):
             parts[int(p)] = new
             continue
@@ -262,10 +270,11 @@ def _only_here(assembly: Assembly, part: int, count: int) -> bool:
     return sum(int((g.part == part).sum()) for g in groups) == count
 
 
-def _stiffer(part: Part, factor: float) -> Part:
-    """The part with E (and G) times a factor."""
+def _stiffer(part: Part, factor: float, loss: float | None = None) -> Part:
+    """The part with E (and G) times a factor, and a loss factor where one is given."""
     assert isinstance(part.section, SolidSection | BeamSection)
     m = part.section.material
     assert isinstance(m, Isotropic)
     G = None if m.G is None else m.G * factor
-    return part.with_section(material=replace(m, E=m.E * factor, G=G))
+    damping = m.damping if loss is None else loss
+    return part.with_section(material=replace(m, E=m.E * factor, G=G, damping=damping))

@@ -29,6 +29,7 @@ from . import (
     stiffness_patch,
     suspension,
     thickness_distribution,
+    viscoelastic_joint,
     weld_compliance,
     weld_missing,
 )
@@ -56,6 +57,7 @@ BUILT_IN = (
     over_constraint.FAMILY,
     compliant_support.FAMILY,
     shaker_restraint.FAMILY,
+    viscoelastic_joint.FAMILY,
 )
 _added: dict[str, Family] = {}
 

@@ -13,6 +13,7 @@ from ..geometry.beam_lines import lines
 from ..geometry.facets import point_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample
 from .element_groups import ElementGroups
+from .identified_damping import IdentifiedDamping
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,7 @@ class Setup:
     weight : mass of the structure [kg]
     f_max : highest frequency of interest [Hz]
     drives : of each force the (grid id, weight) it acts on, and its direction
+    damping : of the modes that were identified, where responses are compared
     """
 
     sensors: tuple[Share, ...]
@@ -33,6 +35,7 @@ class Setup:
     weight: float
     f_max: float
     drives: tuple[tuple[Share, tuple[float, float, float]], ...] = ()
+    damping: IdentifiedDamping | None = None
 
     @property
     def stiffness(self) -> float:

@@ -9,18 +9,19 @@ what the basis lacks no less than about 4ab/(a+b)² of it (Kantorovich's inequal
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import beyond
-from ..effects.effect import Effect
+from ..effects.effect import Effect, FieldChange, MatrixTerm
 from .effect_dofs import own_part, own_positions
 from .field_factors import mass_log, stiffness_log
 from .reduced_model import Reduced, State, evaluate, log_fields, slices
 from .reduced_problem import ReducedProblem
+from .rising import UnrisenModes, applied
 
 LIMIT = 5e-4  # relative frequency error of a basis that still serves
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid
@@ -120,6 +121,7 @@ def products(
     K = K + _spread(model, np.asarray(change), u)
     M = M + _spread(model, np.expm1(mass_log(logs)) * groups.mass, u)
     K, M = (np.pad(A, ((0, n_own), (0, 0))) for A in (K, M))
+    frame = _without_rise(model, effects, x)
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
             rows = model.wide(term.rows, term.strained)
@@ -130,9 +132,37 @@ def products(
             K, M = (K + added, M) if term.matrix == "K" else (K, M + added)
         for part in effect.matrices(x[at]):
             m = part.operator.shape[0]
-            added = np.pad(part.coefficient * (part.operator @ u[:m]), ((0, len(q) - m), (0, 0)))
+            strained = applied(part, u[:m], frame, system.M)
+            added = np.pad(part.coefficient * strained, ((0, len(q) - m), (0, 0)))
             K, M = (K + added, M) if part.matrix == "K" else (K, M + added)
     return K, M
+
+
+@dataclass(frozen=True, eq=False)
+class _Level(Effect):
+    """An effect whose stiffness does not rise."""
+
+    of: Effect = field(default_factory=Effect)
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """As of the effect."""
+        return self.of.fields(x)
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """The same without their rise."""
+        return tuple(replace(part, rise=None) for part in self.of.matrices(x))
+
+
+def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> UnrisenModes:
+    """The modes in which stiffness that rises is multiplied; none where nothing rises."""
+    rising = {
+        id(e) for e, at in slices(effects) if any(m.rise is not None for m in e.matrices(x[at]))
+    }
+    if not rising:
+        return UnrisenModes(np.zeros(0), np.zeros((model.vectors.shape[0], 0)))
+    level = [_Level(e.parameters, of=e) if id(e) in rising else e for e in effects]
+    state = evaluate(model, level, x, gradient=False)
+    return UnrisenModes(state.lam, model.vectors.combined(state.phi))
 
 
 def _spread(model: Reduced, matrices: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -7,42 +7,39 @@ or another rubbing part damps some modes many times as much. A test on that scat
 frequencies and shapes are met.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
+from ..effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
 from ..ema.identification import Identified
+from .reduced_model import State
 from .result import FitStatistic
 
-SCATTER, LOG_SD = 0.33, 0.3  # prior of the standard deviation of ln ζ: its median, and of its ln
+LOG_SD = 0.3  # prior sd of ln of the standard deviation of ln ζ, about its median SCATTER
 FEWEST = 5  # modes below which a scatter says nothing
 UNSURE = 0.3  # sd of ln ζ from the identification above which a mode has no say
 STRONG = 0.02  # of the median share of χ²: a weaker pole may be the identification's own clutter
 DRAWS = 4000
+LEAST_LEFT = 0.1  # of a damping ratio is left at least, whatever a named effect takes of it
 
 
 @dataclass(frozen=True, eq=False)
-class ModalDamping:
-    """Identified damping of the modes that are compared.
+class ModalDamping(IdentifiedDamping):
+    """Identified damping of the modes that are compared, and whether it is uneven."""
 
-    Attributes
-    ----------
-    frequency : (n,) Hz
-    ratio : (n,)           ζ
-    sd : (n,)              of ln ζ, from the identification
-    """
+    def beyond(self, state: State) -> Self:
+        """What is left of it beside what the effects of a state dissipate: ζ ζ_0 / (ζ_0 + ζ_e).
 
-    frequency: np.ndarray
-    ratio: np.ndarray
-    sd: np.ndarray
-
-    def of(self, keep: np.ndarray) -> "ModalDamping":
-        """Some of the modes (n,) bool."""
-        return ModalDamping(self.frequency[keep], self.ratio[keep], self.sd[keep])
-
-    def above(self, frequency: float) -> "ModalDamping":
-        """The modes above a frequency [Hz]: what swings on cords is damped by them."""
-        return self.of(self.frequency > frequency)
+        ζ_0 is the median of ζ - ζ_e.
+        """
+        if state.dissipated is None:
+            return self
+        f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
+        more = paired_with(self.frequency, f)[0] @ state.dissipated.ratio
+        usual = float(np.median(np.maximum(self.ratio - more, LEAST_LEFT * self.ratio)))
+        return replace(self, ratio=self.ratio * usual / (usual + more))
 
     def tested(self) -> tuple[float, FitStatistic]:
         """Chance that one structure is damped as unevenly upwards as this, and its statistic.

@@ -133,14 +133,16 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     winner = diagnosis.found or diagnosis.null
     if diagnosis.found:
         winner = _about_itself(problem, winner)
+    lost, damping = winner.fit.state.dissipated, problem.damping
+    damping = None if damping is None else damping.beyond(winner.fit.state)
     fits = adequacy(
-        winner, problem.mass_measurement, problem.labels, damping=problem.damping,
-        coupling=problem.coupling,
+        winner, problem.mass_measurement, problem.labels, damping=damping,
+        coupling=problem.coupling if lost is None else None,  # its responses have complex modes
     )  # fmt: skip
     if fits is None:
         return diagnosis
     name = winner.name if diagnosis.found else "calibration alone"
-    fits = heard_of_damping(fits, winner, problem.damping)
+    fits = heard_of_damping(fits, winner, damping)
     note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
     if fits.passes:
         return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))

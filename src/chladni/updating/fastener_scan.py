@@ -100,7 +100,7 @@ def loosened_receptance(
     beyond, still = data.s**2 - sigma, 1 / (state.lam + sigma)
     follow = d - still + beyond[:, None] * still**2
     b = reduced.model.rows(one.joint.rows, keep=False) @ state.phi
-    G = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+    G = data.receptance(state, phi_o, phi_i, d)
     G_ob = np.einsum("or,fr,br->fob", phi_o, d, b, optimize=True)
     G_bi = np.einsum("br,fr,ir->fbi", b, d, phi_i, optimize=True)
     R = one.R + beyond[:, None, None] * one.N

@@ -11,7 +11,7 @@ from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
-from .map_fit import Fit, MassMeasurement, beside, fit, unknowns
+from .map_fit import Fit, MassMeasurement, beside, constants, fit
 from .reduced_model import Reduced, State, evaluate
 from .reduced_problem import ReducedProblem
 
@@ -170,15 +170,13 @@ def _fit_responses(
 ) -> Fit:  # fmt: skip
     """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
     assert data.error is not None
-    constant = sum(2 * np.log(effect.trials_factor) for effect in effects)
-    constant += sum(2 * np.log(p.sd) for p in unknowns(effects))
     for _ in range(ROUNDS):
         found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
         r0, J0 = beside(effects, mass_measurement, found.x, found.state)
         likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
-        S = likely.neg2_log_evidence + float(constant)
+        S = likely.neg2_log_evidence + constants(effects)
         found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break

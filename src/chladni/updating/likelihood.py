@@ -78,10 +78,20 @@ class Responses:
         return replace(self, a=a, b=b, sensors=sensors)
 
     def model(self, state: State) -> np.ndarray:
-        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in)."""
-        phi_o, phi_i, d = self.modal(state)
-        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
+
+        Where effects dissipate, of modes that are complex (:mod:`.rising`).
+        """
+        H = self.receptance(state, *self.modal(state))
         return self.s[:, None, None] ** self.power * H + self.direct
+
+    def receptance(
+        self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray
+    ) -> np.ndarray:
+        """Of modes as :meth:`modal` gives them, made complex by what dissipates."""
+        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        lost = state.dissipated
+        return H if lost is None else H + lost.seen(self.s, d, phi_o, phi_i)
 
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).
@@ -178,7 +188,7 @@ class Responses:
         they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
-        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        H = self.receptance(state, phi_o, phi_i, d)
         H = H + self.direct / self.s[:, None, None] ** self.power
         assert state.dK is not None
         assert state.dM is not None
@@ -193,6 +203,9 @@ class Responses:
             out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
             if state.ddrive is not None:
                 out[:, :, :, j] += np.einsum("for,pr->pfo", left, state.ddrive[:, j], optimize=True)
+        if state.dissipated is not None:
+            for p, seen in state.dissipated.seen_slopes(self.s, d, phi_o, phi_i):
+                out[p] += seen
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
             out[p] += np.einsum("or,fr,ir->foi", moved_o, d, phi_i, optimize=True)
@@ -223,7 +236,7 @@ def _each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
     return out
 
 
-def _along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
+def along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
     """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
     return np.einsum("rk,prk->pk", phi, A @ phi)
 
@@ -324,7 +337,7 @@ class Poles:
         assert state.dK is not None
         assert state.dM is not None
         J, phi = np.zeros((len(r), len(state.dK))), state.vectors[:, model]
-        dlam = _along(state.dK, phi) - lam * _along(state.dM, phi)
+        dlam = along(state.dK, phi) - lam * along(state.dM, phi)
         J[test] = (dlam / (2 * lam) / sd[test]).T
         return r[use], J[use]
 

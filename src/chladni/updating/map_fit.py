@@ -4,7 +4,7 @@
 (MacKay 2003, Information Theory, Inference, and Learning Algorithms, ch. 27-28).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Self
@@ -13,8 +13,8 @@ import numpy as np
 
 from ..effects.effect import Effect, Parameter
 from ..errors import ModelError
-from .likelihood import Data
-from .reduced_model import Reduced, State, evaluate
+from .likelihood import Data, along
+from .reduced_model import Reduced, State, evaluate, slices
 
 
 class Status(Enum):
@@ -90,12 +90,43 @@ def beside(
     """Whitened residuals and slopes of what is known beside the data: priors and the scales."""
     priors = unknowns(effects)
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
-    r, J = (x - mean) / sd, np.diag(1 / sd)
-    if mass_measurement is None:
-        return r, J
-    row = state.dweight[None] / mass_measurement.sd
-    off = (state.weight - mass_measurement.mass) / mass_measurement.sd
-    return np.append(r, off), np.concatenate([J, row])
+    r, J = [(x - mean) / sd], [np.diag(1 / sd)]
+    if mass_measurement is not None:
+        J.append(state.dweight[None] / mass_measurement.sd)
+        r.append(np.array([(state.weight - mass_measurement.mass) / mass_measurement.sd]))
+    for off, slope in _by_effects(effects, x, state):
+        r.append(off)
+        J.append(slope)
+    return np.concatenate(r), np.concatenate(J)
+
+
+def _by_effects(
+    effects: Sequence[Effect], x: np.ndarray, state: State
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Residuals and slopes of what effects know beside the data."""
+    lost = state.dissipated
+    if lost is None:
+        return
+    for effect, at in slices(effects):
+        known = effect.beside(x[at], state.lam, lost.ratio)
+        if known is None:
+            continue
+        slope = np.zeros((len(known.r), len(x)))
+        if state.dK is not None and state.dM is not None:
+            dlam = along(state.dK, state.vectors) - state.lam * along(state.dM, state.vectors)
+            slope = known.by_lam @ dlam.T + known.by_dissipated @ lost.slopes.T
+            slope[:, at] += known.gradient
+        yield known.r, slope
+
+
+def constants(effects: Sequence[Effect]) -> float:
+    """Of -2 ln evidence, from the effects: widths of priors, places tried, what is told without.
+
+    What an effect is held against beside the data counts for it by how much likelier it is with
+    the effect than without: all hypotheses are compared on the same.
+    """
+    widths = sum(2 * np.log(p.sd) for p in unknowns(effects))
+    return float(widths + sum(2 * np.log(e.trials_factor) - e.neg2_log_without for e in effects))
 
 
 def fit(
@@ -115,9 +146,7 @@ def fit(
     start : (n_p,)      where to begin
     tol : float        stop when a step improves -2 ln posterior by less
     """
-    priors = unknowns(effects)
-    sd = np.array([p.sd for p in priors])
-    limit = np.array([p.step for p in priors])
+    limit = np.array([p.step for p in unknowns(effects)])
 
     def objective(x: np.ndarray, gradient: bool) -> tuple[np.ndarray, np.ndarray, State]:
         state = evaluate(model, effects, x, gradient)
@@ -128,9 +157,8 @@ def fit(
     x, r, J, state, status = descend(objective, start, limit, max_steps, tol)
     cost = float(r @ r)
     A = J.T @ J
-    S = cost + np.linalg.slogdet(A)[1] + 2 * np.log(sd).sum()
-    S += sum(2 * np.log(effect.trials_factor) for effect in effects)
-    own = r[: len(r) - len(x) - (mass_measurement is not None)]
+    S = cost + np.linalg.slogdet(A)[1] + constants(effects)
+    own = r[: len(r) - len(beside(effects, mass_measurement, x, state)[0])]
     return Fit(tuple(effects), x, np.linalg.inv(A), float(own @ own), float(S), state, data, status)
 
 

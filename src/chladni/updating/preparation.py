@@ -133,8 +133,9 @@ def _by_responses(question: Question) -> Prepared:
         notes.append("the gain is unknown: one real factor common to all channels is free")
     notes.append(_sensor_note(question))
     notes += _mass_note(question)
-    damping, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
-    problem = replace(problem, damping=damping, coupling=coupling)
+    known, coupling = modal_damping(found, low, fit_max), mode_coupling(found, low, fit_max)
+    setup = replace(problem.setup, damping=known)
+    problem = replace(problem, damping=known, coupling=coupling, setup=setup)
     own = AtLevel(question.level, frf, found, question.control)
     studied = level_study([own, *levels(others)])
     notes += [*said, *spread_note(spreads[1], data[1].use, others), *level_notes(studied)]

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..dynamics.reduction import Basis, beyond
@@ -25,6 +24,8 @@ from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import own_part, own_positions, row, with_own
 from .field_factors import mass_log, stiffness_log
 from .matrix_stack import MatrixStack, Whole, bordered
+from .real_modes import real_modes
+from .rising import Dissipated, Rising
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +193,7 @@ class State:
     weight, dweight        mass on the scales [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
+    dissipated             what effects dissipate in the modes, or None
     moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
                            or None, and its derivative by the parameters it hangs on
     """
@@ -209,6 +211,7 @@ class State:
     ddrive: np.ndarray | None = None
     moved: np.ndarray | None = None
     dmoved: Mapping[int, np.ndarray] = field(default_factory=dict)
+    dissipated: Dissipated | None = None
 
     @property
     def vectors(self) -> np.ndarray:
@@ -217,7 +220,8 @@ class State:
 
     def without_slopes(self) -> Self:
         """The same without ∂K and ∂M, which weigh ten times the rest."""
-        return replace(self, dK=None, dM=None)
+        lost = self.dissipated
+        return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
 
 
 def evaluate(
@@ -237,7 +241,7 @@ def evaluate(
     weight, dweight = _weight(model, logs, slopes)
     offset: np.ndarray | None = None
     doffset: np.ndarray | None = None
-    base = _participating(model, logs, slopes, n_own)
+    base, rising = _participating(model, logs, slopes, n_own), Rising()
     for (effect, at), first in zip(slices(effects), own_positions(effects), strict=True):
         for term in effect.terms(x[at]):
             seen = model.rows(term.rows, not term.moving, term.strained)
@@ -259,6 +263,7 @@ def evaluate(
         for part in effect.matrices(x[at]):
             A = with_own(model.operator(part.operator), n_own)
             target, slope = (K, dK) if part.matrix == "K" else (M, dM)
+            rising.add(part, A, at)
             target += part.coefficient * A
             if base is not None:
                 base.add_operator(part, model.vectors, at)
@@ -271,11 +276,14 @@ def evaluate(
                 offset = np.zeros(len(change.value), complex)
                 doffset = np.zeros((len(change.value), n_p), complex)
             offset, doffset[:, at] = offset + change.value, change.gradient
-    lam, phi = _eigen(K, M)
+    lam, phi = real_modes(K, M)
+    lost: Dissipated | None = None
+    if rising.parts:
+        lam, phi, dK, dM, lost = rising.over_basis(lam, phi, dK, dM, M, gradient)
     drive, ddrive = (None, None) if base is None else base.loads(phi)
     state = State(
         lam, phi[:r], phi[r:], dK, dM, weight, dweight, offset, doffset, drive, ddrive,
-        *_moved(model, effects, x, phi[:r]),
+        *_moved(model, effects, x, phi[:r]), lost,
     )  # fmt: skip
     return state if gradient else state.without_slopes()
 
@@ -304,20 +312,6 @@ def _participating(
         return None
     w = np.exp(mass_log(logs))
     return Participating(model.base, w, w[:, None] * mass_log(slopes), n_own)
-
-
-FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
-
-
-def _eigen(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
-    except (sl.LinAlgError, ValueError) as error:
-        raise ModelError(f"an effect left no positive mass: {error}") from error
-    flexible = lam[lam > FLEXIBLE * lam[-1]]
-    if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
-        raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
-    return lam, phi
 
 
 def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:

@@ -154,7 +154,7 @@ def reanalysis(
     return Reanalysis(
         base,
         data,
-        np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True),
+        data.receptance(base.state, phi_o, phi_i, d),
         np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True),
         G_bi,
         (phi_b**2) @ d.T + residual_flexibility[:, None],
@@ -213,7 +213,8 @@ def bending_slopes(
             bent = groups.cubic[shells] @ V.reshape(len(shells), 24, r)
             dK[j, :r, :r] = V.T @ bent.reshape(-1, r)
         # stiffness moves no load of a base and no shape beside those of the modes
-        still = replace(base.state, doffset=None, ddrive=None, dmoved={})
+        lost = None if base.state.dissipated is None else base.state.dissipated.held
+        still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
         state = replace(still, dK=dK, dM=np.zeros_like(dK))
         J = data.scaled(state, True)[1]
         rest = len(base.residual) - len(J)  # what the scales say does not change

@@ -17,6 +17,7 @@ from ..ema.finding import Screening
 from ..errors import FileError, LabelError, ModelError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
+from ..io.nastran.edit.changes import Add
 from ..io.nastran.edit.model_changes import changes
 from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
@@ -26,6 +27,7 @@ from ..updating.confusers import with_confusers
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
+from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import leaning, strained
 from ..updating.least_data import withheld
@@ -172,6 +174,7 @@ def _updated(
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, asked, nominal, stages.final)
+        final = _commented(final, found.written or found.found)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
 
@@ -200,6 +203,15 @@ def _deck(
         known = modelled(asked.tested(changed), nominal.band)
         return ChangedDeck(known, None), [f"no updated deck was written: {error}"]
     return ChangedDeck(modelled(asked.tested(written), nominal.band), edits), []
+
+
+def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
+    """The deck with what its cards cannot hold of the named effects, as comments."""
+    if named is None or deck.changes is None:
+        return deck
+    said = [e.deck_comment(named.fit.of(e)) for e in named.effects]
+    comments = tuple(Add((), text) for text in said if text)
+    return replace(deck, changes=(*deck.changes, *comments))
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:

@@ -165,3 +165,31 @@ def test_a_bar_that_was_taken_out_is_a_card_less(tmp_path, card):
     got, gone = rewritten(found, before, replace(before, beams=Beams(**kept)))
     assert got.beams.ids.tolist() == [4]
     assert gone == [card]
+
+
+@pytest.mark.parametrize("rows", [[0], [0, 1]])
+def test_the_loss_factor_of_a_bush_goes_into_its_property(deck, rows):
+    """Of one bush of PBUSH 7, and of both; dashpots and the other's stiffness stay."""
+    found, before = deck
+    loss, stiffness = before.bushes.loss.copy(), before.bushes.stiffness.copy()
+    loss[rows], stiffness[rows] = 0.25, 0.5 * stiffness[rows]
+    after = replace(before, bushes=replace(before.bushes, loss=loss, stiffness=stiffness))
+    got, _ = rewritten(found, before, after)
+    for name in ("loss", "stiffness", "viscous"):
+        assert_allclose(getattr(got.bushes, name), getattr(after.bushes, name), rtol=1e-6)
+
+
+@pytest.mark.parametrize("names", [(2,), (2, 3)])
+def test_the_loss_factor_of_a_material_goes_into_its_card(deck, names):
+    """Of one part of two that share MAT1 2, and of both."""
+    found, before = deck
+    parts = list(before.parts)
+    for pid in names:
+        k = position(before, pid)
+        lossy = replace(parts[k].section.material, damping=0.3)
+        parts[k] = parts[k].with_section(material=lossy)
+    got, _ = rewritten(found, before, before.with_parts(tuple(parts)))
+    for pid in (1, 2, 3):
+        section = got.parts[position(got, pid)].section
+        lost = getattr(section, "material", None) or section.membrane
+        assert lost.damping == (0.3 if pid in names else 0.0)

@@ -1,4 +1,4 @@
-"""Changed joints and masses put into their cards: K of PBUSH, PELAS and CELAS2, M of CONM2."""
+"""Changed joints and masses put into their cards: PBUSH, K of PELAS and CELAS2, M of CONM2."""
 
 from collections.abc import Iterator
 
@@ -30,7 +30,7 @@ def joint_changes(
     """
     return [
         *_springs(deck, _factors(before, after, "springs", "value")),
-        *_bushes(deck, _factors(before, after, "bushes", "stiffness"), free),
+        *_bushes(deck, _bush_changes(before, after), free),
         *_masses(deck, _factors(before, after, "masses", "matrix")),
     ]
 
@@ -75,42 +75,59 @@ def _pelas(deck: Deck, pid: int, factor: float) -> Change:
     raise ModelError(f"{deck.path} has no PELAS {pid}")
 
 
-def _bushes(deck: Deck, factor: dict[int, float], free: Iterator[int]) -> Iterator[Change]:
-    """K1 to K6 of the PBUSH that its CBUSH share; of those that changed otherwise one of their own.
+_BushChange = tuple[float, tuple[float, ...]]  # factor on K; GE1 to GE6, none where it stays
 
-    The factor of the first stays with the card.
+
+def _bush_changes(before: Assembly, after: Assembly) -> dict[int, _BushChange]:
+    """{element id: what became of a bush that was there before}."""
+    factor, out = _factors(before, after, "bushes", "stiffness"), {}
+    pairs = zip(before.bushes.loss, after.bushes.loss, strict=False)
+    for (id, f), (old, new) in zip(factor.items(), pairs, strict=False):
+        out[id] = f, () if np.allclose(old, new, rtol=_SAME, atol=0) else tuple(new.tolist())
+    return out
+
+
+def _bushes(deck: Deck, changed: dict[int, _BushChange], free: Iterator[int]) -> Iterator[Change]:
+    """K and GE of the PBUSH that its CBUSH share; of those that changed otherwise one of their own.
+
+    What became of most stays with the card.
     """
-    users: dict[int, dict[float, list[int]]] = {}
+    users: dict[int, dict[_BushChange, list[int]]] = {}
     for cards in deck.present("CBUSH"):
         ids, pid = cards.integers(1), cards.integers(2, 0)
         for id, p in zip(ids.tolist(), np.where(pid == 0, ids, pid).tolist(), strict=True):
-            if id in factor:  # not one that was taken out
+            if id in changed:  # not one that was taken out
                 kinds = users.setdefault(int(p), {})
-                same = next((f for f in kinds if abs(f / factor[id] - 1) < _ALIKE), factor[id])
+                same = next((c for c in kinds if _alike(c, changed[id])), changed[id])
                 kinds.setdefault(same, []).append(int(id))
     for property, kinds in users.items():
-        common = max(kinds, key=lambda f: len(kinds[f]))
-        if abs(common - 1) > _SAME:
-            for j, k in _scaled(deck["PBUSH"], property, common).items():
+        common = max(kinds, key=lambda c: len(kinds[c]))
+        if abs(common[0] - 1) > _SAME or common[1]:
+            for j, k in _fields(deck["PBUSH"], property, common).items():
                 yield SetField("PBUSH", property, j, k)
-        for f, members in kinds.items():
-            if f != common:
+        for change, members in kinds.items():
+            if change != common:
                 new = next(free)
-                fields = {1: new, **_scaled(deck["PBUSH"], property, f)}
+                fields = {1: new, **_fields(deck["PBUSH"], property, change)}
                 yield Add([copied(deck["PBUSH"], property, fields)], "of bushes that changed")
                 yield from (SetField("CBUSH", id, "PID", new) for id in members)
 
 
-def _scaled(cards: Cards, pid: int, factor: float) -> dict[int, float]:
-    """{position: K times a factor} of a PBUSH."""
+def _alike(one: _BushChange, other: _BushChange) -> bool:
+    return abs(one[0] / other[0] - 1) < _ALIKE and one[1] == other[1]
+
+
+def _fields(cards: Cards, pid: int, change: _BushChange) -> dict[int, float | str]:
+    """{position: K times the factor} of a PBUSH, and GE: where it stands, or behind all else."""
     one = cards.single(int(np.flatnonzero(cards.integers(1) == pid)[0]))
-    words = one.fields(0)
-    return {
-        j: float(one.reals(j)[0]) * factor
-        for key in (k for k in range(2, len(words) + 1, 8) if words[k - 1] == "K")
-        for j in range(key + 1, min(key + 6, len(words)) + 1)
-        if words[j - 1]
-    }
+    words, (factor, loss) = one.fields(0), change
+    keys = {words[k - 1]: k for k in range(2, len(words) + 1, 8)}
+    at = range(keys["K"] + 1, min(keys["K"] + 6, len(words)) + 1) if "K" in keys else ()
+    out: dict[int, float | str] = {j: float(one.reals(j)[0]) * factor for j in at if words[j - 1]}
+    if loss:
+        key = keys.get("GE", 2 + 8 * -(-(len(words) - 1) // 8))
+        out |= {key: "GE", **{key + 1 + k: v for k, v in enumerate(loss)}}
+    return out
 
 
 def _masses(deck: Deck, factor: dict[int, float]) -> Iterator[Change]:

@@ -131,7 +131,7 @@ def _edited(deck: Deck, id: int, was: Material, now: Material, units: Units) -> 
 
 def _numbers(id: int, was: Material, now: Material, units: Units) -> Iterator[Change]:
     """Fields of MAT1 or MAT8 whose values differ."""
-    names = {"rho": ("RHO", units.density)}
+    names = {"rho": ("RHO", units.density), "damping": ("GE", 1.0)}
     if isinstance(now, Isotropic):
         kind = "MAT1"
         names |= {"E": ("E", units.stress), "G": ("G", units.stress), "nu": ("NU", 1.0)}

@@ -1,0 +1,99 @@
+"""Damping of the modes of a test, as effects may know it, and what it says of a dissipation."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+SCATTER = 0.33  # sd of ln ζ among modes of one structure, see updating/damping_scatter.py
+TAILS = 5.0  # degrees of freedom of Student's t: ln of that sd is itself known to 0.3 only
+LEVEL_SD = 1.0  # of ln of what damps all modes alike, over the median of what was identified
+SAME = 0.01  # relative distance of natural frequencies over which a mode of the model is one of it
+LEVELS = np.linspace(-3.0, 2.0, 101)  # of that ln, over which it is sought
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedDamping:
+    """Identified damping of the modes that are compared.
+
+    Attributes
+    ----------
+    frequency : (n,) Hz
+    ratio : (n,)           ζ
+    sd : (n,)              of ln ζ, from the identification
+    """
+
+    frequency: np.ndarray
+    ratio: np.ndarray
+    sd: np.ndarray
+
+    def of(self, keep: np.ndarray) -> Self:
+        """Some of the modes (n,) bool."""
+        return replace(
+            self, frequency=self.frequency[keep], ratio=self.ratio[keep], sd=self.sd[keep]
+        )
+
+    def above(self, frequency: float) -> Self:
+        """The modes above a frequency [Hz]: what swings on cords is damped by them."""
+        return self.of(self.frequency > frequency)
+
+    @property
+    def usual(self) -> float:
+        """Median of ζ."""
+        return float(np.median(self.ratio))
+
+    def misfit(self, level: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals of ln ζ against ln(ζ_usual e^level + more), and their slopes by that ln.
+
+        r² is -2 ln of Student's t: one mode that something else damps bears little.
+
+        Parameters
+        ----------
+        level : (..., 1)    ln of what damps all modes alike, over ``usual``
+        more : (n,)         ζ that is dissipated beside it
+        """
+        width = np.hypot(SCATTER, self.sd)
+        z = (np.log(self.ratio) - np.log(self.usual * np.exp(level) + more)) / width
+        r = np.sign(z) * np.sqrt((TAILS + 1) * np.log1p(z**2 / TAILS))
+        flat = np.sqrt((TAILS + 1) / TAILS)
+        steep = np.divide((TAILS + 1) * z / (TAILS + z**2), r, out=flat + 0 * r, where=r != 0)
+        return r, -steep / width
+
+    def neg2_log_likely(self, more: np.ndarray) -> float:
+        """-2 ln p at the most probable level, its prior included."""
+        return float(self._by_level(more).min())
+
+    def neg2_log_evidence(self) -> float:
+        """-2 ln p of damping that scatters about one level, which is integrated out (Laplace)."""
+        even = np.zeros_like(self.ratio)
+        best = LEVELS[[np.argmin(self._by_level(even))]]
+        _, slope = self.misfit(best, even)
+        curved = float((slope**2).sum()) + 1 / LEVEL_SD**2
+        return self.neg2_log_likely(even) + float(np.log(curved)) + 2 * float(np.log(LEVEL_SD))
+
+    def _by_level(self, more: np.ndarray) -> np.ndarray:
+        r, _ = self.misfit(LEVELS[:, None], more)
+        return np.asarray((r**2).sum(axis=1) + (LEVELS / LEVEL_SD) ** 2)
+
+
+def paired_with(
+    frequency: np.ndarray, model: np.ndarray, same: float = SAME
+) -> tuple[np.ndarray, np.ndarray]:
+    """Share of each mode of a model in what is told of each identified one, and its slope.
+
+    w_ji ∝ exp(-½ (ln f_i/f_j)² / same²), one over all i: of the nearest mode, of several that are
+    as near a mean.  The slope is ∂ ln w_ji / ∂ ln f_i before the w are made one.
+
+    Parameters
+    ----------
+    frequency : (n,) [Hz]    identified
+    model : (m,) [Hz]        of the model, rigid ones may be zero
+
+    Returns
+    -------
+    (n, m), (n, m)
+    """
+    away = np.log(np.maximum(model, 1e-6 * frequency.max()) / frequency[:, None])
+    exponent = -0.5 * (away / same) ** 2
+    w = np.exp(exponent - exponent.max(axis=1, keepdims=True))
+    return w / w.sum(axis=1, keepdims=True), -away / same**2

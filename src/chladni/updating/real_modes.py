@@ -1,0 +1,33 @@
+"""Modes of the reduced model, and what its slopes are in them."""
+
+import numpy as np
+import scipy.linalg as sl
+
+from ..errors import ModelError
+
+FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
+
+
+def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """λ (m,) and φ (m, m) of K φ = λ M φ.
+
+    Raises
+    ------
+    ModelError
+        If mass or stiffness lost its positive (semi-)definiteness: an effect is wrong.
+    """
+    try:
+        lam, phi = sl.eigh(K, M, driver="gvd", check_finite=True)
+    except (sl.LinAlgError, ValueError) as error:
+        raise ModelError(f"an effect left no positive mass: {error}") from error
+    flexible = lam[lam > FLEXIBLE * lam[-1]]
+    if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
+        raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
+    return lam, phi
+
+
+def in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """φᵀ A φ of every slope (n_p, m, m); most parameters move stiffness or mass alone."""
+    acts = slopes.any(axis=(1, 2))
+    slopes[acts] = phi.T @ slopes[acts] @ phi
+    return slopes
