@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.stats import binom, norm
+from scipy.stats import norm
 
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
@@ -167,12 +167,13 @@ def of_poles(data: Poles, state: State) -> FitTest:
 
     p is the smaller of two chances: of a spread of ln f at least as large as the one that was
     learned, and of at least as many poles without a partner among the modes of ``state``, each
-    being spurious with the share that such a list has.
+    being spurious with the chance it has.
     """
     closely = float(norm.sf(np.log(data.scale / SCALE) / SCALE_SD))
     poles = np.flatnonzero(data.use)
     alone = np.setdiff1d(poles, data.pairs(state)[0])
-    often = float(binom.sf(len(alone) - 1, len(poles), data.spurious))
+    share = np.broadcast_to(data.spurious, data.frequency.shape)[poles]
+    often = at_least(len(alone), share)
     if often < closely:
         what = f"{len(alone)} of {len(poles)} natural frequencies have no partner in the model"
         where = "at " + ", ".join(f"{f:.4g}" for f in data.frequency[alone][:8]) + " Hz"
@@ -182,6 +183,18 @@ def of_poles(data: Poles, state: State) -> FitTest:
         f"{SCALE:.1%}"
     )
     return FitTest(closely >= LEAST, closely, what, "over all modes")
+
+
+def at_least(count: int, chance: np.ndarray) -> float:
+    """P of so many events or more, each with its own chance (n,).
+
+    >>> round(at_least(1, np.array([0.5, 0.5])), 6)
+    0.75
+    """
+    number = np.ones(1)
+    for p in chance:
+        number = np.convolve(number, [1 - p, p])
+    return float(min(1.0, number[count:].sum()))
 
 
 def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:

@@ -13,12 +13,12 @@ model in both:
 Data that cannot feel the effect are predicted alike with and without it and have no vote.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from .discrepancy import learned
-from .hypothesis_fit import HypothesisFit, UpdatingProblem
+from .hypothesis_fit import HypothesisFit, UpdatingProblem, over_scales
 from .likelihood import Poles, Responses
 from .map_fit import beside, unknowns
 from .reduced_model import Reduced, evaluate
@@ -92,8 +92,6 @@ def _news(problem: UpdatingProblem, hypothesis: HypothesisFit, both: Responses |
     data = hypothesis.data
     assert isinstance(data, (Responses, Poles))
     both = both.over(hypothesis.model)
-    if isinstance(both, Poles) and isinstance(data, Poles):
-        both = replace(both, scale=data.scale)
     return _evidence(problem, hypothesis, both) - _evidence(problem, hypothesis, data)
 
 
@@ -105,7 +103,9 @@ def _evidence(
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
     r0, J0 = beside(fit.effects, problem.mass_measurement, fit.x, state)
-    if isinstance(data, Responses) and data.error is not None:
+    if isinstance(data, Poles):
+        return over_scales(data, state, r0, J0)
+    if data.error is not None:
         return learned(data.error, r, J, r0, J0).neg2_log_evidence
     A, g = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0
     cost = r @ r + r0 @ r0 - g @ np.linalg.solve(A, g)

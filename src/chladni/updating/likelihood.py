@@ -257,7 +257,7 @@ class Poles:
     strength : (n,)           peak height relative to the highest
     band : (low, high) Hz     in which the test would have shown a mode
     scale : float             spread of ln f that no model reaches; learned with every hypothesis
-    spurious : float          share of poles that may belong to no mode of the structure
+    spurious : (n,) or float  chance of each pole to belong to no mode of the structure
     outputs, inputs           rows at the likely places of sensors and shakers, or None
     """
 
@@ -269,7 +269,7 @@ class Poles:
     scale: float = SCALE
     outputs: object = None
     inputs: object = None
-    spurious: float = SPURIOUS
+    spurious: np.ndarray | float = SPURIOUS
     a: np.ndarray | None = None
     b: np.ndarray | None = None
 

@@ -7,6 +7,7 @@ import numpy as np
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified, identify
 from ..errors import FileError
+from .pole_assignment import FAINTEST
 from .question import Question
 
 
@@ -52,7 +53,6 @@ def frequencies(
 LEAST_DELTA_CHI2 = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
 TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
 SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
-FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
 
 
 def _peaks(found: Identified) -> np.ndarray:

@@ -10,6 +10,8 @@ Needleman and Wunsch (1970), J. Mol. Biol. 48, 443-453 (the alignment).
 import numpy as np
 
 SPURIOUS = 0.4  # share of poles of a recording that may be the rig's, the room's, the noise's
+FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
+CERTAIN = 5.0  # odds by which the height of a peak alone speaks for one or the other at most
 SPURIOUS_LISTED = 0.05  # the same of poles somebody has listed as modes
 RANGE = 3.0  # ln f over which a spurious pole may lie anywhere: 20 to 400 Hz
 MISSED = 8.0  # -2 ln p of overlooking a mode that shows as strongly as the strongest
@@ -17,13 +19,30 @@ HARDLY = 0.3  # the same of a mode that hardly shows
 SEEN = 1.5  # decades of visibility over which the one price falls to the other
 
 
-def price_spurious(share: float) -> float:
+def price_spurious(share: np.ndarray | float) -> np.ndarray:
     """Price of an unpaired pole, -2 ln(p/(1-p)) + 2 ln L - ln 2π, where a pair costs δ²/σ² + ln σ².
 
     >>> price_spurious(0.05) > price_spurious(0.4) > 0
     True
     """
-    return float(-2 * np.log(share / (1 - share)) + 2 * np.log(RANGE) - np.log(2 * np.pi))
+    odds = np.asarray(share) / (1 - np.asarray(share))
+    return np.asarray(-2 * np.log(odds) + 2 * np.log(RANGE) - np.log(2 * np.pi))
+
+
+def share_spurious(strength: np.ndarray) -> np.ndarray:
+    """Chance of each pole of a recording to be spurious, by its height over the highest (n,).
+
+    What the rig or the room rings with shows faintly, and the highest peaks are the structure's:
+    over the decades from ``FAINTEST`` to 1 the density of log heights is taken to fall to nothing
+    for spurious poles and to rise from nothing for modes, both linearly.
+
+    >>> low, high = share_spurious(np.array([0.03, 1.0]))
+    >>> low > SPURIOUS > high
+    True
+    """
+    u = np.clip(1 - np.log10(strength) / np.log10(FAINTEST), 0, 1)
+    odds = np.clip((1 - u) / np.maximum(u, 1e-9), 1 / CERTAIN, CERTAIN) * SPURIOUS / (1 - SPURIOUS)
+    return np.asarray(odds / (1 + odds))
 
 
 def price_missed(visibility: np.ndarray) -> np.ndarray:

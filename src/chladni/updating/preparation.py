@@ -35,7 +35,7 @@ from .map_fit import fit
 from .measured_frequencies import LEAST_DELTA_CHI2, band_of, counted, frequencies, widened
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .other_recordings import levels, measured_spread, others_identified, spread_note
-from .pole_assignment import SPURIOUS, SPURIOUS_LISTED
+from .pole_assignment import SPURIOUS_LISTED, share_spurious
 from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
 from .sensor_errors import sensor_errors
@@ -258,7 +258,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
     band = question.band if question.frf is None else band_of(question, question.frf)
     data = Poles(
         frequency, sd / frequency, ~held, strength, band, outputs=rows_o, inputs=rows_i,
-        spurious=SPURIOUS if question.frf is not None else SPURIOUS_LISTED,
+        spurious=SPURIOUS_LISTED if question.frf is None else share_spurious(strength),
     ).over(reduced.model)  # fmt: skip
     nuisance = nuisances(reduced, nominal, mesh, f_max)
     problem = updating_problem(question, reduced, data, nuisance, f_max)
