@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.stats import kstest
+from scipy.stats import binom, kstest
 
 from chladni.effects.effect import Effect
 from chladni.effects.ordinary import ordinary
-from chladni.updating.adequacy import _drawn, _Linear, adequacy, of_poles, ranked
+from chladni.updating.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.likelihood import Poles
 from chladni.updating.map_fit import MassMeasurement, beside
@@ -95,6 +95,12 @@ def test_poles_without_partner_are_counted_and_said():
     assert not found.passes
     assert "have no partner" in found.what
     assert "20" in found.where
+
+
+def test_equal_chances_are_binomial():
+    for count in range(7):
+        expected = binom.sf(count - 1, 6, 0.3)
+        assert_allclose(at_least(count, np.full(6, 0.3)), expected, atol=1e-12)
 
 
 def test_of_a_raw_recording_more_poles_may_be_the_rigs():

@@ -13,6 +13,7 @@ from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.effects.surroundings import Setup, Surroundings
 from chladni.fem.modelled import solved
+from chladni.updating.hypothesis_fit import over_scales
 from chladni.updating.likelihood import Poles
 from chladni.updating.reduced_model import evaluate
 
@@ -128,3 +129,25 @@ def test_noise_widens_the_spread_in_squares(responses):
     noise = np.full(responses.values.shape, 0.02)
     wider = replace(responses, noise=noise).std()
     assert_allclose(wider**2, responses.std() ** 2 + 0.02**2)
+
+
+def test_one_more_pole_is_foretold_by_a_density(reduced, poles):
+    """p(new | old) holds one for each mode that it may be, the spread of ln f integrated out."""
+    state = evaluate(reduced.model, [], np.zeros(0), True)
+    f = np.sqrt(state.lam[6:10]) / (2 * np.pi)
+    nothing = np.zeros(0), np.zeros((0, 0))
+    old = replace(
+        poles, frequency=f, sd=np.full(4, 1e-3), use=np.array([True] * 3 + [False]),
+        strength=np.ones(4), spurious=1e-6, band=(20.0, 1.01 * f[2]),
+    )  # fmt: skip
+    before = over_scales(old, state, *nothing)
+    ln = np.linspace(-0.25, 0.25, 801)
+    density = []
+    for shift in ln:
+        new = replace(old, frequency=f * np.exp([0, 0, 0, shift]), use=np.ones(4, bool))
+        density.append(np.exp((before - over_scales(new, state, *nothing)) / 2))
+    mass = np.trapezoid(density, ln) / np.sqrt(2 * np.pi)
+    ahead = np.sqrt(state.lam[9:12]) / (2 * np.pi)
+    modes = (ahead < f[3] * np.exp(ln[-1])).sum()
+    assert_allclose(mass, modes, rtol=0.02)
+    assert density[420] > 1e-3 * max(density)  # a per cent off is no refutation of few poles

@@ -7,7 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from chladni.updating.pole_assignment import paired, price_missed, price_spurious
+from chladni.updating.pole_assignment import (
+    FAINTEST,
+    SPURIOUS,
+    paired,
+    price_missed,
+    price_spurious,
+    share_spurious,
+)
 
 PRICE = st.floats(0.0, 40.0)
 
@@ -82,3 +89,20 @@ def test_what_shows_more_costs_more_to_leave_alone(a, b):
 def test_the_commoner_spurious_poles_are_the_cheaper_they_are(a, b):
     low, high = np.sort([a, b])
     assert price_spurious(low) >= price_spurious(high)
+
+
+@given(st.floats(FAINTEST, 1.0), st.floats(FAINTEST, 1.0))
+def test_the_higher_a_peak_the_less_it_may_be_spurious(a, b):
+    low, high = share_spurious(np.sort([a, b]))
+    assert 1 > low >= high > 0
+
+
+def test_a_peak_of_middling_height_says_nothing():
+    """Midway in decades both densities are alike, so that what is known beforehand stays."""
+    assert_allclose(share_spurious(np.array([np.sqrt(FAINTEST)])), SPURIOUS)
+
+
+def test_a_spurious_pole_never_earns_anything():
+    """A price below nothing at the widest spread of a fit would have no square root."""
+    widest = 0.2
+    assert np.all(price_spurious(share_spurious(np.array([FAINTEST, 1.0]))) > 2 * np.log(widest))

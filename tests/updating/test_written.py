@@ -16,7 +16,7 @@ from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.hypothesis_fit import HypothesisFit, as_written
-from chladni.updating.likelihood import Responses
+from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
@@ -109,6 +109,33 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
     assert called != REST or not judged.adequacy.passes
+
+
+@pytest.mark.parametrize(
+    ("gain", "news", "named"),
+    [(0.7 * DUE, 0.2 * DUE, False), (0.7 * DUE, 0.4 * DUE, True), (-1.0, 2 * DUE, False)],
+)
+def test_all_poles_together_may_bear_a_name(monkeypatch, reduced, gain, news, named):
+    """The Bayes factor of fitted and foretold poles is the product of both."""
+    f = np.array([20.0, 30.0, 40.0])
+    data = Poles(f, np.full(3, 1e-3), np.ones(3, bool), np.ones(3), (10.0, 50.0))
+    effects = [ordinary(reduced.groups, "E", [0])]
+    fitted = fit(reduced.model, effects, data, None, np.zeros(1))
+    lead = HypothesisFit(effects[0], fitted, reduced.model)
+    worse = replace(fitted, neg2_log_evidence=fitted.neg2_log_evidence + gain)
+    null = HypothesisFit(Effect(), worse, reduced.model)
+    due = threshold(data, 1)
+    heard = HeldOutEvidence(news * due / DUE)
+    null = replace(null, fit=replace(worse, neg2_log_evidence=(
+        fitted.neg2_log_evidence + gain * due / DUE)))  # fmt: skip
+    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
+    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
+    found = Diagnosis(null, null, null, (lead,), "nothing missing", ("of calibration",))
+    asked = SimpleNamespace(problem=None, unseen=None, too_little="")
+    got = outcome.borne_by_all_poles(asked, found)
+    assert (got.verdict == "missing physics") == named
+    asked = SimpleNamespace(problem=None, unseen=None, too_little="three modes are the least")
+    assert outcome.borne_by_all_poles(asked, found) is found
 
 
 def test_calibration_alone_is_written_without_scatter(reduced, responses):

@@ -19,17 +19,31 @@ from .reduced_problem import ReducedProblem
 ROUGH = 8  # steps of a fit that only has to show whether a hypothesis is in the running
 
 
+NEARLY = 6.0  # in -2 ln evidence: what explains poles so much worse still has a share of 5 %
+
+
+@dataclass(frozen=True, eq=False)
+class Valley:
+    """Where else the parameters (n_p,) of an effect may lie, with their standard deviations."""
+
+    neg2_log_evidence: float
+    x: np.ndarray
+    sd: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class HypothesisFit:
     """One hypothesis after its fit: the effect, the fit, the model it was fitted in.
 
     ``beside`` are effects that were found before it; the hypothesis is all of them together.
+    ``valleys`` are other values of the effect that explain the same poles paired otherwise.
     """
 
     effect: Effect
     fit: Fit
     model: Reduced
     beside: tuple[Effect, ...] = ()
+    valleys: tuple[Valley, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -51,6 +65,20 @@ class HypothesisFit:
         """Channels that it concerns, where it concerns nothing else."""
         every = [e.channels for e in self.effects]
         return tuple(c for each in every for c in each) if all(every) else ()
+
+    @property
+    def nearly(self) -> tuple[Valley, ...]:
+        """Other valleys that are nearly as probable."""
+        most = self.neg2_log_evidence + NEARLY
+        return tuple(v for v in self.valleys if v.neg2_log_evidence < most)
+
+    def among(self, other: "HypothesisFit") -> "HypothesisFit":
+        """The same with the values of another fit of its effect to the same poles kept as well."""
+        if not isinstance(self.data, Poles) or other.effect.text != self.effect.text:
+            return self
+        own = other.fit.of(other.effect), other.fit.sd(other.effect)
+        valley = Valley(other.neg2_log_evidence, *own)
+        return replace(self, valleys=(*self.valleys, valley, *other.valleys))
 
     @property
     def data(self) -> Data:

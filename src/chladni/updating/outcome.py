@@ -92,6 +92,33 @@ AGAINST = "the data that no fit saw speak against it"
 MORE_LEFT = "but with it in place more is left than it explains"
 
 
+def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with a name that all poles together bear, those that no fit saw included.
+
+    A fifth of a dozen natural frequencies is much of what is known.  The Bayes factor of all of
+    them is the product of that of the fitted ones and of how well the others are foretold, and the
+    bound on false alarms holds for it as for the first alone.
+    """
+    lead = diagnosis.hypotheses[0] if diagnosis.hypotheses else None
+    poles = isinstance(diagnosis.null.data, Poles)
+    if lead is None or diagnosis.found is not None or prepared.too_little or not poles:
+        return diagnosis
+    heard = held_out_evidence(prepared.problem, prepared.unseen, diagnosis.null, lead)
+    gain, news = diagnosis.two_log_bayes_factor(lead), heard.held_out or 0.0
+    if not (gain > 0 and gain + news > diagnosis.due):
+        return diagnosis
+    note = (
+        f"{lead.name} gained {gain:.1f} in -2 ln evidence on the poles that were fitted, and those "
+        f"that no fit saw speak for it with {news:.1f}: together more than the {diagnosis.due:.0f} "
+        "that are needed"
+    )
+    of_null = 0 if diagnosis.adequacy is None else 1  # the last is what was said of calibration
+    notes = (*diagnosis.notes[: len(diagnosis.notes) - of_null], note)
+    called = "missing physics" if lead.physics else "measurement fault"
+    named = replace(diagnosis, verdict=called, notes=notes, adequacy=None)
+    return tested(named, prepared.problem)
+
+
 def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """The verdict once data that no fit saw have been heard, and the named effect as written.
 
@@ -112,7 +139,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     seen, held = fitted_scores(prepared, diagnosis)
     together = gain + (heard.held_out or 0.0)
     due = diagnosis.due
-    borne = carried(gain, heard, due) and not held.effect > HARM * held.calibrated
+    poles = isinstance(lead.data, Poles)
+    borne = carried(gain, heard, due, poles) and not held.effect > HARM * held.calibrated
     faint = gain < CONFLICT * due and held.effect > held.calibrated
     left = all(q.effect > MOST_LEFT * q.calibrated for q in (seen, held)) and lead.physics
     if borne and not (faint or left):
@@ -134,10 +162,14 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     return tested(refused, problem)
 
 
-def carried(gain: float, heard: HeldOutEvidence, due: float) -> bool:
-    """Whether fitted data and those that no fit saw bear a name that has to gain what is due."""
+def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False) -> bool:
+    """Whether fitted data and those that no fit saw bear a name that has to gain what is due.
+
+    ``poles`` are few: all of them together bear it, or do not.
+    """
     together = gain + (heard.held_out or 0.0)
-    return min(gain, together) > due and not any(g < -due for g in heard.votes.values())
+    least = together if poles else min(gain, together)
+    return least > due and not any(g < -due for g in heard.votes.values())
 
 
 def _unexplained(

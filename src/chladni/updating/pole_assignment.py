@@ -14,7 +14,7 @@ FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
 CERTAIN = 5.0  # odds by which the height of a peak alone speaks for one or the other at most
 SPURIOUS_LISTED = 0.05  # the same of poles somebody has listed as modes
 RANGE = 3.0  # ln f over which a spurious pole may lie anywhere: 20 to 400 Hz
-MISSED = 8.0  # -2 ln p of overlooking a mode that shows as strongly as the strongest
+MISSED = 5.0  # -2 ln p of overlooking a mode that should show as strongly as the strongest
 HARDLY = 0.3  # the same of a mode that hardly shows
 SEEN = 1.5  # decades of visibility over which the one price falls to the other
 

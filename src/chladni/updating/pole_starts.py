@@ -18,7 +18,7 @@ from .likelihood import Poles
 from .reduced_model import evaluate
 
 DRAWS = 4096
-WALKED = 32  # distinct points that are walked downhill
+WALKED = 16  # distinct points that are walked downhill
 APART = 0.25  # of the prior sd, in one parameter at least: points that count as distinct
 WIDE = 0.03  # spread of ln f at which the points are compared before they are walked
 STEPS = 250  # evaluations of one walk
@@ -57,7 +57,7 @@ def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> li
     points = np.vstack([effect.starts(), draws(effect, DRAWS)])
     rough = np.array([cost(x, np.array([WIDE])) for x in points])
     chosen = _distinct(points / sd, rough, WALKED)
-    return _valleys(lambda x: cost(x, SCALES[::4]), points[chosen], sd, most)
+    return _valleys(lambda x: cost(x, SCALES[::6]), points[chosen], sd, most)
 
 
 def _distinct(points: np.ndarray, cost: np.ndarray, most: int) -> list[int]:

@@ -56,7 +56,12 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
     """
     problem = prepared.problem
     if any(e.remakes_structure for e in hypothesis.effects):
-        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
+        problem, fresh = _on_new_structure(question, problem, hypothesis)
+        shift = fresh.neg2_log_evidence - hypothesis.neg2_log_evidence
+        valleys = tuple(
+            replace(v, neg2_log_evidence=v.neg2_log_evidence + shift) for v in hypothesis.valleys
+        )
+        hypothesis = replace(fresh, valleys=valleys)
     found = _accuracy(problem, hypothesis)
     note = _said(found)
     for _ in range(TRIES):

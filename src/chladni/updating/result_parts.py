@@ -1,8 +1,12 @@
 """What a diagnosis says, part by part: effects, alternatives, calibrated values, the remainder."""
 
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.estimate import Estimate
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
@@ -38,8 +42,51 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
         effect.claim,
         -hypothesis.neg2_log_evidence / 2,
         effect.location(x),
-        effect.reported(x, hypothesis.fit.sd(effect)),
+        _reported(hypothesis, effect),
         gain,
+    )
+
+
+def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:
+    """The values of an effect; intervals reach over all valleys that are nearly as probable."""
+    rows = effect.reported(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
+    if effect is not hypothesis.effect:
+        return rows
+    every = [rows, *(effect.reported(v.x, v.sd) for v in hypothesis.nearly)]
+    return tuple(
+        replace(row, low=_reach(min, (r[k].low for r in every)),
+                high=_reach(max, (r[k].high for r in every)))
+        for k, row in enumerate(rows)
+    )  # fmt: skip
+
+
+def _reach(pick: Callable[[list[float]], float], values: Iterable[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return pick(known) if known else None
+
+
+def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """A sentence on other values of the named effect that explain the poles nearly as well."""
+    found = diagnosis.found
+    if found is None or not found.nearly:
+        return ()
+    effect, said = found.effect, []
+    own = effect.reported(found.fit.of(effect), found.fit.sd(effect))
+    for valley in found.nearly:
+        rows = effect.reported(valley.x, valley.sd)
+        apart = [
+            f"{new.name} {new.value:.3g} {new.unit}".strip()
+            for new, row in zip(rows, own, strict=True)
+            if row.low is not None and row.high is not None
+            and not row.low <= new.value <= row.high
+        ]  # fmt: skip
+        if apart and (words := ", ".join(apart)) not in said:
+            said.append(words)
+    if not said:
+        return ()
+    return (
+        f"with other poles taken for spurious, other values of {effect.name} explain the poles "
+        f"nearly as well: {'; or '.join(said)}; the intervals reach over all of them",
     )
 
 

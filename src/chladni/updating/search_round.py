@@ -86,8 +86,13 @@ def by_family(hypotheses: list[HypothesisFit]) -> list[HypothesisFit]:
     """The best hypothesis of every family, best first."""
     best: dict[str, HypothesisFit] = {}
     for t in hypotheses:
-        if t.effect.name not in best or t.neg2_log_evidence < best[t.effect.name].neg2_log_evidence:
+        lead = best.get(t.effect.name, t)
+        if lead is t:
             best[t.effect.name] = t
+        elif t.neg2_log_evidence < lead.neg2_log_evidence:
+            best[t.effect.name] = t.among(lead)
+        else:
+            best[t.effect.name] = lead.among(t)
     return sorted(best.values(), key=lambda t: t.neg2_log_evidence)
 
 

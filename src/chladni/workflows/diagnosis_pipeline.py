@@ -35,6 +35,7 @@ from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.other_recordings import scored_others
 from ..updating.outcome import (
+    borne_by_all_poles,
     fitted_scores,
     held_out,
     judged,
@@ -46,7 +47,14 @@ from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
-from ..updating.result_parts import agreement, alternatives, calibrated, named_effects, remainder
+from ..updating.result_parts import (
+    agreement,
+    alternatives,
+    calibrated,
+    named_effects,
+    otherwise,
+    remainder,
+)
 from ..updating.several_judged import named_together
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
@@ -146,6 +154,7 @@ def _judged(
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
+    found = borne_by_all_poles(prepared, found)
     for more in reversed(found.sets):
         whole = renewed(asked, prepared, more.hypothesis)
         together, why_not = named_together(prepared, found, more, whole.hypothesis)
@@ -266,7 +275,14 @@ def _result(
         structured=left,
         adequate=_adequate(found, spot),
         left_where=spot,
-        notes=(*prepared.notes, *found.notes, *away, left.sentence, *_blind(spot)),
+        notes=(
+            *prepared.notes,
+            *found.notes,
+            *otherwise(found),
+            *away,
+            left.sentence,
+            *_blind(spot),
+        ),
         one_of=(found.one_of,) if found.one_of else (),
         compared="frequencies" if isinstance(prepared.score, Poles) else "responses",
         models=stages,
