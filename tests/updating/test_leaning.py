@@ -7,7 +7,8 @@ import pytest
 
 from chladni.effects.effect import Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.updating.leaning import FAR, strained
+from chladni.effects.ordinary import PartScale
+from chladni.updating.leaning import FAR, in_doubt, strained
 
 
 def fitted(text, away):
@@ -26,3 +27,15 @@ def test_adhesive_that_took_more_than_it_scatters_is_told(sign):
 
 def test_the_shear_of_a_sheet_is_no_joint():
     assert strained(fitted("shear of inner", 2 * FAR)) == []
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_calibration_that_took_what_no_deck_is_off_by_is_in_doubt(sign):
+    """A number far from the deck's may hold what is missing; one that scatters so may not."""
+    E = PartScale((Parameter("E", "Pa", 0.0, 0.06),), "E of strip")
+    for away in (0.9 * FAR, 1.2 * FAR):
+        x = np.array([sign * away * 0.06])
+        said = in_doubt(SimpleNamespace(effects=(E,), of=lambda effect, x=x: x))
+        assert bool(said) == (away > FAR)
+    assert "E of strip" in said[0]
+    assert "measure it first" in said[0]

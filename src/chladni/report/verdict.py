@@ -96,6 +96,11 @@ def _sentence(result: DiagnosisResult) -> str:
         return f"The structure does not answer in proportion to the force: {why}."
     if not result.searched and not result.effects:
         return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
+    if verdict == "calibration only" and result.distrust:
+        return (
+            "Ordinary parameters explain the recording, but that no physics is missing is not to be "
+            f"trusted{gain}."
+        )
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":

@@ -21,6 +21,20 @@ def leaning(fit: Fit) -> list[str]:
     ]
 
 
+def in_doubt(plain: Fit) -> tuple[str, ...]:
+    """Why a calibration that explains everything is not to be trusted, if it is not.
+
+    That no physics is missing is a claim: a number no structure of this deck has may hold what is.
+    """
+    if not (far := leaning(plain)):
+        return ()
+    return (
+        f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
+        "correct the deck; if it was only guessed, free it by a [[parameter]] with an sd that says "
+        "so",
+    )
+
+
 def strained(fit: Fit) -> list[str]:
     """A sentence for every family of joints that took more than joints of its kind scatter."""
     return [

@@ -29,7 +29,7 @@ from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import Posterior, informed
-from ..updating.leaning import leaning, strained
+from ..updating.leaning import in_doubt, leaning, strained
 from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
@@ -140,6 +140,8 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     result = _result(asked, prepared, found, stages)
     result = over_levels(asked, prepared, stages, result, diagnosing)
     distrust = known.distrust
+    if diagnosing and result.verdict == "calibration only":
+        distrust = (*distrust, *in_doubt(found.plain.fit))
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
         distrust = (f"nothing is named: {prepared.too_little}", *distrust)
     said = () if known.screening is None else known.screening.notes
