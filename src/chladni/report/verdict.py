@@ -98,8 +98,8 @@ def _sentence(result: DiagnosisResult) -> str:
         return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
     if verdict == "calibration only" and result.distrust:
         return (
-            "Ordinary parameters explain the recording, but that no physics is missing is not to be "
-            f"trusted{gain}."
+            "Ordinary parameters explain the recording, but that no physics is missing is not to "
+            f"be trusted{gain}."
         )
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
