@@ -56,12 +56,7 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
     """
     problem = prepared.problem
     if any(e.remakes_structure for e in hypothesis.effects):
-        problem, fresh = _on_new_structure(question, problem, hypothesis)
-        shift = fresh.neg2_log_evidence - hypothesis.neg2_log_evidence
-        valleys = tuple(
-            replace(v, neg2_log_evidence=v.neg2_log_evidence + shift) for v in hypothesis.valleys
-        )
-        hypothesis = replace(fresh, valleys=valleys)
+        problem, hypothesis = _on_new_structure(question, problem, hypothesis)
     found = _accuracy(problem, hypothesis)
     note = _said(found)
     for _ in range(TRIES):
@@ -123,4 +118,11 @@ def _on_new_structure(
     fresh = replace(fresh, base=tuple(with_priors(fresh.base, old.base)))
     (first, start), *beside = found
     fresh = fresh.holding(beside)
-    return fresh, fresh.fitted_with(first, start, fresh.mean())
+    return fresh, _with_valleys(fresh.fitted_with(first, start, fresh.mean()), hypothesis)
+
+
+def _with_valleys(hypothesis: HypothesisFit, old: HypothesisFit) -> HypothesisFit:
+    """The hypothesis with other values that it had, as far behind it as they were."""
+    ahead = hypothesis.neg2_log_evidence - old.neg2_log_evidence
+    valleys = (replace(v, neg2_log_evidence=v.neg2_log_evidence + ahead) for v in old.valleys)
+    return replace(hypothesis, valleys=tuple(valleys))
