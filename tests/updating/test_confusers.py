@@ -6,7 +6,7 @@ import pytest
 
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.registry import families
-from chladni.updating.confusers import with_confusers
+from chladni.updating.confusers import with_confusers, with_doubt
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.result_parts import why_not
 from chladni.updating.ties import TIED, simplest_first
@@ -42,6 +42,26 @@ def test_a_clear_lead_is_a_name(verdict):
 
 def test_where_nothing_is_named_nothing_is_tied():
     assert found(0.0, 1.0, 2.0, verdict="calibration only").one_of == ()
+
+
+@pytest.mark.parametrize(
+    ("gains", "verdict", "heard", "tied"),
+    [
+        ((TIED + 2, TIED + 1, 1.0), "calibration only", None, ("point-mass", "sensor-mass")),
+        ((TIED + 9, TIED - 1, 1.0), "nothing missing", None, ("point-mass",)),
+        ((TIED - 1, 2.0, 1.0), "calibration only", None, ()),
+        ((TIED + 2, 2.0, 1.0), "not in catalogue", None, ()),  # says so itself
+        ((TIED + 2, 2.0, 1.0), "calibration only", "refused", ()),
+    ],
+)
+def test_what_leads_without_being_named_leaves_calibration_in_doubt(gains, verdict, heard, tied):
+    names = ("point-mass", "sensor-mass", "suspension")
+    hypotheses = tuple(tried(name, -gain) for name, gain in zip(names, gains, strict=True))
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    answer = with_doubt(Diagnosis(None, null, None, hypotheses, verdict, heard=heard))
+    assert answer.one_of == (("calibration alone", *tied) if tied else ())
+    assert bool(answer.notes) == bool(tied)
+    assert not tied or "weigh the structure" in answer.notes[0]
 
 
 def test_every_family_says_what_would_settle_it():

@@ -101,6 +101,12 @@ def _sentence(result: DiagnosisResult) -> str:
             "Ordinary parameters explain the recording, but that no physics is missing is not to "
             f"be trusted{gain}."
         )
+    if verdict in ("calibration only", "nothing missing") and result.one_of:
+        better = " or ".join(result.one_of[0][1:])
+        return (
+            f"Nothing is named; {better} would explain the recording better than calibration "
+            f"alone, but not by enough to be sure of either{gain}."
+        )
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":

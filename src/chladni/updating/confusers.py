@@ -8,6 +8,31 @@ from .diagnosis import Diagnosis
 from .ties import TIED
 
 
+def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
+    """A calibration with what explains the data clearly better, if not by enough to be named.
+
+    That no physics is missing is a claim as well: where an effect leads by more than what is told
+    apart, and no data that were not fitted have refused it, the answer is one of both.
+    """
+    plainly = diagnosis.verdict in ("nothing missing", "calibration only")
+    if not plainly or not diagnosis.hypotheses or diagnosis.heard is not None:
+        return diagnosis
+    lead = diagnosis.hypotheses[0]
+    gain = diagnosis.two_log_bayes_factor(lead)
+    if gain <= TIED:
+        return diagnosis
+    near = [t for t in diagnosis.hypotheses if diagnosis.two_log_bayes_factor(t) > gain - TIED]
+    names = tuple(t.effect.name for t in near if diagnosis.two_log_bayes_factor(t) > TIED)
+    note = (
+        f"{lead.effect.name} explains the recording better than calibration alone, by {gain:.1f} "
+        f"in -2 ln evidence, of which {diagnosis.due:.0f} are needed to name it: neither is certain"
+    )
+    if check := family(lead.effect.name).settled_by:
+        note = f"{note}; what would settle it: {check}"
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, one_of=("calibration alone", *names), notes=notes)
+
+
 def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis with what explains the data as well as the named effect, if anything does."""
     best = diagnosis.found

@@ -23,7 +23,7 @@ from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..sparse.freed_memory import give_back_freed_memory
-from ..updating.confusers import with_confusers
+from ..updating.confusers import with_confusers, with_doubt
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
@@ -168,6 +168,7 @@ def _judged(
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = with_confusers(judged(prepared, found)), lead.distrust
+    found = with_doubt(found)
     if found.found is None:
         found = prudently_calibrated(prepared, found)
         plain = renewed(asked, prepared, found.plain)
