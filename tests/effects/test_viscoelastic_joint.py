@@ -29,7 +29,7 @@ from chladni.geometry.sampling import farthest_point_sample, nearest_points
 from chladni.model.assembly import Bushes
 from chladni.updating.accuracy import products
 from chladni.updating.damping_scatter import ModalDamping
-from chladni.updating.likelihood import Responses
+from chladni.updating.likelihood import Responses, along
 from chladni.updating.map_fit import beside, constants
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.rising import Dissipated
@@ -90,7 +90,7 @@ def test_damping_is_half_the_loss_factor_times_the_slope_of_the_eigenvalue(masti
     effect = replace(effect, band=(effect.reference,) * 2)  # of one stiffness at all frequencies
     state = evaluate(model, [effect], X)
     eta = effect.exponent(X)[0]
-    share = np.diagonal(state.dK[0])[FLEXIBLE] / state.lam[FLEXIBLE]
+    share = along(state.dK, state.vectors)[0, FLEXIBLE] / state.lam[FLEXIBLE]
     assert_allclose(state.dissipated.ratio[FLEXIBLE], eta / 2 * share, rtol=1e-10)
     assert share.max() > 0.05
     assert_allclose(state.dissipated.ratio[:6], 0, atol=1e-12)

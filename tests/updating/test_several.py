@@ -230,7 +230,8 @@ def test_what_is_written_holds_all_that_was_found(found):
 
 def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monkeypatch):
     """A null costs nothing and stays one."""
-    null = SimpleNamespace(data=SimpleNamespace(error=1), effects=())
+    fit = SimpleNamespace(state=SimpleNamespace(dissipated=None))
+    null = SimpleNamespace(data=SimpleNamespace(error=1), effects=(), fit=fit)
     fits = SimpleNamespace(passes=True, p=0.5, what="", where="")
     lead = SimpleNamespace(effect=SimpleNamespace(name="point-mass"))
     monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
