@@ -250,8 +250,7 @@ def _settled(
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
         now = fit(model, effects, replace(data, scale=scale), mass_measurement, x)
         S = over_scales(data, now.state, *beside(effects, mass_measurement, now.x, now.state))
-        S += sum(2 * float(np.log(p.sd)) for p in unknowns(effects))
-        S += sum(2 * float(np.log(effect.trials_factor)) for effect in effects)
+        S += constants(effects)
         now = replace(now, neg2_log_evidence=S)
         if best is not None and now.neg2_log_evidence > best.neg2_log_evidence - 0.05:
             break
