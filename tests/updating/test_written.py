@@ -169,6 +169,27 @@ def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
     assert (found.plain is not plain) == kept
 
 
+def test_where_no_number_serves_the_deck_stays_as_it_is(monkeypatch, reduced, responses):
+    """Neither the prudent values nor those of plain calibration, 8 sd off, which nobody has."""
+    data = responses.over(reduced.model)
+    base = (ordinary(reduced.groups, "E", [0]),)
+
+    def at(x):
+        found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
+        return HypothesisFit(Effect(), found, reduced.model)
+
+    monkeypatch.setattr(outcome, "as_written", lambda null, mass: at(0.2))
+    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
+    prepared = SimpleNamespace(problem=problem, score=data)
+    plain = at(0.5)
+    found = outcome.prudently_calibrated(
+        prepared, Diagnosis(plain, plain, plain, (), "calibration only")
+    )
+    assert found.plain.fit.x == pytest.approx([0.0])
+    assert found.verdict == "nothing missing"
+    assert "its own, which stay" in found.notes[-1]
+
+
 def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses):
     """A stiffness that is no longer positive has no Q: the calibration stays, without a fault."""
     data = responses.over(reduced.model)

@@ -15,7 +15,9 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
+from .leaning import leaning
 from .likelihood import Poles
+from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 
@@ -189,7 +191,8 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
     Plain calibration would bend E, rho and t to make up for mesh and joints. Where errors of the
     model are so large that the prudent values fit worse than the deck as it was given, with its
-    mesh error or as it is written, it stays.
+    mesh error or as it is written, plain calibration is the answer; where that needs numbers no
+    structure of this deck has, or fits no better either, the deck's own stay.
     """
     null = diagnosis.null
     prudent = as_written(null, prepared.problem.mass_measurement)
@@ -207,9 +210,32 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
     before, after = (Q(effects, x) for effects, x in decks)
     bare_before, bare_after = (Q(effects, _mesh_idle(effects, x)) for effects, x in decks)
-    if after > before or bare_after > bare_before:
+    if after <= before and bare_after <= bare_before:
+        return replace(diagnosis, plain=prudent)
+    plain = diagnosis.plain.fit
+    if not leaning(plain) and Q(plain.effects, plain.x) <= bare_before:
         return diagnosis
-    return replace(diagnosis, plain=prudent)
+    return _deck_stays(prepared, diagnosis)
+
+
+def _deck_stays(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """The deck's own numbers, where none that serve better were found."""
+    plain, mass = diagnosis.plain, prepared.problem.mass_measurement
+    x = [
+        np.array([p.nominal for p in e.parameters]) if e.kind == "ordinary" else plain.fit.of(e)
+        for e in plain.fit.effects
+    ]
+    given = fit(
+        plain.model, plain.fit.effects, plain.data, mass, np.concatenate([np.zeros(0), *x]),
+        max_steps=0,
+    )  # fmt: skip
+    note = (
+        "no calibrated numbers that a structure of this deck may have fit better than its own, "
+        "which stay: what is left is of mesh, joints and scatter"
+    )
+    verdict = "nothing missing" if diagnosis.verdict == "calibration only" else diagnosis.verdict
+    notes = (*diagnosis.notes, note)
+    return replace(diagnosis, plain=replace(plain, fit=given), verdict=verdict, notes=notes)
 
 
 def _mesh_idle(effects: Sequence[Effect], x: np.ndarray) -> np.ndarray:
