@@ -15,7 +15,7 @@ from chladni.errors import ModelError
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
-from chladni.updating.hypothesis_fit import HypothesisFit, as_written
+from chladni.updating.hypothesis_fit import HypothesisFit, as_found, as_written
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
@@ -148,6 +148,19 @@ def test_calibration_alone_is_written_without_scatter(reduced, responses):
     assert deck.fit.x[0] == pytest.approx(0.04, abs=2e-3)
 
 
+def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
+    """The scatter beside them is gone; values and what is known of them stay."""
+    effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)]
+    start = np.concatenate([[p.mean for p in e.parameters] for e in effects])
+    fitted = fit(reduced.model, effects, responses.over(reduced.model), None, start)
+    found = as_found(HypothesisFit(Effect(), fitted, reduced.model))
+    assert found.fit.effects == (effects[0],)
+    assert found.fit.of(effects[0]) == fitted.of(effects[0])
+    assert found.fit.sd(effects[0]) == fitted.sd(effects[0])
+    due = evaluate(reduced.model, [effects[0]], fitted.of(effects[0]), False)
+    assert found.fit.state.lam[6:] == pytest.approx(due.lam[6:])
+
+
 @pytest.mark.parametrize(("E", "kept"), [(0.03, True), (0.2, False)])
 def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
     monkeypatch, reduced, responses, E, kept
@@ -159,7 +172,8 @@ def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
         found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
         return HypothesisFit(Effect(), found, reduced.model)
 
-    monkeypatch.setattr(outcome, "as_written", lambda null, mass: at(E))
+    for made in ("as_found", "as_written"):
+        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: at(E))
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
     prepared = SimpleNamespace(problem=problem, score=data)
     plain = at(0.04)
@@ -178,7 +192,8 @@ def test_where_no_number_serves_the_deck_stays_as_it_is(monkeypatch, reduced, re
         found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
         return HypothesisFit(Effect(), found, reduced.model)
 
-    monkeypatch.setattr(outcome, "as_written", lambda null, mass: at(0.2))
+    for made in ("as_found", "as_written"):
+        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: at(0.2))
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
     prepared = SimpleNamespace(problem=problem, score=data)
     plain = at(0.5)
@@ -205,7 +220,8 @@ def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, res
         return real(model, effects, x, gradient)
 
     monkeypatch.setattr(outcome, "evaluate", evaluated)
-    monkeypatch.setattr(outcome, "as_written", lambda null, mass: none)
+    for made in ("as_found", "as_written"):
+        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: none)
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
     prepared = SimpleNamespace(problem=problem, score=data)
     diagnosis = Diagnosis(plain, plain, plain, (), "calibration only")

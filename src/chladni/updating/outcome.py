@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..model.assembly import Assembly
 from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
-from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_written
+from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_found, as_written
 from .leaning import leaning
 from .likelihood import Poles
 from .map_fit import fit
@@ -189,31 +190,32 @@ def _unexplained(
 def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     """Calibration as it is answered with where nothing is named: the null as a deck can hold it.
 
-    Plain calibration would bend E, rho and t to make up for mesh and joints. Where errors of the
-    model are so large that the prudent values fit worse than the deck as it was given, with its
-    mesh error or as it is written, plain calibration is the answer; where that needs numbers no
-    structure of this deck has, or fits no better either, the deck's own stay.
+    Plain calibration would bend E, rho and t to make up for mesh and joints. Numbers as the null
+    found them come first, then fitted anew. Where errors of the model are so large that both fit
+    worse than the deck as it was given, with its mesh error or as it is written, plain calibration
+    is the answer; where that needs numbers no structure of this deck has, or fits no better either,
+    the deck's own stay.
     """
-    null = diagnosis.null
-    prudent = as_written(null, prepared.problem.mass_measurement)
+    null, mass = diagnosis.null, prepared.problem.mass_measurement
     if diagnosis.verdict == "nothing missing":
-        return replace(diagnosis, plain=prudent)
+        return replace(diagnosis, plain=as_written(null, mass))
     problem, data = prepared.problem, prepared.score.over(null.model)
-    decks = (problem.base, _given(problem, null)), (prudent.fit.effects, prudent.fit.x)
 
-    def Q(effects: Sequence[Effect], x: np.ndarray) -> float:
+    def Q(effects: Sequence[Effect], x: np.ndarray) -> np.ndarray:
+        """With what the mesh hides, and without, as a deck has it."""
         try:
-            state = evaluate(null.model, effects, x, False)
+            each = [evaluate(null.model, effects, at, False) for at in (x, _mesh_idle(effects, x))]
         except ModelError:  # no structure at all: nothing speaks for it
-            return np.inf
-        return data.Q(state, data.use)
+            return np.full(2, np.inf)
+        return np.array([data.Q(state, data.use) for state in each])
 
-    before, after = (Q(effects, x) for effects, x in decks)
-    bare_before, bare_after = (Q(effects, _mesh_idle(effects, x)) for effects, x in decks)
-    if after <= before and bare_after <= bare_before:
-        return replace(diagnosis, plain=prudent)
+    before = Q(problem.base, _given(problem, null))
+    for made in (as_found, partial(as_written, mass_measurement=mass)):
+        prudent = made(null)
+        if (Q(prudent.fit.effects, prudent.fit.x) <= before).all():
+            return replace(diagnosis, plain=prudent)
     plain = diagnosis.plain.fit
-    if not leaning(plain) and Q(plain.effects, plain.x) <= bare_before:
+    if not leaning(plain) and Q(plain.effects, plain.x)[1] <= before[1]:
         return diagnosis
     return _deck_stays(prepared, diagnosis)
 

@@ -22,7 +22,7 @@ SEEN = 1.5  # decades of visibility over which the one price falls to the other
 def price_spurious(share: np.ndarray | float) -> np.ndarray:
     """Price of an unpaired pole, -2 ln(p/(1-p)) + 2 ln L - ln 2π, where a pair costs δ²/σ² + ln σ².
 
-    >>> price_spurious(0.05) > price_spurious(0.4) > 0
+    >>> bool(price_spurious(0.05) > price_spurious(0.4) > 0)
     True
     """
     odds = np.asarray(share) / (1 - np.asarray(share))
@@ -37,7 +37,7 @@ def share_spurious(strength: np.ndarray) -> np.ndarray:
     for spurious poles and to rise from nothing for modes, both linearly.
 
     >>> low, high = share_spurious(np.array([0.03, 1.0]))
-    >>> low > SPURIOUS > high
+    >>> bool(low > SPURIOUS > high)
     True
     """
     u = np.clip(1 - np.log10(strength) / np.log10(FAINTEST), 0, 1)

@@ -5,6 +5,7 @@ import scipy.linalg as sl
 
 from ..errors import ModelError
 
+SEEN = 1e-7  # of the middle eigenvalue: rounding of the largest, from which another way is gone
 FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
 
 
@@ -23,7 +24,20 @@ def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     flexible = lam[lam > FLEXIBLE * lam[-1]]
     if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
         raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
+    middle = float(np.median(lam))
+    if np.finfo(float).eps * lam[-1] > SEEN * middle:
+        return _softest_first(K, M, middle)
     return lam, phi
+
+
+def _softest_first(K: np.ndarray, M: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same where something is so stiff that its rounding would be seen in soft modes.
+
+    Of M φ = μ (K + σM) φ, μ = 1 / (λ + σ), the softest are the largest, and rounding is of these.
+    """
+    mu, phi = sl.eigh(M, K + shift * M, driver="gvd")
+    mu, phi = mu[::-1], phi[:, ::-1]
+    return 1 / mu - shift, phi / np.sqrt(np.einsum("ij,ij->j", phi, M @ phi))
 
 
 def in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
