@@ -170,13 +170,10 @@ def _judged(
         found, distrust = with_confusers(judged(prepared, found)), lead.distrust
     found = with_doubt(found)
     if found.found is None:
-        null = renewed(asked, prepared, found.null)
-        calm = prudently_calibrated(prepared, replace(found, null=null.hypothesis))
-        plain, note, distrust = calm.plain, null.note, null.distrust
-        if plain.model is not null.hypothesis.model:
-            again = renewed(asked, prepared, plain)
-            plain, note, distrust = again.hypothesis, again.note, again.distrust
-        found = replace(calm, null=found.null, plain=plain, notes=(*calm.notes, note))
+        found = prudently_calibrated(prepared, found)
+        plain = renewed(asked, prepared, found.plain)
+        found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
+        distrust = plain.distrust
     return found, distrust
 
 
