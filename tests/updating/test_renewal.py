@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect
+from chladni.effects.ordinary import ordinary
 from chladni.errors import ModelError
 from chladni.updating import renewal
 from chladni.updating.accuracy import Accuracy
 from chladni.updating.hypothesis_fit import HypothesisFit
+from chladni.updating.map_fit import fit
 
 
 class Remade(Effect):
@@ -48,6 +50,37 @@ def test_is_fitted_again_only_beyond_the_limit(monkeypatch, error, model):
     assert done.hypothesis.model == model
     assert f"{error:.2%}" in done.note
     assert bool(done.distrust) == (model == "wide")
+
+
+def test_numbers_that_are_held_are_seen_over_the_wider_basis_and_stay(monkeypatch, reduced):
+    """They are not fitted again; their state is that of the wider model."""
+    errors = iter([2e-3, 2e-4])
+    monkeypatch.setattr(
+        renewal, "_accuracy",
+        lambda *given: Accuracy(np.ones(1), np.array([next(errors)]), np.zeros((3, 1))),
+    )  # fmt: skip
+    monkeypatch.setattr(renewal, "fitted", lambda *given: pytest.fail("fitted again"))
+    E = ordinary(reduced.groups, "E", [0])
+    fits = fit(reduced.model, [E], Still(), None, np.array([0.1]), max_steps=0)
+    wide = reduced.model.with_components()
+    monkeypatch.setattr(Accuracy, "renewed", lambda self, narrow: wide)
+    prepared = SimpleNamespace(problem=SimpleNamespace(mass_measurement=None))
+    begun = HypothesisFit(Effect(), fits, reduced.model)
+    done = renewal.renewed(None, prepared, begun, held=True).hypothesis
+    assert done.model is wide
+    assert done.fit.x == pytest.approx([0.1])
+    assert done.fit.state is not fits.state
+    assert done.fit.state.lam[6:] == pytest.approx(fits.state.lam[6:])
+
+
+class Still:
+    """Data that say nothing."""
+
+    def over(self, model):
+        return self
+
+    def residual(self, state, gradient):
+        return np.zeros(1), np.zeros((1, 1))
 
 
 def test_is_widened_until_it_serves(monkeypatch):

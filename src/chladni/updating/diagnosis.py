@@ -81,6 +81,13 @@ class Diagnosis:
         """Gain in -2 ln evidence that is needed to name one of the families that were tried."""
         return threshold(self.null.data, len(self.hypotheses))
 
+    @property
+    def as_the_null(self) -> bool:
+        """Whether the calibration has its numbers as the null found them."""
+        plain, null = self.plain.fit, self.null.fit
+        shared = [e for e in plain.effects if e in null.effects]
+        return all(np.array_equal(plain.of(e), null.of(e)) for e in shared)
+
     def two_log_bayes_factor(self, hypothesis: HypothesisFit) -> float:
         """How much better than the null, in -2 ln evidence."""
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence

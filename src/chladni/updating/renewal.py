@@ -14,6 +14,7 @@ from .likelihood import Poles, Responses
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import SOLVED, updating_problem
 from .question import Prepared, Question
+from .reduced_model import evaluate
 from .reduced_problem import reduced_problem
 
 TRIES = 3  # times the basis is widened by what it lacks
@@ -46,13 +47,15 @@ class Renewal:
         )
 
 
-def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -> Renewal:
+def renewed(
+    question: Question, prepared: Prepared, hypothesis: HypothesisFit, held: bool = False
+) -> Renewal:
     """The hypothesis on ground that bears it, and a sentence on how far the reduced model is off.
 
     Mesh error, modal discrepancy and the basis belong to the structure they were made for. Where
     the effect makes it another one they are made anew. Elsewhere the basis is widened by what it
     lacks, while it lacks more than ``LIMIT``. The same parameters are then fitted from where they
-    were.
+    were, or ``held`` there.
     """
     problem = prepared.problem
     if any(e.remakes_structure for e in hypothesis.effects):
@@ -65,7 +68,11 @@ def renewed(question: Question, prepared: Prepared, hypothesis: HypothesisFit) -
         model, begun = found.renewed(hypothesis.model), hypothesis.fit
         data = hypothesis.data.over(model)
         try:
-            fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
+            if held:
+                state = evaluate(model, begun.effects, begun.x)
+                fit = replace(begun, state=state, data=data)
+            else:
+                fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
         except ModelError as error:  # what the coarse basis could not feel
             note = f"{note}; with what it lacked added to its basis it could not be fitted: {error}"
             break

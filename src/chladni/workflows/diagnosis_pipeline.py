@@ -171,7 +171,7 @@ def _judged(
     found = with_doubt(found)
     if found.found is None:
         found = prudently_calibrated(prepared, found)
-        plain = renewed(asked, prepared, found.plain)
+        plain = renewed(asked, prepared, found.plain, held=found.as_the_null)
         found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
         distrust = plain.distrust
     return found, distrust
