@@ -5,7 +5,7 @@ import scipy.linalg as sl
 
 from ..errors import ModelError
 
-SEEN = 1e-7  # of the middle eigenvalue: rounding of the largest, from which another way is gone
+SEEN = 0.1  # rounding of the highest λ [rad²/s²] beyond which soft modes are sought another way
 FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
 
 
@@ -24,9 +24,9 @@ def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     flexible = lam[lam > FLEXIBLE * lam[-1]]
     if lam[0] < -max(1e-6 * float(np.median(flexible)), ROUNDING * lam[-1]):
         raise ModelError(f"an effect left negative stiffness: {lam[0]:.2e} rad²/s²")
-    middle = float(np.median(lam))
-    if np.finfo(float).eps * lam[-1] > SEEN * middle:
-        return _softest_first(K, M, middle)
+    rounding = np.finfo(float).eps * float(lam[-1])
+    if rounding > SEEN:
+        return _softest_first(K, M, 1e7 * rounding)
     return lam, phi
 
 
