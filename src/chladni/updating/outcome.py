@@ -212,10 +212,10 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     before = Q(problem.base, _given(problem, null))
     for made in (as_found, partial(as_written, mass_measurement=mass)):
         prudent = made(null)
-        if (Q(prudent.fit.effects, prudent.fit.x) <= before).all():
+        if not (Q(prudent.fit.effects, prudent.fit.x) > before).any():  # no Q is no worse
             return replace(diagnosis, plain=prudent)
     plain = diagnosis.plain.fit
-    if not leaning(plain) and Q(plain.effects, plain.x)[1] <= before[1]:
+    if not (leaning(plain) or (Q(plain.effects, plain.x) > before).all()):
         return diagnosis
     return _deck_stays(prepared, diagnosis)
 
