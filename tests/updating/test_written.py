@@ -161,12 +161,9 @@ def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
     assert found.fit.state.lam[6:] == pytest.approx(due.lam[6:])
 
 
-@pytest.mark.parametrize(("E", "kept"), [(0.03, True), (0.2, False)])
-def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
-    monkeypatch, reduced, responses, E, kept
-):
-    data = responses.over(reduced.model)
-    base = (ordinary(reduced.groups, "E", [0]),)
+def prudent(monkeypatch, reduced, responses, E, plain):
+    """Calibration as it is answered with, E of the null and of plain calibration given."""
+    data, base = responses.over(reduced.model), (ordinary(reduced.groups, "E", [0]),)
 
     def at(x):
         found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
@@ -175,31 +172,23 @@ def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
     for made in ("as_found", "as_written"):
         monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: at(E))
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
-    prepared = SimpleNamespace(problem=problem, score=data)
-    plain = at(0.04)
-    found = outcome.prudently_calibrated(
-        prepared, Diagnosis(plain, plain, plain, (), "calibration only")
-    )
+    begun = at(plain)
+    diagnosis = Diagnosis(begun, begun, begun, (), "calibration only")
+    found = outcome.prudently_calibrated(SimpleNamespace(problem=problem, score=data), diagnosis)
+    return found, begun
+
+
+@pytest.mark.parametrize(("E", "kept"), [(0.03, True), (0.2, False)])
+def test_prudent_values_are_kept_where_they_do_not_fit_worse_than_the_deck(
+    monkeypatch, reduced, responses, E, kept
+):
+    found, plain = prudent(monkeypatch, reduced, responses, E, 0.04)
     assert (found.plain is not plain) == kept
 
 
 def test_where_no_number_serves_the_deck_stays_as_it_is(monkeypatch, reduced, responses):
     """Neither the prudent values nor those of plain calibration, 8 sd off, which nobody has."""
-    data = responses.over(reduced.model)
-    base = (ordinary(reduced.groups, "E", [0]),)
-
-    def at(x):
-        found = fit(reduced.model, base, data, None, np.array([x]), max_steps=0)
-        return HypothesisFit(Effect(), found, reduced.model)
-
-    for made in ("as_found", "as_written"):
-        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: at(0.2))
-    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
-    prepared = SimpleNamespace(problem=problem, score=data)
-    plain = at(0.5)
-    found = outcome.prudently_calibrated(
-        prepared, Diagnosis(plain, plain, plain, (), "calibration only")
-    )
+    found, _ = prudent(monkeypatch, reduced, responses, 0.2, 0.5)
     assert found.plain.fit.x == pytest.approx([0.0])
     assert found.verdict == "nothing missing"
     assert "its own, which stay" in found.notes[-1]

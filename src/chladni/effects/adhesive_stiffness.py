@@ -74,9 +74,14 @@ class AdhesiveStiffness(Effect):
         )
 
 
+def longest_beads(built: Structure) -> list[Connection]:
+    """Those that are tried, ``MOST`` of them."""
+    return sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
+
+
 def beads_of(built: Structure) -> list[AdhesiveStiffness]:
     """The effect of every bead, and of all of a part together."""
-    found = sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
+    found = longest_beads(built)
     families = {text: (K, sd) for text, K, sd in joint_families(built)} if found else {}
     return [_of_one(built, bead, families["adhesive"], len(found)) for bead in found]
 
@@ -127,14 +132,27 @@ def candidates(context: SearchContext) -> list[Candidate]:
     return best_places(context, effects, points, FOLLOWED, -1.0, carried=True)
 
 
-def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """E of a bead times e^-2 to e^-3."""
-    found = beads(structure(article.assembly))
+def softened_bead(
+    assembly: Assembly, rng: np.random.Generator, ln_factor: tuple[float, float]
+) -> tuple[Connection, float, float]:
+    """A bead drawn to be concealed, the factor on its E from a range of its logarithm, and E [Pa].
+
+    Raises
+    ------
+    ModelError
+        If there is no bead.
+    """
+    found = beads(structure(assembly))
     if not found:
         raise ModelError("the structure has no bead of adhesive")
     bead = found[int(rng.integers(len(found)))]
-    factor = float(np.exp(rng.uniform(-3.0, -2.0)))
-    E = (modulus_of(article.assembly, bead) or 1.0) * factor
+    factor = float(np.exp(rng.uniform(*ln_factor)))
+    return bead, factor, (modulus_of(assembly, bead) or 1.0) * factor
+
+
+def conceal(article: Article, rng: np.random.Generator) -> Article:
+    """E of a bead times e^-2 to e^-3."""
+    bead, factor, E = softened_bead(article.assembly, rng, (-3.0, -2.0))
     truth = {"point_m": bead.point.tolist(), "value": E, "parameters": {"E": E}}
     made = with_factor_on(article.assembly, bead, factor)
     return replace(article, assembly=made, truth=truth)

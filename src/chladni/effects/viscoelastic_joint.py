@@ -16,16 +16,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import ModelError
-from ..fem.assemble import Structure, structure
+from ..fem.assemble import Structure
 from ..fem.derivative import of_lumps
 from ..model.assembly import Assembly
-from .adhesive_stiffness import MOST, modulus_of
+from .adhesive_stiffness import MOST, longest_beads, modulus_of, softened_bead
 from .effect import Beside, Effect, MatrixTerm, Parameter, Rise
 from .estimate import Estimate, Location
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
-from .joints import Connection, beads, stiffness, with_factor_on, with_solids
+from .joints import Connection, stiffness, with_factor_on, with_solids
 from .model_families import joint_families
 from .search_context import Candidate, SearchContext, best_places
 
@@ -168,8 +167,7 @@ class _Suspect:
 
 def _suspects(built: Structure, bushes: Sequence[Connection]) -> list[_Suspect]:
     """Every bead, longest first, all bushes together and each of them; ``MOST`` of either."""
-    found = sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
-    out = [_Suspect(bead, stiffness(built, bead), "adhesive") for bead in found]
+    out = [_Suspect(b, stiffness(built, b), "adhesive") for b in longest_beads(built)]
     whole = [_together(bushes)] if len(bushes) > 1 else []
     for joint in [*whole, *bushes][:MOST]:
         rows = joint.elements.tolist()
@@ -279,12 +277,8 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """E of a bead times e^-3.5 to e^-2.5, with a loss factor of 0.3 to 0.8 at all frequencies."""
-    found = beads(structure(article.assembly))
-    if not found:
-        raise ModelError("the structure has no bead of adhesive that could dissipate")
-    bead = found[int(rng.integers(len(found)))]
-    factor, eta = float(np.exp(rng.uniform(-3.5, -2.5))), float(rng.uniform(0.3, 0.8))
-    E = (modulus_of(article.assembly, bead) or 1.0) * factor
+    bead, factor, E = softened_bead(article.assembly, rng, (-3.5, -2.5))
+    eta = float(rng.uniform(0.3, 0.8))
     truth = {
         "point_m": bead.point.tolist(), "value": E, "parameters": {"E": E, "loss factor": eta},
     }  # fmt: skip

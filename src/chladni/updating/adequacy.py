@@ -129,7 +129,7 @@ def adequacy(
     test = FitTest(p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
-    return test if coupling is None else _alive(test, coupling)
+    return test if coupling is None else _coupled_by_damping(test, coupling)
 
 
 def _first(data: Responses, state: State) -> float:
@@ -151,7 +151,7 @@ def _evenly_damped(test: FitTest, damping: ModalDamping) -> FitTest:
     return replace(test, passes=False, p=p, what=what, where=where, modes_hz=modes)
 
 
-def _alive(test: FitTest, coupling: ModeCoupling) -> FitTest:
+def _coupled_by_damping(test: FitTest, coupling: ModeCoupling) -> FitTest:
     """The test, or that of complex modes where it is the less likely of the two."""
     p, row, what, modes = coupling.tested()
     test = replace(test, statistics=(*test.statistics, row))

@@ -176,14 +176,21 @@ def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | N
 
 
 def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, float]]) -> Path:
-    """Statistics of what is left, (value, median, low, high) each, as multiples of their median."""
+    """Statistics of what is left, (value, median, low, high) each, as multiples of their median.
+
+    What is none at all stands at the left edge of the logarithmic axis.
+    """
     figure = Figure(figsize=(7.6, 0.42 * len(rows) + 1.1), layout="constrained")
     ax = figure.subplots()
-    for k, (value, median, low, high) in enumerate(rows.values()):
-        ax.barh(k, (high - low) / median, left=low / median, color="#aab4bf", height=0.5)
+    over = np.array([(value, low, high) for value, _, low, high in rows.values()])
+    over = over / np.array([[median] for _, median, *_ in rows.values()])
+    edge = 0.8 * float(over[over > 0].min(initial=0.5))
+    for k, (value, low, high) in enumerate(np.maximum(over, edge)):
+        ax.barh(k, high - low, left=low, color="#aab4bf", height=0.5)
         ax.plot(1.0, k, "|", color="#555555", ms=12)
-        ax.plot(value / median, k, "o", color=AFTER if value <= high else BEFORE, ms=7)
+        ax.plot(value, k, "o", color=AFTER if value <= high else BEFORE, ms=7, clip_on=False)
     ax.set(xscale="log", xlabel="over the median of draws of the model itself [-]")
+    ax.set_xlim(left=edge)
     ax.set_yticks(range(len(rows)), list(rows))
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
