@@ -35,7 +35,17 @@ def test_calibration_that_took_what_no_deck_is_off_by_is_in_doubt(sign):
     E = PartScale((Parameter("E", "Pa", 0.0, 0.06),), "E of strip")
     for away in (0.9 * FAR, 1.2 * FAR):
         x = np.array([sign * away * 0.06])
-        said = in_doubt(SimpleNamespace(effects=(E,), of=lambda effect, x=x: x))
+        found = SimpleNamespace(effects=(E,), of=lambda effect, x=x: x)
+        said = in_doubt(found, found)
         assert bool(said) == (away > FAR)
     assert "E of strip" in said[0]
     assert "measure it first" in said[0]
+
+
+def test_joints_that_no_joint_is_like_leave_calibration_in_doubt():
+    """Whether a deck holds them or the null alone; said once."""
+    idle, null = fitted("welds", 0.0), fitted("adhesive", 1.2 * FAR)
+    assert in_doubt(idle, fitted("adhesive", 0.9 * FAR)) == ()
+    for deck in (idle, null):
+        (said,) = in_doubt(deck, null)
+        assert said.count("the stiffness of adhesive as a whole") == 1
