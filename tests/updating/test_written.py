@@ -164,11 +164,34 @@ def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
     assert found.fit.state.lam[6:] == pytest.approx(due.lam[6:])
 
 
+def glued(reduced):
+    """A hundredth of the plate's stiffness as if it were that of adhesive."""
+    K, prior = reduced.structure.system.K, (Parameter("k", "-", 0.0, ADHESIVE),)
+    none = sp.csr_array(K.shape)
+    return ModelFamily(prior, "adhesive", slope=Slope(none, none, 0.01 * K))
+
+
+@pytest.mark.parametrize(("x", "verdict"), [(1.6, "calibration only"), (1.4, "nothing missing")])
+def test_a_deck_whose_joints_are_strained_is_calibrated(reduced, responses, x, verdict):
+    """The joints explain what E, rho and t would add nothing to: they are what is written."""
+    data, base = responses.over(reduced.model), (ordinary(reduced.groups, "E", [0]), glued(reduced))
+
+    def at(x):
+        found = fit(reduced.model, base, data, None, np.array([0.0, x]), max_steps=0)
+        return HypothesisFit(Effect(), found, reduced.model)
+
+    data = replace(data, values=data.model(at(x).fit.state))
+    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(2))
+    quiet = Diagnosis(at(0.0), at(x), at(0.0), (), "nothing missing")
+    found = outcome.prudently_calibrated(SimpleNamespace(problem=problem, score=data), quiet)
+    assert found.verdict == verdict
+    written = [e.text for e in found.plain.fit.effects]
+    assert written == [base[0].text, "adhesive"][: 2 if x > 1.5 else 1]
+
+
 def test_joints_that_took_more_than_they_scatter_are_numbers_of_the_deck(responses, reduced):
     """Beyond 3 sd: calibrated beside E; within, a nuisance that no deck holds."""
-    E, K = ordinary(reduced.groups, "E", [0]), reduced.structure.system.K
-    none, prior = sp.csr_array(K.shape), (Parameter("k", "-", 0.0, ADHESIVE),)
-    adhesive = ModelFamily(prior, "adhesive", slope=Slope(none, none, 0.01 * K))
+    E, adhesive = ordinary(reduced.groups, "E", [0]), glued(reduced)
     for x, kept in ((1.6, ["E", "k"]), (1.4, ["E"])):
         at = np.array([0.02, x])
         data = responses.over(reduced.model)

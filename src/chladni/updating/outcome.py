@@ -16,7 +16,7 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_found, as_written
-from .leaning import leaning
+from .leaning import leaning, strained
 from .likelihood import Poles
 from .map_fit import fit
 from .question import Prepared, Question
@@ -194,9 +194,12 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     found them come first, then fitted anew. Where errors of the model are so large that both fit
     worse than the deck as it was given, with its mesh error or as it is written, plain calibration
     is the answer; where that needs numbers no structure of this deck has, or fits no better either,
-    the deck's own stay.
+    the deck's own stay. Joints that took more than joints scatter are calibrated, whatever E, rho
+    and t gain beside them.
     """
     null, mass = diagnosis.null, prepared.problem.mass_measurement
+    if diagnosis.verdict == "nothing missing" and strained(null.fit):
+        diagnosis = replace(diagnosis, verdict="calibration only")
     if diagnosis.verdict == "nothing missing":
         return replace(diagnosis, plain=as_written(null, mass))
     problem, data = prepared.problem, prepared.score.over(null.model)
