@@ -83,30 +83,62 @@ def test_lines_beside_one_are_moved_turned_and_stretched():
 TOWARDS = np.array([1.0, 0.0, 0.0])
 
 
+def missed(lines, true, sets):
+    """How far sets of shells are from a line, seen through waves as long as modes have."""
+    x = lines.middle
+    seen = np.exp(-((x[:, None] - x) ** 2).sum(axis=2) / (2 * 0.04**2))
+    wrong = np.reshape([np.bincount(s, minlength=len(x)) for s in sets], (len(sets), len(x)))
+    wrong = wrong - np.bincount(true.shells, minlength=len(x))
+    return np.einsum("ki,ij,kj->k", wrong, seen, wrong)
+
+
 def test_lines_are_moved_until_none_beside_explains_more():
-    """Seen through waves as long as modes have: the search ends far nearer than it began."""
+    """The search ends far nearer than the nearest of the lines that were drawn."""
     deck = plate(0.4, 0.3, 24, 18, 1.5e-3)
     lines, way = LineFinder.of(deck), np.array([np.cos(0.5), np.sin(0.5), 0.0])
-    true = lines.through(7 * 24 + 11, way, 1.9)
-    x, asked = lines.middle, []
-    seen = np.exp(-((x[:, None] - x) ** 2).sum(axis=2) / (2 * 0.04**2))
+    true, asked = lines.through(7 * 24 + 11, way, 1.9), []
 
     def bending_scores(about, sets):
         asked.extend(sets)
-        wrong = [np.bincount(s, minlength=len(x)) for s in sets]
-        wrong = np.reshape(wrong, (len(sets), len(x))) - np.bincount(true.shells, minlength=len(x))
-        return np.full(len(sets), -0.5), np.einsum("ki,ij,kj->k", wrong, seen, wrong)
+        return np.full(len(sets), -0.5), missed(lines, true, sets)
 
     first = lines.drawn(np.arange(0, len(deck.shells), 9), (1.0, 2.5))
-    begun = bending_scores(0, [line.shells for line in first])[1].min()
-    asked.clear()
     ends, tried = _at_rest(SimpleNamespace(bending_scores=bending_scores), 0, lines, first)
     assert tried == len(asked) == len({s.tobytes() for s in asked})  # each set of shells once
-    rest = [bending_scores(0, [line.shells])[1][0] for line in ends]
-    assert min(rest) < 0.2 * begun
+    rest = missed(lines, true, [line.shells for line in ends])
+    assert rest.min() < 0.2 * missed(lines, true, [line.shells for line in first]).min()
     for line, score in zip(ends, rest, strict=True):
-        beside = bending_scores(0, [m.shells for m in lines.moved(line)])[1]
-        assert beside.min() >= score - WORTH
+        assert missed(lines, true, [m.shells for m in lines.moved(line)]).min() >= score - WORTH
+
+
+def test_a_line_that_was_fitted_goes_on_to_a_better_one_beside_it():
+    """Along with its strength; each line that was tried is counted. At rest it stays."""
+    groups = element_groups(structure(plate(0.4, 0.3, 24, 18, 1.5e-3)))
+    lines = LineFinder.of(groups.structure.assembly)
+    begun = lines.through(7 * 24 + 11, TOWARDS, 1.9)
+    turned = np.array([np.cos(0.35), np.sin(0.35), 0.0])
+    true = lines.through(9 * 24 + 12, turned, 2.4)
+    strong = np.array([0.4])
+
+    def scores(effect, starts):
+        far = missed(lines, true, [effect.shells])[0]
+        return np.array([[far + (start[0] - strong[0]) ** 2 for start in starts]])
+
+    context = SimpleNamespace(
+        scan=bending_slopes, where=SimpleNamespace(groups=groups), bases=(None, "of the fit"),
+        scores=scores,
+    )  # fmt: skip
+    effect, x = crack(groups, begun, 100), np.array([-0.3])
+    better = effect.relocated(x, context)
+    before, after = missed(lines, true, [effect.shells, better.effect.shells])
+    assert after < 0.3 * before
+    assert better.start == pytest.approx(strong)
+    assert better.base == "of the fit"
+    assert better.effect.trials_factor > 100 + len(lines.moved(begun))
+    there = crack(groups, true, 100)
+    assert there.relocated(strong, context) is None
+    context.scan = None  # natural frequencies alone do not tell lines so near each other apart
+    assert effect.relocated(x, context) is None
 
 
 def test_first_frequency_of_a_strip_falls_as_beam_theory_says():

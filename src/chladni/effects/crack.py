@@ -38,6 +38,8 @@ STRETCHED = (0.7, 1.4)  # times its length
 BESIDE = 1.7  # of a shell's size: how far its neighbours are
 WORTH = 0.05  # in -2 ln posterior: a move that gains less is none
 FOLLOWED = 2  # lines that are worth a fit
+STEPS, BETTER = 4, 0.5  # of a line that was fitted, and what each has to gain in -2 ln posterior
+AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +164,7 @@ class Crack(Effect):
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    line: Line | None = None
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B."""
@@ -173,10 +176,36 @@ class Crack(Effect):
         """The shells of the line with a property of their own, 12I/t³ times f."""
         return cracked(assembly, self.shells, left(x[0]))
 
+    def relocated(self, x: np.ndarray, context: SearchContext) -> Candidate | None:
+        """Along a line beside it, a few steps at most, each evaluated as it is."""
+        if self.line is None or context.scan is None:
+            return None
+        groups, best = context.where.groups, self
+        lines, tried = LineFinder.of(groups.structure.assembly), self.trials_factor
+        least, start = _scored(context, self, x)
+        for _ in range(STEPS):
+            near = [crack(groups, line, tried) for line in lines.moved(best.line or self.line)]
+            scores = [_scored(context, effect, start) for effect in near]
+            tried += len(near)
+            k = min(range(len(near)), key=lambda k: scores[k][0], default=-1)
+            if k < 0 or scores[k][0] > least - BETTER:
+                break
+            best, (least, start) = near[k], scores[k]
+        if best is self:
+            return None
+        return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
+
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of 12I/t³."""
         value, high, low = (left(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
         return (Estimate("12I/T3", value, "-", low, high),)
+
+
+def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[float, np.ndarray]:
+    """The best score of an effect at some strengths about x, and that strength."""
+    starts = [x + shift for shift in AROUND]
+    scores = context.scores(effect, starts)[0]
+    return float(scores.min()), starts[int(np.argmin(scores))]
 
 
 def left(x: float) -> float:
@@ -196,7 +225,7 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     return Crack(
         (unknown,), f"on {name} through ({at} mm)", (name,), point=(x, y, z), radius=float(reach),
         grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()), trials_factor=tried,
-        shells=on, operator=congruence(groups.structure.T, K),
+        shells=on, operator=congruence(groups.structure.T, K), line=line,
     )  # fmt: skip
 
 
