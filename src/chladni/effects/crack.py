@@ -185,12 +185,15 @@ class Crack(Effect):
         least, start = _scored(context, self, x)
         for _ in range(STEPS):
             near = [crack(groups, line, tried) for line in lines.moved(best.line or self.line)]
-            scores = [_scored(context, effect, start) for effect in near]
+            scores = [float(context.scores(effect, [start]).min()) for effect in near]
             tried += len(near)
-            k = min(range(len(near)), key=lambda k: scores[k][0], default=-1)
-            if k < 0 or scores[k][0] > least - BETTER:
+            if not near:
                 break
-            best, (least, start) = near[k], scores[k]
+            k = int(np.argmin(scores))
+            score, strength = _scored(context, near[k], start)
+            if score > least - BETTER:
+                break
+            best, least, start = near[k], score, strength
         if best is self:
             return None
         return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
