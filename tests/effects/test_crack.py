@@ -13,6 +13,7 @@ from chladni.effects.crack import (
     LineFinder,
     _at_rest,
     candidates,
+    closer,
     crack,
     left,
 )
@@ -129,16 +130,16 @@ def test_a_line_that_was_fitted_goes_on_to_a_better_one_beside_it():
         scores=scores,
     )  # fmt: skip
     effect, x = crack(groups, begun, 100), np.array([-0.3])
-    better = effect.relocated(x, context)
+    better = closer(context, effect, x)
     before, after = missed(lines, true, [effect.shells, better.effect.shells])
     assert after < 0.3 * before
     assert better.start == pytest.approx(strong)
     assert better.base == "of the fit"
     assert better.effect.trials_factor > 100 + len(lines.moved(begun))
     there = crack(groups, true, 100)
-    assert there.relocated(strong, context) is None
+    assert closer(context, there, strong) is None
     context.scan = None  # natural frequencies alone do not tell lines so near each other apart
-    assert effect.relocated(x, context) is None
+    assert closer(context, effect, x) is None
 
 
 def test_first_frequency_of_a_strip_falls_as_beam_theory_says():

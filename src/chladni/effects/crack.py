@@ -176,39 +176,10 @@ class Crack(Effect):
         """The shells of the line with a property of their own, 12I/t³ times f."""
         return cracked(assembly, self.shells, left(x[0]))
 
-    def relocated(self, x: np.ndarray, context: SearchContext) -> Candidate | None:
-        """Along a line beside it, a few steps at most, each evaluated as it is."""
-        if self.line is None or context.scan is None:
-            return None
-        groups, best = context.where.groups, self
-        lines, tried = LineFinder.of(groups.structure.assembly), self.trials_factor
-        least, start = _scored(context, self, x)
-        for _ in range(STEPS):
-            near = [crack(groups, line, tried) for line in lines.moved(best.line or self.line)]
-            scores = [float(context.scores(effect, [start]).min()) for effect in near]
-            tried += len(near)
-            if not near:
-                break
-            k = int(np.argmin(scores))
-            score, strength = _scored(context, near[k], start)
-            if score > least - BETTER:
-                break
-            best, least, start = near[k], score, strength
-        if best is self:
-            return None
-        return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
-
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of 12I/t³."""
         value, high, low = (left(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
         return (Estimate("12I/T3", value, "-", low, high),)
-
-
-def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[float, np.ndarray]:
-    """The best score of an effect at some strengths about x, and that strength."""
-    starts = [x + shift for shift in AROUND]
-    scores = context.scores(effect, starts)[0]
-    return float(scores.min()), starts[int(np.argmin(scores))]
 
 
 def left(x: float) -> float:
@@ -300,6 +271,37 @@ def _at_rest(
     return ends, len(known)
 
 
+def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
+    """Along a line beside that of a fitted crack, a few steps at most, each evaluated as it is."""
+    if not isinstance(effect, Crack) or effect.line is None or context.scan is None:
+        return None
+    groups, line, tried = context.where.groups, effect.line, effect.trials_factor
+    lines, best = LineFinder.of(groups.structure.assembly), effect
+    least, start = _scored(context, effect, x)
+    for _ in range(STEPS):
+        near = lines.moved(line)
+        every = [crack(groups, other, tried) for other in near]
+        scores = [float(context.scores(other, [start]).min()) for other in every]
+        tried += len(near)
+        if not near:
+            break
+        k = int(np.argmin(scores))
+        score, strength = _scored(context, every[k], start)
+        if score > least - BETTER:
+            break
+        best, line, least, start = every[k], near[k], score, strength
+    if best is effect:
+        return None
+    return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
+
+
+def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[float, np.ndarray]:
+    """The best score of an effect at some strengths about x, and that strength."""
+    starts = [x + shift for shift in AROUND]
+    scores = context.scores(effect, starts)[0]
+    return float(scores.min()), starts[int(np.argmin(scores))]
+
+
 def conceal(article: Article, rng: np.random.Generator) -> Article:
     """A line of the deck loses 50 to 80 % of its bending stiffness, the finer shells in it."""
     lines = LineFinder.of(article.deck)
@@ -316,6 +318,7 @@ FAMILY = Family(
     Crack,
     conceal,
     candidates=candidates,
+    closer=closer,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="look for a crack there with dye or a magnifying glass, and tap on both its sides",
     on_sheets=True,

@@ -28,7 +28,6 @@ from ..model.assembly import Assembly
 from .estimate import Estimate, Location
 
 if TYPE_CHECKING:
-    from .search_context import Candidate, SearchContext
     from .surroundings import Surroundings
 
 FIELDS = ("t", "E", "rho", "Q11", "Q22", "Q12", "Q66")
@@ -273,13 +272,6 @@ class Effect:
 
     def recentred(self, x: np.ndarray, where: "Surroundings") -> tuple["Effect", np.ndarray] | None:
         """The effect about the place it moved to, and its start there; None: it is near enough."""
-        return None
-
-    def relocated(self, x: np.ndarray, context: "SearchContext") -> "Candidate | None":
-        """It at a place next to the one where x was fitted, if it explains more there.
-
-        The last of the context's ``bases`` is that of the fit.
-        """
         return None
 
     def with_reference_state(self, x: np.ndarray) -> Self:

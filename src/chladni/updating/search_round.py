@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
 from .candidates import UpdatingContext
@@ -155,7 +156,10 @@ def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -
     again = lead.effect.recentred(x, problem.where)
     if again is not None:
         return Candidate(*again, base)
-    return lead.effect.relocated(x, UpdatingContext(problem, null, base))
+    known = next((f for f in families() if f.name == lead.effect.name), None)
+    if known is None or known.closer is None:
+        return None
+    return known.closer(UpdatingContext(problem, null, base), lead.effect, x)
 
 
 def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
