@@ -220,7 +220,10 @@ def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """Shells along a line across the sheet lose most of their bending stiffness, no membrane."""
+    """Shells along a line across the sheet lose most of their bending stiffness, no membrane.
+
+    Its place is the middle of these shells, for the sheet may end before the line does.
+    """
     a = site.article
     length = float(rng.uniform(0.12, 0.2)) * site.size * float(np.clip(size, 1.0, 3.0))
     for _ in range(50):
@@ -233,10 +236,11 @@ def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     assert isinstance(section, ShellSection)
     new = Part(1 + max(x.id for x in a.parts), "cracked", replace(section, bending_ratio=kept))
     shells = replace(a.shells, part=np.where(mine, len(a.parts), a.shells.part))
+    middle = a.points[a.shells.nodes[mine]].mean(axis=1)  # edges and holes cut it short
     truth = {
         "value": kept,
-        "point_m": a.points[row].tolist(),
-        "length_m": length,
+        "point_m": middle.mean(axis=0).tolist(),
+        "length_m": float(np.linalg.norm(np.ptp(middle, axis=0))),
         "shells": int(mine.sum()),
     }
     return Hidden(replace(a, parts=(*a.parts, new), shells=shells), truth)

@@ -5,8 +5,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.sparse.csgraph import connected_components
 
-from chladni.effects.crack import LEAST, LineFinder, candidates, crack, left
+from chladni.effects.crack import (
+    LEAST,
+    WORTH,
+    LineFinder,
+    _at_rest,
+    candidates,
+    closer,
+    crack,
+    left,
+)
 from chladni.effects.element_groups import element_groups
 from chladni.effects.ordinary import ordinary
 from chladni.fem.assemble import structure
@@ -35,6 +45,103 @@ def test_lines_lie_on_one_part_and_are_as_long_as_they_should_be():
         assert np.ptp(X, axis=0).max() <= 0.5 * lines.size[line.part] + 0.02
 
 
+def test_an_oblique_line_is_a_hinge_without_bridges():
+    """Shells of a line hang together by edges: corners alone would pass bending through it."""
+    deck = plate(0.4, 0.3, 16, 12, 1.5e-3)
+    lines, nodes = LineFinder.of(deck), deck.shells.nodes
+    middle = int(np.argmin(np.linalg.norm(lines.middle - [0.2, 0.15, 0], axis=1)))
+    for degrees in range(0, 180, 5):
+        way = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0])
+        line = lines.through(middle, way, 1.7)
+        by_edge = [[len({*nodes[j]} & {*nodes[k]}) > 1 for j in line.shells] for k in line.shells]
+        assert connected_components(np.array(by_edge))[0] == 1, degrees
+
+
+def test_lines_beside_one_are_moved_turned_and_stretched():
+    """About the middle and about either end, where these are as they were to half a shell."""
+    lines = LineFinder.of(plate(0.4, 0.4, 40, 40, 1e-3))
+    x = np.array([0.205, 0.205, 0])
+    line = lines.through(int(np.argmin(np.linalg.norm(lines.middle - x, axis=1))), TOWARDS, 2.0)
+    moved = lines.moved(line)
+
+    def ends(some):
+        half = 0.5 * 0.25 * 0.4 * some.times * some.way
+        return np.sort([lines.middle[some.through] @ TOWARDS + s * half @ TOWARDS for s in (-1, 1)])
+
+    longer = [m for m in moved if m.times > line.times]
+    shift = np.array([ends(m) - ends(line) for m in longer])
+    assert len(longer) == 3
+    assert (np.abs(shift).min(axis=1) <= 0.005 + 1e-9).sum() == 2  # one end stays
+    assert (np.abs(shift).max(axis=1) > 0.01).all()
+    assert any(m.times < line.times for m in moved)
+    assert any(np.abs(m.way @ TOWARDS) < 0.99 for m in moved)
+    beside = [m for m in moved if m.times == line.times and m.way @ TOWARDS > 1 - 1e-12]
+    away = [np.linalg.norm(lines.middle[m.through] - lines.middle[line.through]) for m in beside]
+    assert len(away) >= 4
+    assert max(away) < 0.02
+
+
+TOWARDS = np.array([1.0, 0.0, 0.0])
+
+
+def missed(lines, true, sets):
+    """How far sets of shells are from a line, seen through waves as long as modes have."""
+    x = lines.middle
+    seen = np.exp(-((x[:, None] - x) ** 2).sum(axis=2) / (2 * 0.04**2))
+    wrong = np.reshape([np.bincount(s, minlength=len(x)) for s in sets], (len(sets), len(x)))
+    wrong = wrong - np.bincount(true.shells, minlength=len(x))
+    return np.einsum("ki,ij,kj->k", wrong, seen, wrong)
+
+
+def test_lines_are_moved_until_none_beside_explains_more():
+    """The search ends far nearer than the nearest of the lines that were drawn."""
+    deck = plate(0.4, 0.3, 24, 18, 1.5e-3)
+    lines, way = LineFinder.of(deck), np.array([np.cos(0.5), np.sin(0.5), 0.0])
+    true, asked = lines.through(7 * 24 + 11, way, 1.9), []
+
+    def bending_scores(about, sets):
+        asked.extend(sets)
+        return np.full(len(sets), -0.5), missed(lines, true, sets)
+
+    first = lines.drawn(np.arange(0, len(deck.shells), 9), (1.0, 2.5))
+    ends, tried = _at_rest(SimpleNamespace(bending_scores=bending_scores), 0, lines, first)
+    assert tried == len(asked) == len({s.tobytes() for s in asked})  # each set of shells once
+    rest = missed(lines, true, [line.shells for line in ends])
+    assert rest.min() < 0.2 * missed(lines, true, [line.shells for line in first]).min()
+    for line, score in zip(ends, rest, strict=True):
+        assert missed(lines, true, [m.shells for m in lines.moved(line)]).min() >= score - WORTH
+
+
+def test_a_line_that_was_fitted_goes_on_to_a_better_one_beside_it():
+    """Along with its strength; each line that was tried is counted. At rest it stays."""
+    groups = element_groups(structure(plate(0.4, 0.3, 24, 18, 1.5e-3)))
+    lines = LineFinder.of(groups.structure.assembly)
+    begun = lines.through(7 * 24 + 11, TOWARDS, 1.9)
+    turned = np.array([np.cos(0.35), np.sin(0.35), 0.0])
+    true = lines.through(9 * 24 + 12, turned, 2.4)
+    strong = np.array([0.4])
+
+    def scores(effect, starts):
+        far = missed(lines, true, [effect.shells])[0]
+        return np.array([[far + (start[0] - strong[0]) ** 2 for start in starts]])
+
+    context = SimpleNamespace(
+        scan=bending_slopes, where=SimpleNamespace(groups=groups), bases=(None, "of the fit"),
+        scores=scores,
+    )  # fmt: skip
+    effect, x = crack(groups, begun, 100), np.array([-0.3])
+    better = closer(context, effect, x)
+    before, after = missed(lines, true, [effect.shells, better.effect.shells])
+    assert after < 0.3 * before
+    assert better.start == pytest.approx(strong)
+    assert better.base == "of the fit"
+    assert better.effect.trials_factor > 100 + len(lines.moved(begun))
+    there = crack(groups, true, 100)
+    assert closer(context, there, strong) is None
+    context.scan = None  # natural frequencies alone do not tell lines so near each other apart
+    assert closer(context, effect, x) is None
+
+
 def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
     """∂ln λ/∂ln f = ∫_line φ''² dx / ∫ φ''² dx, φ'' of a free beam's first mode, nu = 0."""
     n, length = 25, 0.5
@@ -61,7 +168,8 @@ def test_first_frequency_of_a_strip_falls_as_beam_theory_says():
 def test_a_sheet_too_coarse_for_a_line_has_none():
     """Two by two shells hold no three in a row, and nothing is proposed."""
     coarse = plate(0.2, 0.2, 2, 2, 1e-3)
-    context = SimpleNamespace(where=SimpleNamespace(groups=element_groups(structure(coarse))))
+    groups = element_groups(structure(coarse))
+    context = SimpleNamespace(scan=None, where=SimpleNamespace(groups=groups))
     assert candidates(context) == []
 
 

@@ -173,6 +173,18 @@ def test_a_crack_takes_bending_alone(site):
     assert (g[6:16] < 0.995 * f[6:16]).any()
 
 
+def test_the_place_of_a_crack_is_the_middle_of_what_is_cracked(site):
+    """Also where an edge cuts it short: no end is farther from it than another."""
+    for seed in range(8):
+        hidden = crack(site, np.random.default_rng(seed), 3.0)
+        a = hidden.article
+        X = a.points[a.shells.nodes[a.shells.part == len(a.parts) - 1]].mean(axis=1)
+        away = X - hidden.truth["point_m"]
+        along = away @ np.linalg.svd(away, full_matrices=False)[2][0]
+        assert abs(along.max() + along.min()) < 0.02  # a shell
+        assert hidden.truth["length_m"] == pytest.approx(np.linalg.norm(np.ptp(X, axis=0)))
+
+
 def test_friction_softens_and_damps():
     """Joints of the box: lower modes, and a modal loss no negative motion feeds."""
     form = FORMS["lidded box"]

@@ -5,12 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.effects.search_context import Candidate
 from chladni.errors import ModelError
 from chladni.updating import search_round
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import Status
-from chladni.updating.search_round import BEHIND, _finished, _tried
+from chladni.updating.search_round import BEHIND, _closer, _finished, _tried
 
 NULL = SimpleNamespace(neg2_log_evidence=100.0, fit=SimpleNamespace(x=np.ones(2)))
 
@@ -58,3 +59,30 @@ def test_what_ran_out_of_steps_is_fitted_to_the_end(monkeypatch, status, running
     problem = SimpleNamespace(data=object.__new__(Responses), mass_measurement=None)
     got = _finished(problem, HypothesisFit(None, left, None), running)
     assert got.neg2_log_evidence == (1.0 if running or status is Status.OUT_OF_STEPS else 9.0)
+
+
+@pytest.mark.parametrize(("gains", "followed"), [([5.0, 3.0], 3), ([0.5, 9.0], 1), ([5.0], 2)])
+def test_a_leader_goes_on_to_where_its_family_finds_it_closer(monkeypatch, gains, followed):
+    """Until it gains no more, or nothing next to it does; from the base of its own fit."""
+    bases, lead = [], hypothesis_at("weld", 50.0)
+
+    def closer(context, effect, x):
+        bases.append(context.bases[-1])
+        return Candidate(effect, x, context.bases[-1]) if len(bases) <= len(gains) + 1 else None
+
+    left = iter(50.0 - np.cumsum([*gains, 0.0]))
+    problem = SimpleNamespace(
+        base=(), where=None, mean=lambda: np.zeros(0),
+        fitted_with=lambda effect, start, base: hypothesis_at("weld", next(left)),
+    )  # fmt: skip
+    families = (SimpleNamespace(name="weld", closer=closer),)
+    monkeypatch.setattr(search_round, "families", lambda: families)
+    assert len(_closer(problem, NULL, lead)) == followed
+    assert len(bases) == followed
+    assert _closer(problem, NULL, hypothesis_at("of another family", 50.0)) == []
+
+
+def hypothesis_at(name, evidence):
+    effect = SimpleNamespace(name=name, recentred=lambda x, where: None)
+    fit = SimpleNamespace(effects=(), of=lambda effect: np.zeros(1))
+    return SimpleNamespace(effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence)

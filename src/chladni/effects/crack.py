@@ -13,33 +13,54 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..fem.sparse_assembly import blocks, congruence
-from ..geometry.facets import cell_areas, cell_normals, tangents
-from ..geometry.sampling import farthest_point_sample
+from ..geometry.facets import cell_areas, cell_normals, tangents, unit
+from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
 from .effect import WIDER, Effect, MatrixTerm, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
-from .search_context import Candidate, SearchContext, best_places, distinct
+from .search_context import Candidate, ResponseScan, SearchContext, best_places, distinct
 
 LEAST = 0.1  # of the bending stiffness is always left: K stays positive
 SHELLS = 3  # fewer of them are no line
-WIDE = 0.55  # of a shell's size: half the width of a line
-LENGTH = 0.25  # of the square root of the part's area: the length that is tried first
-LENGTHS = (0.6, 1.0, 1.7, 3.0)  # times that: tried at the best places
+REACH = 0.55  # of a shell's size times so many: half the least length
+WIDE = 0.75  # of a shell's size: half the width of a line, so that no corner bridges an oblique one
+LENGTH = 0.25  # of the square root of the part's area
+LENGTHS = (1.0, 2.5)  # times that: tried all over the sheets
+SHORTEST, LONGEST = 0.4, 4.0  # times that: what a line may come to
 ANGLES = 4
-PLACES, CLOSER = 48, 12  # middles of lines: all over the sheets, and round each of the best
+PLACES = 48  # middles of lines, all over the sheets
+BEGUN = 12  # lines, far from each other, that are moved while they explain more
+TURNS = (-np.pi / 8, -np.pi / 16, np.pi / 16, np.pi / 8)
+STRETCHED = (0.7, 1.4)  # times its length
+BESIDE = 1.7  # of a shell's size: how far its neighbours are
+WORTH = 0.05  # in -2 ln posterior: a move that gains less is none
 FOLLOWED = 2  # lines that are worth a fit
+STEPS, BETTER = 4, 0.5  # of a line that was fitted, and what each has to gain in -2 ln posterior
+AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Shells side by side along a line on a part: ``shells`` (k,) int, ``centre`` (3,) [m]."""
+    """Shells side by side along a line on a part, as :meth:`LineFinder.through` drew it.
+
+    Attributes
+    ----------
+    shells : (k,) int
+    centre : (3,)        of these shells [m]
+    part, through : int  its part, and the shell whose middle it goes through
+    way : (3,)           unit vector along it there
+    times : float        its length, in units of the usual one
+    """
 
     shells: np.ndarray
     centre: np.ndarray
     part: int
+    through: int
+    way: np.ndarray
+    times: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,32 +90,65 @@ class LineFinder:
         normal = cell_normals(assembly.points, shells.nodes)
         return cls(middle, normal, shells.part, np.sqrt(area), size)
 
-    def through(self, shell: int, angle: float, times: float) -> Line | None:
-        """The line through a shell's middle at an angle, ``times`` the usual length.
+    def through(self, shell: int, way: np.ndarray, times: float) -> Line | None:
+        """The line through a shell's middle along ``way`` (3,), ``times`` the usual length.
 
-        On a coarse mesh it is as long as ``SHELLS`` shells at least.
+        It follows the sheet. On a coarse mesh it is as long as ``SHELLS`` shells at least; None
+        where there are fewer, or ``way`` leaves the sheet.
         """
-        p, n = int(self.part[shell]), self.normal[shell]
-        u, v = tangents(n)
-        along = np.cos(angle) * u + np.sin(angle) * v
-        d, least = self.middle - self.middle[shell], WIDE * SHELLS * self.width[shell]
-        half = max(0.5 * LENGTH * times * self.size[p], least)
+        n = self.normal[shell]
+        flat = way - (way @ n) * n
+        if np.linalg.norm(flat) < 0.5:
+            return None
+        along = unit(flat)
+        d, least = self.middle - self.middle[shell], REACH * SHELLS * self.width[shell]
+        half = max(self._half(shell, times), least)
         inside = (np.abs(d @ along) <= half) & (np.abs(d @ n) <= half / 2)
         inside &= np.abs(d @ np.cross(n, along)) <= WIDE * self.width
+        p = int(self.part[shell])
         shells = np.flatnonzero(inside & (self.part == p))
-        return Line(shells, self.middle[shells].mean(axis=0), p) if len(shells) >= SHELLS else None
+        if len(shells) < SHELLS or np.ptp(d[shells] @ along) < least:
+            return None
+        return Line(shells, self.middle[shells].mean(axis=0), p, shell, along, times)
+
+    def _half(self, shell: int, times: float) -> float:
+        """Half of ``times`` the usual length [m]."""
+        return 0.5 * LENGTH * times * self.size[int(self.part[shell])]
 
     def drawn(self, shells: np.ndarray, lengths: Sequence[float]) -> list[Line]:
         """Lines through these shells at all angles, each set of shells once."""
-        angles = np.pi * np.arange(ANGLES) / ANGLES
-        found = {
-            line.shells.tobytes(): line
-            for k in shells
-            for angle in angles
-            for times in lengths
-            if (line := self.through(int(k), float(angle), times)) is not None
-        }
-        return list(found.values())
+        found = []
+        for k in shells.tolist():
+            u, v = tangents(self.normal[k])
+            for angle in np.pi * np.arange(ANGLES) / ANGLES:
+                way = np.cos(angle) * u + np.sin(angle) * v
+                found += [self.through(k, way, times) for times in lengths]
+        return _different(found)
+
+    def moved(self, line: Line) -> list[Line]:
+        """Lines beside one; and it turned, and stretched, about its middle and about either end."""
+        k, x, n = line.through, self.middle[line.through], self.normal[line.through]
+        mine = np.flatnonzero(self.part == line.part)
+        d = np.linalg.norm(self.middle[mine] - x, axis=1)
+        found = [
+            self.through(int(j), line.way, line.times)
+            for j in mine[d <= BESIDE * self.width[k]]
+            if j != k
+        ]
+        across, half = np.cross(n, line.way), self._half(k, line.times)
+        turned = [(np.cos(a) * line.way + np.sin(a) * across, line.times) for a in TURNS]
+        stretched = [(line.way, line.times * f) for f in STRETCHED]
+        for way, times in (*turned, *stretched):
+            if SHORTEST <= times <= LONGEST:
+                shift = self._half(k, times) * way - half * line.way
+                middles = nearest_points(self.middle[mine], x + np.outer((-1, 0, 1), shift))
+                found += [self.through(int(j), way, times) for j in mine[middles]]
+        return _different(found)
+
+
+def _different(lines: Sequence[Line | None]) -> list[Line]:
+    """Each set of shells once."""
+    return list({line.shells.tobytes(): line for line in lines if line is not None}.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +164,7 @@ class Crack(Effect):
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    line: Line | None = None
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """(f - 1) B."""
@@ -138,13 +193,13 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
     K = blocks(groups.cubic[on], groups.nodes[on], len(assembly.points))
     name, (x, y, z) = assembly.parts[line.part].name, line.centre.tolist()
     at = ", ".join(f"{1e3 * v:.0f}" for v in (x, y, z))
-    starts = (-1.0, 0.5, 2.0)
+    starts = (-1.5, -0.5, 0.5, 1.5, 2.5)
     unknown = Parameter("12I/T3", "-", 0.0, 1.5, kind="linear", starts=starts, nominal=-40.0)
     reach = np.linalg.norm(np.ptp(assembly.points[groups.nodes[on].ravel()], axis=0)) / 2
     return Crack(
         (unknown,), f"on {name} through ({at} mm)", (name,), point=(x, y, z), radius=float(reach),
         grids=tuple(assembly.ids[np.unique(groups.nodes[on])].tolist()), trials_factor=tried,
-        shells=on, operator=congruence(groups.structure.T, K),
+        shells=on, operator=congruence(groups.structure.T, K), line=line,
     )  # fmt: skip
 
 
@@ -166,54 +221,85 @@ def weakened(part: Part, f: float) -> Part:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The lines along which a crack explains most: all over the sheets, then closer and longer.
+    """The lines along which a crack explains most: drawn all over the sheets, then moved.
 
-    Each costs a slope; only the best are fitted.
+    Each costs a slope; where the best of them came to rest they are evaluated as they are.
     """
     groups = context.where.groups
     lines = LineFinder.of(groups.structure.assembly)
-    first = lines.drawn(farthest_point_sample(lines.middle, PLACES), (1.0,))
-    if not first:
+    places = farthest_point_sample(lines.middle, PLACES)
+    first = lines.drawn(places, LENGTHS[:1] if context.scan is None else LENGTHS)
+    ends, tried = first[::ANGLES], len(first)
+    if first and context.scan is not None:
+        ends, tried = _at_rest(context.scan, len(context.bases) - 1, lines, first)
+    if not ends:
         return []
-    if context.scan is None:
-        effects = [crack(groups, line, len(first)) for line in first[::ANGLES]]
-        return best_places(context, effects, np.array([e.point for e in effects]))
-    about, base = len(context.bases) - 1, context.bases[-1]
-    found = _scored(context, about, first)
-    closer = [k for line, _, _ in found for k in _round(lines, line)]
-    second = lines.drawn(np.unique(closer).astype(int), LENGTHS)
-    tried = len(first) + len(second)
-    return [
-        Candidate(crack(groups, line, tried), np.array([_start(amount)]), base)
-        for line, amount, _ in _scored(context, about, [*(f[0] for f in found), *second])
-    ]
+    effects = [crack(groups, line, tried) for line in ends]
+    return best_places(context, effects, np.array([e.point for e in effects]), FOLLOWED)
 
 
-def _scored(
-    context: SearchContext, about: int, lines: Sequence[Line]
-) -> list[tuple[Line, float, float]]:
-    """The best lines, how much they gain, and their scores; one that gained explains nothing."""
-    assert context.scan is not None
-    amount, score = context.scan.bending_scores(about, [line.shells for line in lines])
-    score = np.where(amount < 0, score, score.max() + 1)
-    centre = np.array([line.centre for line in lines])
-    best = distinct(score, centre, [], FOLLOWED)
-    return [(lines[k], float(amount[k]), float(score[k])) for k in best]
+def _at_rest(
+    scan: ResponseScan, about: int, lines: LineFinder, first: Sequence[Line]
+) -> tuple[list[Line], int]:
+    """The best of the lines drawn first, moved until none next to them explains more.
+
+    With how many were tried for it.
+    """
+    known: dict[bytes, float] = {}
+
+    def scores(drawn: Sequence[Line]) -> np.ndarray:
+        """Of each of them; one that is to gain stiffness explains nothing."""
+        fresh = [line.shells for line in drawn if line.shells.tobytes() not in known]
+        amount, score = scan.bending_scores(about, fresh)
+        score = np.where(amount < 0, score, np.inf)
+        known.update((s.tobytes(), float(v)) for s, v in zip(fresh, score, strict=True))
+        return np.array([known[line.shells.tobytes()] for line in drawn])
+
+    def at_rest(line: Line) -> Line:
+        """Where no move explains more."""
+        while near := lines.moved(line):
+            score = scores([line, *near])
+            best = int(np.argmin(score))
+            if not score[best] < score[0] - WORTH:
+                break
+            line = near[best - 1]
+        return line
+
+    score = scores(first)
+    begun = distinct(score, np.array([line.centre for line in first]), [], BEGUN)
+    ends = _different([at_rest(first[k]) for k in begun if np.isfinite(score[k])])
+    return ends, len(known)
 
 
-def _round(lines: LineFinder, line: Line) -> np.ndarray:
-    """Shells round the middle of a line, as far as others that were tried."""
-    mine = np.flatnonzero(lines.part == line.part)
-    d = np.linalg.norm(lines.middle[mine] - line.centre, axis=1)
-    reach = lines.size[line.part] * np.sqrt(len(lines.size) / PLACES)
-    near = mine[d <= max(reach, float(np.sort(d)[min(CLOSER, len(d)) - 1]))]
-    return np.asarray(near[farthest_point_sample(lines.middle[near], CLOSER)])
+def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
+    """Along a line beside that of a fitted crack, a few steps at most, each evaluated as it is."""
+    if not isinstance(effect, Crack) or effect.line is None or context.scan is None:
+        return None
+    groups, line, tried = context.where.groups, effect.line, effect.trials_factor
+    lines, best = LineFinder.of(groups.structure.assembly), effect
+    least, start = _scored(context, effect, x)
+    for _ in range(STEPS):
+        near = lines.moved(line)
+        every = [crack(groups, other, tried) for other in near]
+        scores = [float(context.scores(other, [start]).min()) for other in every]
+        tried += len(near)
+        if not near:
+            break
+        k = int(np.argmin(scores))
+        score, strength = _scored(context, every[k], start)
+        if score > least - BETTER:
+            break
+        best, line, least, start = every[k], near[k], score, strength
+    if best is effect:
+        return None
+    return Candidate(replace(best, trials_factor=tried), start, context.bases[-1])
 
 
-def _start(amount: float) -> float:
-    """From the slope, which is that of the flexibility: 1/f - 1 = -amount."""
-    f = np.clip(1 / (1 - min(amount, 0.0)), 0.15, 0.95)
-    return float(np.log((1 - LEAST) / (f - LEAST) - 1))
+def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[float, np.ndarray]:
+    """The best score of an effect at some strengths about x, and that strength."""
+    starts = [x + shift for shift in AROUND]
+    scores = context.scores(effect, starts)[0]
+    return float(scores.min()), starts[int(np.argmin(scores))]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
@@ -232,6 +318,7 @@ FAMILY = Family(
     Crack,
     conceal,
     candidates=candidates,
+    closer=closer,
     cards=("PSHELL", "CQUAD4", "CTRIA3"),
     settled_by="look for a crack there with dye or a magnifying glass, and tap on both its sides",
     on_sheets=True,

@@ -67,6 +67,8 @@ class Family:
     conceal : puts it into an article, of a size and at a place drawn at random, with the truth
     placed : its effects where deck and test tell their place
     candidates : what is worth a fit, where the place is unknown; of ``placed`` the best starts
+    closer : one that was fitted at x, next to its place, if it explains more there; the last of
+        the context's ``bases`` is that of the fit
     cards : of the deck that hold it
     no_cards : why none can
     settled_by : the measurement that tells it from what looks like it, in words
@@ -78,6 +80,7 @@ class Family:
     conceal: Callable[[Article, np.random.Generator], Article]
     placed: Callable[[Surroundings], Sequence[Effect]] | None = None
     candidates: Callable[[SearchContext], Iterable[Candidate]] | None = None
+    closer: Callable[[SearchContext, Effect, np.ndarray], Candidate | None] | None = None
     cards: tuple[str, ...] = ()
     no_cards: str = ""
     settled_by: str = ""

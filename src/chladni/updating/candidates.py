@@ -99,11 +99,13 @@ def unasked(problem: UpdatingProblem) -> tuple[str, ...]:
 class UpdatingContext:
     """An updating problem as families of effects see it.
 
-    See :class:`..effects.search_context.SearchContext`.
+    See :class:`..effects.search_context.SearchContext`. With ``about`` (n_base,) the last of the
+    states that are changed is another than that of the null.
     """
 
     problem: UpdatingProblem
     null_fit: HypothesisFit  # the best without any effect
+    about: np.ndarray | None = None
 
     @property
     def where(self) -> Surroundings:
@@ -119,6 +121,8 @@ class UpdatingContext:
     def bases(self) -> tuple[np.ndarray, ...]:
         """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
         nominal = self.problem.mean()
+        if self.about is not None:
+            return nominal, self.about
         found = [e for e, _ in self.problem.found]
         kinds = [
             e.kind == "ordinary" or e in found for e in self.problem.base for _ in e.parameters

@@ -11,8 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.effect import Effect
+from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
+from .candidates import UpdatingContext
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
@@ -51,7 +53,7 @@ def search_round(
     finished = [_finished(problem, t, True) for t in ahead]
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
-    closer = [t for lead in hypotheses[:running] for t in _closer(problem, lead)]
+    closer = [t for lead in hypotheses[:running] for t in _closer(problem, null, lead)]
     return simplest_first(by_family([*hypotheses, *closer]), null.neg2_log_evidence)
 
 
@@ -128,15 +130,17 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
     return hypothesis
 
 
-def _closer(problem: UpdatingProblem, lead: HypothesisFit) -> list[HypothesisFit]:
-    """The leader begun anew about the place it moved to, while it moves."""
+def _closer(
+    problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit
+) -> list[HypothesisFit]:
+    """The leader begun anew about the place it moved to, or at a better one, while it moves."""
     out: list[HypothesisFit] = []
     for _ in range(3):
-        again = lead.effect.recentred(lead.fit.of(lead.effect), problem.where)
+        again = _again(problem, null, lead)
         if again is None:
             break
         try:
-            hypothesis = problem.fitted_with(*again, taken(problem, lead, ("ordinary",)))
+            hypothesis = problem.fitted_with(again.effect, again.start, again.base)
         except ModelError:
             break
         out.append(hypothesis)
@@ -144,6 +148,18 @@ def _closer(problem: UpdatingProblem, lead: HypothesisFit) -> list[HypothesisFit
             break
         lead = hypothesis
     return out
+
+
+def _again(problem: UpdatingProblem, null: HypothesisFit, lead: HypothesisFit) -> Candidate | None:
+    """The leader about the place it moved to, or at a better one next to its own; None: at rest."""
+    x, base = lead.fit.of(lead.effect), taken(problem, lead, ("ordinary",))
+    again = lead.effect.recentred(x, problem.where)
+    if again is not None:
+        return Candidate(*again, base)
+    known = next((f for f in families() if f.name == lead.effect.name), None)
+    if known is None or known.closer is None:
+        return None
+    return known.closer(UpdatingContext(problem, null, base), lead.effect, x)
 
 
 def taken(problem: UpdatingProblem, lead: HypothesisFit, kinds: tuple[str, ...]) -> np.ndarray:
