@@ -194,8 +194,12 @@ def test_where_no_number_serves_the_deck_stays_as_it_is(monkeypatch, reduced, re
     assert "its own, which stay" in found.notes[-1]
 
 
-def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses):
-    """A stiffness that is no longer positive has no Q: the calibration stays, without a fault."""
+@pytest.mark.parametrize("begun", [True, False])
+def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses, begun):
+    """A stiffness that is no longer positive has no Q: the calibration stays, without a fault.
+
+    Nor where no fit of them could even be begun.
+    """
     data = responses.over(reduced.model)
     base = (ordinary(reduced.groups, "E", [0]),)
     found = fit(reduced.model, base, data, None, np.array([0.04]), max_steps=0)
@@ -208,9 +212,14 @@ def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, res
             raise ModelError("an effect left negative stiffness")
         return real(model, effects, x, gradient)
 
+    def asked(null, mass_measurement=None):
+        if begun:
+            return none
+        raise ModelError("an effect left negative stiffness")
+
     monkeypatch.setattr(outcome, "evaluate", evaluated)
     for made in ("as_found", "as_written"):
-        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: none)
+        monkeypatch.setattr(outcome, made, asked)
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
     prepared = SimpleNamespace(problem=problem, score=data)
     diagnosis = Diagnosis(plain, plain, plain, (), "calibration only")

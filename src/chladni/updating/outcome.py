@@ -157,7 +157,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    refused = replace(diagnosis, verdict=plainly, notes=notes, written=None)
+    refused = replace(diagnosis, verdict=plainly, notes=notes, written=None, refused=f"it {why}")
     if together > due and not borne:
         return _unexplained(refused, lead, together, "all data")
     if gain > CONFLICT * due:
@@ -211,7 +211,10 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
     before = Q(problem.base, _given(problem, null))
     for made in (as_found, partial(as_written, mass_measurement=mass)):
-        prudent = made(null)
+        try:
+            prudent = made(null)
+        except ModelError:  # without scatter its numbers are no structure's
+            continue
         if not (Q(prudent.fit.effects, prudent.fit.x) > before).any():  # no Q is no worse
             return replace(diagnosis, plain=prudent)
     plain = diagnosis.plain.fit
@@ -233,8 +236,10 @@ def _deck_stays(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )  # fmt: skip
     note = (
         "no calibrated numbers that a structure of this deck may have fit better than its own, "
-        "which stay: what is left is of mesh, joints and scatter"
+        "which stay"
     )
+    if not (diagnosis.unexplained or diagnosis.one_of):
+        note = f"{note}: what is left is of mesh, joints and scatter"
     verdict = "nothing missing" if diagnosis.verdict == "calibration only" else diagnosis.verdict
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, plain=replace(plain, fit=given), verdict=verdict, notes=notes)
