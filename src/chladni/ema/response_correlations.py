@@ -9,11 +9,12 @@ So has that of a free decay itself, from its loudest moment on: nothing is corre
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..dynamics.frf import FRF
-from .setup import Function
+from .setup import Function, Recording
 from .signals import window
 from .time_record import TimeRecord
 
@@ -24,6 +25,7 @@ SEGMENTS = 8  # of the record: the lags that are used, and the spread of their c
 DECAY = 0.01  # of the window at the last lag
 ALIKE = -np.log(DECAY) / 2  # lines of one noise: the window's equivalent noise bandwidth
 REFERENCES = 3  # responses of most energy
+RELEASE = "decay"  # what stands in the place of a force: the block that was let go
 LINES = 2500  # of the band: more take minutes to identify
 PIECES, DIED = 32, 0.1  # of a free decay: in its last half no piece is as loud as that of the first
 
@@ -66,6 +68,23 @@ def of_responses(record: TimeRecord) -> tuple[Function, ...]:
 def free_decays(functions: Sequence[Function]) -> bool:
     """Whether time histories ring down, every block of them."""
     return functions[0].kind == "time" and all(_onset(y) is not None for y in _blocks(functions)[1])
+
+
+def ringing(r: Recording, band: tuple[float, float] = (0.0, np.inf)) -> Recording:
+    """A recording that holds free decays alone with their transforms; any other as it is.
+
+    Poles are those of an FRF, residues have no scale and no drive point: modal shapes times what
+    each block was let go with.
+    """
+    used = responses(r.functions)
+    if r.frf is not None or r.poles is not None or not used or not free_decays(used):
+        return r
+    frf, sigma = one_sided(used, band)
+    note = (
+        f"{r.name}: no force was measured; poles and damping are those of its free decays, shapes "
+        "have no scale"
+    )
+    return replace(r, frf=frf, added_damping=sigma, notes=(*r.notes, note))
 
 
 def _blocks(functions: Sequence[Function]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -155,7 +174,7 @@ def _of_decays(
     n = min(blocks.shape[2] - max(starts), most)
     still = _at_rest(blocks)
     free = np.stack([y[:, k : k + n] for y, k in zip(still, starts, strict=True)], axis=2)
-    names = tuple(f"decay {k + 1}" for k in range(len(blocks)))
+    names = tuple(f"{RELEASE} {k + 1}" for k in range(len(blocks)))
     made = FRF(
         _transformed(np.moveaxis(free, 1, 0), rate), np.fft.rfftfreq(n, 1 / rate), labels, names,
         "receptance",

@@ -7,11 +7,10 @@ import numpy as np
 from ..case import Case
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
-from ..ema.response_correlations import ALIKE, free_decays, one_sided, responses
+from ..ema.response_correlations import free_decays, one_sided, responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from ..updating.measured_frequencies import LEAST_DELTA_CHI2
-from .identify import firm
+from .identify import clear, firm
 
 HIGHEST = 0.8  # of the highest frequency a record holds: above it filters fall off
 
@@ -47,8 +46,7 @@ def _identified(case: Case, recording: Recording) -> tuple[Identified, str]:
     found = identified(frf, (low, high), use=case.lines(frf.frequency))
     free = found.poles + sigma  # without what the window adds
     found = replace(found, poles=free)
-    clear = found.relative_delta_chi2 > LEAST_DELTA_CHI2 * ALIKE
-    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear)
+    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear(found))
     if not known.order:
         raise FileError(
             f"{recording.name}: no natural frequency stands out of its {len(used)} records of "
