@@ -109,6 +109,15 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
     assert called != REST or not judged.adequacy.passes
+    if called == NAMED:
+        return
+    against = not outcome.carried(ahead, heard, DUE)  # what refused it is said, and nothing else
+    worse = not against and (left[1] > outcome.HARM or (ahead < 2 * DUE and left[1] > 1))
+    assert ("data no fit saw worse explained" in judged.refused) == against
+    assert ("worse on data no fit saw" in judged.refused) == worse
+    assert ("leaves more than it explains" in judged.refused) == (not against and not worse)
+    if called == REST and not against:
+        assert outcome.AGAINST not in judged.adequacy.what
 
 
 @pytest.mark.parametrize(
