@@ -1,5 +1,6 @@
 """A case folder or deck as the problem of an environment."""
 
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from chladni.workflows.loaded_model import load_model
 from chladni.workflows.question_of_case import prepared
 
 from .calibration_questions import CalibrationQuestion
+from .catalogue_choices import CatalogueChoices, catalogue_choices
 from .small_specimens import ModalSpecimen
 
 REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
@@ -85,8 +87,19 @@ class Recorded:
         model = self.prepared.problem.reduced.model
         return evaluate(model, self.effects, self.mean + self.sd * theta, gradient)
 
-    def linearised(self) -> Linearised:
-        """Fitted and held-out residuals and their slopes at the prior mean."""
+    @cached_property
+    def catalogue(self) -> CatalogueChoices:
+        """What the search of a diagnosis would try on this case; a scan of some seconds."""
+        return catalogue_choices(self.prepared)
+
+    def linearised(self, effects: bool = False) -> Linearised:
+        """Fitted and held-out residuals and their slopes at the prior mean.
+
+        With ``effects`` those of the catalogue follow the ordinary parameters, and the fitted
+        residuals allow for what a model may be wrong by.
+        """
+        if effects:
+            return self.catalogue.linearised(self.score, self.prepared.held, len(self.names))
         state = self.state(np.zeros(len(self.sd)), True)
         r, J = self.score.residual(state, True)
         h, H = self.score.only(self.prepared.held).residual(state, True)

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from chladni.errors import ShapeError
 from chladni.planning import Linearised
 
 from . import drawing
@@ -35,6 +36,11 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
                                reset: p parameters of which one to three are off, two of them
                                nearly twins
     case : folder              a case with FRFs: its ordinary parameters, linearised at the deck
+    effects : bool             of a case, the effects of the catalogue too: every candidate that a
+                               diagnosis would try is a choice, at the place and of the size at
+                               which it scored best. ``names`` says what each choice is, and
+                               ``gain(kept)`` what a set is worth when it is fitted as a diagnosis
+                               fits it: seconds, where a step takes microseconds
     p : int                    parameters of the drawn problems
     cost : float               decades a parameter that is not learned costs
     """
@@ -46,14 +52,22 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         problem: Linearised | None = None,
         *,
         case: str | None = None,
+        effects: bool = False,
         p: int = 8,
         cost: float = 0.2,
         render_mode: str | None = None,
     ) -> None:
+        self.names, self.catalogue = tuple[str, ...](), None
         if case is not None:
             from .environment_cases import Recorded
 
-            problem = Recorded(case).linearised()
+            recorded = Recorded(case)
+            problem, self.names = recorded.linearised(effects), recorded.names
+            if effects:
+                self.catalogue = recorded.catalogue
+                self.names += self.catalogue.names
+        elif effects:
+            raise ShapeError("effects of the catalogue are those of a case; give case= a folder")
         self.given, self.cost, self.render_mode = problem, cost, render_mode
         self.p = len(problem) if problem is not None else p
         self.action_space = gym.spaces.Discrete(self.p + 1)
@@ -74,7 +88,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         before, legal = self.score, self.action_masks()[action]
         if legal and action < self.p:
             self.freed[action] = True
-            self.score = self._score()
+            self.score = self.score_of(self.freed)
         self.over = bool((legal and action == self.p) or self.freed.all())
         truncated = bool(not self.over and self.steps >= 4 * self.p)
         return self._observation(), self.score - before, self.over, truncated, self._info()
@@ -84,6 +98,24 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         refuse_before_reset(self, "over", "action_masks()")
         return np.zeros(self.p + 1, bool) if self.over else np.r_[~self.freed, True]
 
+    def gain(self, kept: np.ndarray) -> float:
+        """What the effects in a selection gain together in -2 ln evidence, less their price.
+
+        Above 0 a diagnosis would name them all, had the data that no fit saw no say; ordinary
+        parameters are free in every such fit.
+
+        Raises
+        ------
+        ShapeError
+            If this environment was not made with ``effects``.
+        """
+        if self.catalogue is None:
+            raise ShapeError(
+                "nothing of the catalogue is here to be fitted; make it with effects=True"
+            )
+        own = self.p - len(self.catalogue.candidates)
+        return self.catalogue.gain(np.flatnonzero(kept[own:]).tolist())
+
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Estimates of the parameters as bars (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
@@ -92,9 +124,9 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         title = f"{int(self.freed.sum())} freed, score {self.score:.2f} decades"
         return drawing.bars(self.problem.fitted(self.freed), self.freed, title)
 
-    def _score(self) -> float:
-        unlearned = self.problem.unlearned(self.freed)
-        return self.problem.improvement(self.freed) - self.cost * unlearned
+    def score_of(self, freed: np.ndarray) -> float:
+        """Score of any selection (p,) bool: decades gained less what is not learned."""
+        return self.problem.improvement(freed) - self.cost * self.problem.unlearned(freed)
 
     def _observation(self) -> np.ndarray:
         problem, freed = self.problem, self.freed

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.calibrated_family import calibrated_family
 from chladni.effects.element_groups import element_groups
-from chladni.effects.model_families import model_families
+from chladni.effects.model_families import joint_nuisances, model_families
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
 from chladni.updating.reduced_model import evaluate, reduce
@@ -56,3 +57,18 @@ def test_idle_at_nought_and_positive_far_away(jointed):
     assert_allclose(zero.lam, evaluate(model, [], np.zeros(0), False).lam, rtol=1e-9, atol=1e-3)
     for x in (-4.0, 4.0):
         assert evaluate(model, found, np.full(len(found), x), False).lam.min() > -1e-3 * zero.lam[9]
+
+
+@pytest.mark.parametrize("name", ["adhesive", "welds", "bushes"])
+def test_a_family_in_the_deck_is_what_the_fit_had(deck, jointed, name):
+    """The deck that is written has K + (e^x - 1) K_family, and no more mass."""
+    assembly = jointed if name == "bushes" else deck
+    built, x = structure(assembly), np.array([np.log(6.0)])
+    family = next(f for f in joint_nuisances(built) if f.text == name)
+    assert family.apply(assembly, x) is assembly  # a nuisance is no number of a deck
+    made = structure(calibrated_family(family).apply(assembly, x)).system
+    (term,) = family.matrices(x)
+    assert abs(term.operator).max() > 0
+    error = made.K - built.system.K - term.coefficient * term.operator
+    assert abs(error).max() < 1e-6 * abs(built.system.K).max()
+    assert abs(made.M - built.system.M).max() == 0

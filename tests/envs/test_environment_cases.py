@@ -15,6 +15,7 @@ from chladni.io.nastran import write_assembly
 from chladni.io.tables.write_tables import write_npz
 from chladni_envs import IDS, agents
 from chladni_envs import environment_cases as cases
+from chladni_envs.parameter_selection import ParameterSelectionEnv
 from chladni_specimens.plates import folded_panel
 
 SOFT = 0.98  # of the panel's modulus in the article: its peaks move by half a half-bandwidth
@@ -161,3 +162,56 @@ def test_a_bare_deck_takes_its_units(case, tmp_path):
     for id in (i for i in IDS if "Placement" in i):
         with pytest.raises(ChladniError, match="mm-t-s"):
             gym.make(f"chladni_envs:{id}", case=str(deck), units="mm")
+
+
+@pytest.fixture(scope="module")
+def choosing(recorded):
+    """The same with the effects of the catalogue as choices."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cases, "Recorded", lambda path: recorded)
+        return ParameterSelectionEnv(case="recorded", effects=True)
+
+
+def test_effects_of_the_catalogue_are_choices(choosing, recorded):
+    """Every candidate of the search has its place and name; the contract stays."""
+    own = len(recorded.names)
+    assert choosing.names[:own] == recorded.names
+    assert {"point-mass", "extra-support", "crack"} <= {n.split()[0] for n in choosing.names[own:]}
+    assert choosing.action_space.n == choosing.p + 1 == len(choosing.names) + 1
+    check_env(choosing, skip_render_check=True)
+
+
+def test_an_effect_is_linear_between_nothing_and_where_it_began(choosing, recorded):
+    """At θ = 1 held-out residuals are those with the effect at its start, no others."""
+    catalogue, problem = recorded.catalogue, choosing.problem
+    k = next(k for k, c in enumerate(catalogue.candidates) if c.effect.name == "point-mass")
+    effect, start = catalogue.candidates[k].effect, catalogue.candidates[k].start
+    base = catalogue.problem.base
+    model = catalogue.problem.reduced.model_for(effect, start)
+    x = np.concatenate([catalogue.problem.mean(), start])
+    heavier = cases.evaluate(model, [*base, effect], x, False)
+    there = recorded.score.only(recorded.prepared.held).over(model).residual(heavier, False)[0]
+    theta = np.eye(choosing.p)[len(recorded.names) + k]
+    np.testing.assert_allclose(problem.held_residual + problem.held_jacobian @ theta, there)
+
+
+def test_what_a_set_of_effects_is_worth(choosing, recorded):
+    """Nothing is free of price; where nothing is missing no effect pays, whoever chose it."""
+    own = len(recorded.names)
+    kept = np.arange(choosing.p) < own
+    assert choosing.gain(kept) == 0
+    for name in ("point-mass", "extra-support"):
+        k = next(k for k, n in enumerate(choosing.names) if n.startswith(name))
+        kept[k] = True
+        assert choosing.gain(kept) < 0
+    assert len(recorded.catalogue.fits) == 2
+    choosing.gain(kept)
+    assert len(recorded.catalogue.fits) == 2
+
+
+def test_effects_need_a_case():
+    with pytest.raises(ShapeError, match="give case="):
+        gym.make("chladni_envs:chladni/ParameterSelection-v0", effects=True)
+    env = gym.make("chladni_envs:chladni/ParameterSelection-v0").unwrapped
+    with pytest.raises(ShapeError, match="effects=True"):
+        env.gain(np.zeros(env.p, bool))

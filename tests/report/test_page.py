@@ -12,6 +12,7 @@ from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.page import write_page, write_sections
 from chladni.report.states_table import states_table
 from chladni.report.verdict import HEADING, sentence
+from chladni.updating.result import FrequencyError
 from chladni.view import plots
 from chladni.workflows.diagnosis_result import StateResult
 
@@ -191,6 +192,22 @@ def test_values_that_the_deck_keeps_are_not_called_calibrated(tmp_path):
 def test_reasons_not_to_trust_stand_first(tmp_path):
     text, _ = read(write_page(tmp_path, replace(RESULT, distrust=("the basis is too small",))))
     assert text.index("the basis is too small") < text.index("At a glance")
+
+
+@pytest.mark.parametrize("verdict", ["calibration only", "nothing missing"])
+def test_a_quiet_verdict_that_is_not_trusted_says_so(verdict):
+    quiet = replace(RESULT, verdict=verdict, one_of=())
+    assert "not to be trusted" not in sentence(quiet)
+    doubted = replace(quiet, distrust=("joints no joint is like",))
+    assert "that no physics is missing is not to be trusted" in sentence(doubted)
+    tied = replace(doubted, one_of=(("calibration alone", "hem-contact"),))
+    assert "hem-contact would explain the recording better" in sentence(tied)
+
+
+def test_agreement_says_how_near():
+    near = replace(RESULT, verdict="nothing missing", one_of=(), distrust=())
+    error = FrequencyError(before=4.21)
+    assert "4.2 % of the frequencies" in sentence(replace(near, frequency_error=error))
 
 
 @pytest.mark.parametrize("verdict", ["missing physics", "measurement fault"])

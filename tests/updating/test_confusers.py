@@ -2,9 +2,12 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from chladni.effects.effect import Parameter
 from chladni.effects.local_resonator import LocalResonator
+from chladni.effects.model_families import ModelFamily
 from chladni.effects.registry import families
 from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers, with_doubt
@@ -12,14 +15,15 @@ from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.result_parts import remainder, why_not
 from chladni.updating.ties import TIED, simplest_first
 
+ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 
-def tried(name, S, becomes="", implausible=""):
+
+def tried(name, S, becomes="", implausible="", ln_k=0.0):
     effect = SimpleNamespace(
         name=name, becomes=lambda x: becomes, implausible=lambda x: implausible
     )
-    return SimpleNamespace(
-        neg2_log_evidence=S, effect=effect, name=name, fit=SimpleNamespace(of=lambda e: None)
-    )
+    fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: np.array([ln_k]))
+    return SimpleNamespace(neg2_log_evidence=S, effect=effect, name=name, fit=fit)
 
 
 def found(*evidence, verdict="missing physics"):
@@ -58,11 +62,23 @@ def test_where_nothing_is_named_nothing_is_tied():
 def test_what_leads_without_being_named_leaves_calibration_in_doubt(gains, verdict, heard, tied):
     names = ("point-mass", "sensor-mass", "suspension")
     hypotheses = tuple(tried(name, -gain) for name, gain in zip(names, gains, strict=True))
-    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    null = tried("", 0.0)
+    null.data = None
     answer = with_doubt(Diagnosis(None, null, None, hypotheses, verdict, heard=heard))
     assert answer.one_of == (("calibration alone", *tied) if tied else ())
     assert bool(answer.notes) == bool(tied)
     assert not tied or "weigh the structure" in answer.notes[0]
+
+
+@pytest.mark.parametrize(("ln_k", "tied"), [(1.6, ("point-mass", "suspension")), (1.4, ())])
+def test_what_relieves_a_strained_joint_is_one_of_both(ln_k, tied):
+    """At 3.2 sd of its scatter adhesive holds what is missing; what leaves it so is no rival."""
+    each = (("point-mass", TIED - 1, 0.2), ("sensor-mass", 5.0, ln_k), ("suspension", 2.0, 0.2))
+    hypotheses = tuple(tried(name, -gain, ln_k=k) for name, gain, k in each)
+    null = tried("", 0.0, ln_k=ln_k)
+    null.data = None
+    answer = with_doubt(Diagnosis(None, null, None, hypotheses, "calibration only"))
+    assert answer.one_of == (("calibration alone", *tied) if tied else ())
 
 
 def test_every_family_says_what_would_settle_it():

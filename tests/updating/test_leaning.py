@@ -44,7 +44,8 @@ def test_calibration_that_took_what_no_deck_is_off_by_is_in_doubt(sign):
     E = PartScale((Parameter("E", "Pa", 0.0, 0.06),), "E of strip")
     for away in (0.9 * FAR, 1.2 * FAR):
         x = np.array([sign * away * 0.06])
-        said = in_doubt(found([E], x, [0.01]))
+        fit = found([E], x, [0.01])
+        said = in_doubt(fit, fit)
         assert bool(said) == (away > FAR)
     assert "E of strip" in said[0]
     assert "measure it first" in said[0]
@@ -62,6 +63,16 @@ def test_numbers_that_are_far_together_are_in_doubt(away, doubt):
     effects = [PartScale((Parameter(n, "-", 0.0, s),), f"{n} of strip") for n in ("E", "rho", "t")]
     z = away / np.sqrt(3) * np.array([1.0, -1.0, 1.0])
     left = s * np.sqrt(2 / 3)  # the two directions that nothing tells keep their prior
-    said = in_doubt(found(effects, s * z, [left] * 3))
+    fit = found(effects, s * z, [left] * 3)
+    said = in_doubt(fit, fit)
     assert bool(said) == doubt
     assert not doubt or "E of strip, rho of strip, t of strip together ended 3.3" in said[0]
+
+
+def test_joints_that_no_joint_is_like_leave_calibration_in_doubt():
+    """Whether a deck holds them or the null alone; said once."""
+    idle, null = fitted("welds", 0.0), fitted("adhesive", 1.2 * FAR)
+    assert in_doubt(idle, fitted("adhesive", 0.9 * FAR)) == ()
+    for deck in (idle, null):
+        (said,) = in_doubt(deck, null)
+        assert said.count("the stiffness of adhesive as a whole") == 1

@@ -5,13 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
-from chladni.effects.effect import Effect
+from chladni.effects.effect import Effect, Parameter
+from chladni.effects.model_families import ADHESIVE, ModelFamily
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.errors import ModelError
+from chladni.fem.derivative import Slope
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
@@ -168,6 +171,22 @@ def test_numbers_as_they_were_found_are_those_of_the_null(reduced, responses):
     assert found.fit.sd(effects[0]) == fitted.sd(effects[0])
     due = evaluate(reduced.model, [effects[0]], fitted.of(effects[0]), False)
     assert found.fit.state.lam[6:] == pytest.approx(due.lam[6:])
+
+
+def test_joints_that_took_more_than_they_scatter_are_numbers_of_the_deck(responses, reduced):
+    """Beyond 3 sd: calibrated beside E; within, a nuisance that no deck holds."""
+    E, K = ordinary(reduced.groups, "E", [0]), reduced.structure.system.K
+    none, prior = sp.csr_array(K.shape), (Parameter("k", "-", 0.0, ADHESIVE),)
+    adhesive = ModelFamily(prior, "adhesive", slope=Slope(none, none, 0.01 * K))
+    for x, kept in ((1.6, ["E", "k"]), (1.4, ["E"])):
+        at = np.array([0.02, x])
+        data = responses.over(reduced.model)
+        begun = fit(reduced.model, [E, adhesive], data, None, at, max_steps=0)
+        found = as_found(HypothesisFit(Effect(), begun, reduced.model)).fit
+        assert [p.name for e in found.effects for p in e.parameters] == kept
+        assert list(found.x) == [0.02, x][: len(kept)]
+        due = evaluate(reduced.model, [E, adhesive][: len(kept)], found.x, False)
+        assert found.state.lam[6:] == pytest.approx(due.lam[6:])
 
 
 def prudent(monkeypatch, reduced, responses, E, plain):

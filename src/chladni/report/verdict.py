@@ -96,27 +96,36 @@ def _sentence(result: DiagnosisResult) -> str:
         return f"The structure does not answer in proportion to the force: {why}."
     if not result.searched and not result.effects:
         return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
-    if verdict == "calibration only" and result.distrust:
-        return (
-            "Ordinary parameters explain the recording, but that no physics is missing is not to "
-            f"be trusted{gain}."
-        )
     if verdict in ("calibration only", "nothing missing") and result.one_of:
         better = " or ".join(result.one_of[0][1:])
         return (
             f"Nothing is named; {better} would explain the recording better than calibration "
             f"alone, but not by enough to be sure of either{gain}."
         )
+    if verdict in ("calibration only", "nothing missing") and result.distrust:
+        known = "Ordinary parameters explain the recording" * (verdict == "calibration only")
+        return (
+            f"{known or 'Nothing is named'}, but that no physics is missing is not to be "
+            f"trusted{gain}."
+        )
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
-        return "Model and recording agree within what repeats and dispersion allow."
+        return f"Model and recording agree within what repeats and dispersion allow{_off(result)}."
     if verdict == "not in catalogue" and result.one_of:
         return f"Nothing is named; the data cannot tell apart {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
         near = f": {what}" if what else ""
         return f"Something is missing that the catalogue does not hold{near}."
     return verdict
+
+
+def _off(result: DiagnosisResult) -> str:
+    """How far they are apart, for a mesh may be allowed much."""
+    error = result.frequency_error
+    if error is None or error.before is None:
+        return ""
+    return f", which is {number(error.before, 2)} % of the frequencies (rms)"
 
 
 def _each(effects: Sequence[NamedEffect]) -> str:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
+from .leaning import strained
 from .ties import TIED
 
 
@@ -12,17 +13,21 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
     """A calibration with what explains the data clearly better, if not by enough to be named.
 
     That no physics is missing is a claim as well: where an effect leads by more than what is told
-    apart, and no data that were not fitted have refused it, the answer is one of both.
+    apart, and no data that were not fitted have refused it, the answer is one of both.  So it is
+    where calibration strains a family of joints that stays as it is with the effect.
     """
     plainly = diagnosis.verdict in ("nothing missing", "calibration only")
     if not plainly or not diagnosis.hypotheses or diagnosis.heard is not None:
         return diagnosis
     lead = diagnosis.hypotheses[0]
     gain = diagnosis.two_log_bayes_factor(lead)
-    if gain <= TIED:
+    relieved = bool(strained(diagnosis.null.fit)) and not strained(lead.fit)
+    least = 0.0 if relieved else TIED
+    if gain <= least:
         return diagnosis
-    near = [t for t in diagnosis.hypotheses if diagnosis.two_log_bayes_factor(t) > gain - TIED]
-    names = tuple(t.effect.name for t in near if diagnosis.two_log_bayes_factor(t) > TIED)
+    least = max(least, gain - TIED)
+    near = [t for t in diagnosis.hypotheses if diagnosis.two_log_bayes_factor(t) > least]
+    names = tuple(t.effect.name for t in near if not (relieved and strained(t.fit)))
     note = (
         f"{lead.effect.name} explains the recording better than calibration alone, by {gain:.1f} "
         f"in -2 ln evidence, of which {diagnosis.due:.0f} are needed to name it: neither is certain"

@@ -109,7 +109,7 @@ def diagnose(
     bring starts of their own.
     """
     progress("calibration without new physics", 0.05)
-    problem, null = _null(problem)
+    problem, null = without_effects(problem)
     nominal = _base_fit(problem, problem.nuisance, _nominal_starts(problem))
     if not effects:
         return _calibrated(problem, nominal, null)
@@ -184,8 +184,8 @@ def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> Hypothesis
     return replace(winner, fit=fit)
 
 
-def _null(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
-    """The null, and the problem with errors of the model's form as they spread from its state."""
+def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
+    """The problem with errors of the model's form as they spread from the null, and the null."""
     model, delta = problem.reduced.model, MEDIAN
     state = evaluate(model, problem.base, problem.mean(), False)
     starts = _null_starts(problem)

@@ -1,6 +1,7 @@
 """Numbers that ended where no such number is: they stand for something else."""
 
 from collections.abc import Sequence
+from typing import TypeGuard
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,14 +23,16 @@ def leaning(fit: Fit) -> list[str]:
     ]
 
 
-def in_doubt(plain: Fit) -> tuple[str, ...]:
+def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
     """Why a calibration that explains everything is not to be trusted, if it is not.
 
-    That no physics is missing is a claim: a number no structure of this deck has may hold what is.
-    So may numbers none of which is far by itself: one direction of E, rho and t is all that the
-    frequencies of a strip tell.
+    That no physics is missing is a claim: a number no structure of this deck has, in the deck that
+    is answered with or beside it in the null, may hold what is. So may numbers none of which is far
+    by itself: one direction of E, rho and t is all that the frequencies of a strip tell.
     """
-    if not (far := leaning(plain) or _far_together(plain)):
+    own = leaning(plain) or _far_together(plain)
+    far = list(dict.fromkeys((*own, *strained(null))))
+    if not far:
         return ()
     return (
         f"calibration alone explains the recording, but {'; '.join(far)}: measure it first, and "
@@ -40,14 +43,21 @@ def in_doubt(plain: Fit) -> tuple[str, ...]:
 
 def strained(fit: Fit) -> list[str]:
     """A sentence for every family of joints that took more than joints of its kind scatter."""
-    return [
-        f"the stiffness of {effect.text} as a whole ended at {np.exp(x[0]):.2g} of the deck's, "
-        f"{away:.2g} standard deviations of what it may be by itself: it may be what is wrong"
-        for effect in fit.effects
-        if isinstance(effect, ModelFamily)
-        and (away := _away(effect, x := fit.of(effect))) > FAR
-        and effect.text in JOINTS
-    ]
+    return [_more(e, x) for e in fit.effects if is_strained(e, x := fit.of(e))]
+
+
+def is_strained(effect: Effect, x: np.ndarray) -> TypeGuard[ModelFamily]:
+    """Whether an effect is a family of joints that took more than joints of its kind scatter."""
+    known = isinstance(effect, ModelFamily) and effect.text in JOINTS
+    return known and _away(effect, x) > FAR
+
+
+def _more(family: Effect, x: np.ndarray) -> str:
+    return (
+        f"the stiffness of {family.text} as a whole ended at {np.exp(x[0]):.2g} of the deck's, "
+        f"{_away(family, x):.2g} standard deviations of what it may be by itself: it may be what "
+        "is wrong"
+    )
 
 
 def _far_together(fit: Fit) -> list[str]:
@@ -79,6 +89,8 @@ def _each(effect: Effect, name: str) -> np.ndarray:
 def _said(effect: Effect, x: np.ndarray) -> str:
     if isinstance(effect, Freed) and effect.on_bound(x):
         return f"{effect.text} ended on a bound, so it may stand for something else"
+    if is_strained(effect, x):
+        return _more(effect, x)
     away = _away(effect, x)
     if len(x) == 1 and away > FAR:
         return (

@@ -140,8 +140,8 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     result = _result(asked, prepared, found, stages)
     result = over_levels(asked, prepared, stages, result, diagnosing)
     distrust = known.distrust
-    if diagnosing and result.verdict == "calibration only":
-        distrust = (*distrust, *in_doubt(found.plain.fit))
+    if diagnosing and result.verdict in ("calibration only", "nothing missing"):
+        distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
         distrust = (f"nothing is named: {prepared.too_little}", *distrust)
     said = () if known.screening is None else known.screening.notes
@@ -263,7 +263,10 @@ def _result(
     )
     rows = frequency_rows(asked, prepared, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
-    left, away = remainder(prepared, found), (*leaning(deck.fit), *strained(last.fit))
+    left, away = (
+        remainder(prepared, found),
+        dict.fromkeys((*leaning(deck.fit), *strained(last.fit))),
+    )
     spot = left_where(last, asked.mass_measurement)
     weighed = None if asked.mass_measurement is None else asked.mass_measurement.mass
     return DiagnosisResult(

@@ -1,0 +1,118 @@
+"""Effects of the catalogue as choices on a recorded case: linear for agents, fitted if asked."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from chladni.effects.search_context import Candidate
+from chladni.errors import ModelError
+from chladni.planning import Linearised
+from chladni.updating.candidates import candidates
+from chladni.updating.diagnosis import threshold, without_effects
+from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem
+from chladni.updating.likelihood import Responses
+from chladni.updating.question import Prepared
+from chladni.updating.reduced_model import evaluate
+from chladni.updating.search_round import taken
+from chladni.updating.several import price
+
+
+@dataclass(frozen=True, eq=False)
+class CatalogueChoices:
+    """Every effect that the search proposes for a case, one choice each.
+
+    Attributes
+    ----------
+    problem : with errors of the model's form as they spread from the null
+    null : the fit of ordinary parameters and nuisances alone
+    candidates : effects, each with the values at which it scored best
+    fits : best fits made so far, by the choices in them
+    """
+
+    problem: UpdatingProblem
+    null: HypothesisFit
+    candidates: tuple[Candidate, ...]
+    fits: dict[frozenset[int], HypothesisFit] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each is and where it begins."""
+        each = ((c.effect, c.effect.location(c.start)) for c in self.candidates)
+        return tuple(f"{e.name} {at.text}".rstrip() for e, at in each)
+
+    def linearised(self, score: Responses, held: np.ndarray, own: int) -> Linearised:
+        """Fitted and held-out residuals about the deck and their changes, ordinary ones first.
+
+        An ordinary parameter enters by its slope, an effect by all that it changes at the values
+        at which it scored best (θ = 1).  The nuisances are free in every fit: with the model's
+        error they are whitened out of what is fitted.
+
+        Parameters
+        ----------
+        score : what held-out data are compared on
+        held : (n_f, n_out) bool     the held-out samples of it
+        own : how many parameters of the base are ordinary and come first
+        """
+        problem, x = self.problem, self.problem.mean()
+        fitted, unseen = problem.data, score.only(held)
+        assert isinstance(fitted, Responses)
+        state = evaluate(problem.reduced.model, problem.base, x, True)
+        sd = np.array([p.sd for e in problem.base for p in e.parameters])
+        (r, J), (h, H) = (d.residual(state, True) for d in (fitted, unseen))
+        J, H = J * sd, H * sd
+        steps = [self._changes(c, (fitted, unseen), x) for c in self.candidates]
+        more = [np.array([s[k] for s in steps]).T for k in (0, 1)]
+        r, *columns = _without(J[:, own:], r, np.hstack([J[:, :own], more[0] - r[:, None]]))
+        return Linearised(r, columns[0], h, np.hstack([H[:, :own], more[1] - h[:, None]]))
+
+    def _changes(
+        self, candidate: Candidate, data: Iterable[Responses], x: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """Residuals with the candidate where it begins, beside the deck's own parameters."""
+        model = self.problem.reduced.model_for(candidate.effect, candidate.start)
+        effects = [*self.problem.base, candidate.effect]
+        state = evaluate(model, effects, np.concatenate([x, candidate.start]), False)
+        return tuple(d.over(model).residual(state, False)[0] for d in data)
+
+    def gain(self, chosen: Iterable[int]) -> float:
+        """Gain of a set in -2 ln evidence over the null, less what each of it has to bring.
+
+        Positive: the set would be named before the data that no fit saw are asked.  Every set is
+        fitted once, -inf where no structure is left.
+        """
+        chosen = frozenset(chosen)
+        if not chosen:
+            return 0.0
+        try:
+            return self.beyond_price(self._fitted(chosen))
+        except ModelError:
+            return float("-inf")
+
+    def beyond_price(self, hypothesis: HypothesisFit) -> float:
+        """What a hypothesis gains over the null, less what each of its effects has to bring."""
+        due = threshold(self.null.data, len({c.effect.name for c in self.candidates}))
+        asked = sum(price(due, size) for size in range(1, len(hypothesis.effects) + 1))
+        return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence - asked
+
+    def _fitted(self, chosen: frozenset[int]) -> HypothesisFit:
+        if chosen not in self.fits:
+            first, *rest = (self.candidates[k] for k in sorted(chosen))
+            held = self.problem.holding([(c.effect, c.start) for c in rest])
+            begun = (held.mean(), taken(held, self.null, ("ordinary", "nuisance")))
+            tries = [held.fitted_with(first.effect, first.start, x) for x in begun]
+            self.fits[chosen] = min(tries, key=lambda t: t.neg2_log_evidence)
+        return self.fits[chosen]
+
+
+def catalogue_choices(prepared: Prepared) -> CatalogueChoices:
+    """The choices of a case that was made ready for updating."""
+    problem, null = without_effects(prepared.problem)
+    return CatalogueChoices(problem, null, tuple(candidates(problem, null)))
+
+
+def _without(nuisance: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    """(I + J Jᵀ)^-½ times each array (n, ...): slopes J (n, k) of what is free at unit spread."""
+    U, s, _ = np.linalg.svd(nuisance, full_matrices=False)
+    less = 1 - 1 / np.sqrt(1 + s**2)
+    return tuple(a - (U * less) @ (U.T @ a) for a in arrays)
