@@ -123,8 +123,11 @@ States are one object changed: each is diagnosed with what the others say of E, 
 then fitted at once with these shared, and each has its own effect, deck and page.
 
 Time histories and spectra of responses, no force among them, give natural frequencies where a case
-holds neither FRFs nor poles: as if the force were white in the band. Elsewhere they, and mode
-shapes, are named in the notes and not used.
+holds neither FRFs nor poles. What rings down (a record, or each of its blocks) is taken from its
+loudest moment on; what goes on, as if the force were white in the band. The time data may be any of
+those above without the force, and sound of a microphone (Pa); `identify` gives poles, damping and
+unscaled shapes of what rings down. Elsewhere they, and mode shapes, are named in the notes and not
+used.
 """
 
 

@@ -34,7 +34,9 @@ KIN = (  # what changes the same operator: the right family, if not the right na
 NEAR = {"tailgate": 0.150}  # a place this far off is right [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
-VETO = re.compile(r"(\S+) gained .* in -2 ln evidence but left the data no fit saw")
+VETO = re.compile(
+    r"(\S+) gained .* in -2 ln evidence but (?:left the|made the deck worse on) data no fit saw"
+)
 
 
 def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:

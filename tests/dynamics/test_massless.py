@@ -6,6 +6,7 @@ import pytest
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import residual_flexibility
 from chladni.dynamics.massless import static_solver
+from chladni.dynamics.reduction import beyond, shifted
 from chladni.dynamics.residual import with_residual_vectors
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
@@ -51,6 +52,19 @@ def test_residual_vectors_are_found_too(bar):
     few = normal_modes(bar.system, 8)
     more = with_residual_vectors(bar.system, few, column(bar, 8, 3))
     assert len(more) == len(few) + 1
+
+
+def test_its_shifted_factor_answers_forces_and_a_basis_has_no_spin(bar):
+    """As :func:`static_solver` does; a unit torque brings no vector, for it moves no mass."""
+    system, hertz = bar.system, 100.0
+    force, torque = column(bar, 8, 3), column(bar, 8, 4)
+    factor = shifted(system, hertz)
+    due = static_solver(system, -((2 * np.pi * hertz) ** 2))(force)
+    np.testing.assert_allclose(factor.solve(force), due, rtol=1e-6, atol=1e-6 * abs(due).max())
+    turned = np.hstack([due, factor.solve(torque)])
+    basis = beyond(system.M, (), turned)
+    assert basis.shape[1] == 1
+    assert np.abs(basis).max() < 1e3  # [1/sqrt(kg), 1/(m sqrt(kg))]: the bar weighs half a kilogram
 
 
 def test_a_load_that_turns_it_is_refused(bar):

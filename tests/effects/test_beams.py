@@ -202,3 +202,27 @@ def test_a_stiffened_plate_frees_both_and_its_sheet_alone_is_patched():
     Phi = reduced.model.basis
     due = Phi.T @ (system.K.real @ Phi) - reduced.model.K0
     assert_allclose(K, due, atol=1e-8 * abs(due).max())
+
+
+@pytest.mark.parametrize("effect", [PointMass, ExtraSupport, LocalResonator])
+def test_nothing_sits_beside_a_frame(where, effect):
+    """A fit that goes far along a tube has the place at its end, where going on changes nothing."""
+    for k in (0, len(where.grids) // 2):
+        one = effect.near(where, k)
+        ends = one.patch.origin + one.patch.flat @ one.patch.plane
+        x = np.array([p.mean for p in one.parameters])
+        for way in (-40.0, 40.0):
+            x[1] = way
+            spot = np.array(one.location(x).point_m)
+            assert np.linalg.norm(ends - spot, axis=1).min() < 1e-9
+            along = [term.moving[1] for term in one.terms(x) if term.moving]
+            assert along
+            assert not any(abs(slope).sum() for slope in along)
+
+
+def test_at_the_end_of_a_tube_the_slope_is_that_inwards(where):
+    k = int(np.flatnonzero(np.bincount(where.grids.line[where.grids.line >= 0]) > 0)[0])
+    patch = PointMass.near(where, int(np.flatnonzero(where.grids.line == k)[0])).patch
+    end, h = patch.flat.max(axis=0), 1e-6 * patch.size * np.eye(2)[0]
+    due = (patch.at(end) - patch.at(end - h)) / h[0]
+    assert_allclose(patch.slope(end, 0).toarray(), due.toarray(), atol=1e-2 * abs(due).max())

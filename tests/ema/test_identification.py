@@ -135,6 +135,27 @@ def test_equalised_is_the_undamped_model() -> None:
     np.testing.assert_allclose(equalised(found, s), due, rtol=1e-5)
 
 
+def test_a_far_pole_that_a_residual_term_makes_up_for_does_so_when_equalised() -> None:
+    """R = iCp² brings 2C Im p - 2s² Re(iC/p) + ...: a constant, here 10⁴ times the response.
+
+    Moved to i|p| it would bring another one, by a share of ζ².
+    """
+    truth = a_truth(2, 10, 5)
+    found = identify(truth.frf(EVEN, "accelerance", 1e-9))
+    s = 2 * np.pi * LOG[::10] * (0.03 + 1j)
+    due, p = equalised(found, s), 2 * np.pi * 2e6 * (-0.06 + 1j)
+    large = 1e4 * float(np.abs(due / s[:, None, None] ** 2).mean())
+    R = np.full((1, *found.lower.shape), 1j * p**2 * large / (2 * p.imag))
+    one = dict.fromkeys(("frequency_sd", "damping_sd", "relative_delta_chi2"), 1.0)
+    more = replace(
+        found, poles=np.append(found.poles, p), residues=np.concatenate([found.residues, R]),
+        upper=found.upper - large,
+        **{name: np.append(getattr(found, name), sd) for name, sd in one.items()},
+    )  # fmt: skip
+    for whole, of in ((evaluate(more, s), evaluate(found, s)), (equalised(more, s), due)):
+        np.testing.assert_allclose(whole, of, atol=0.05 * np.abs(of).mean())
+
+
 def test_a_gap_in_the_data_does_no_harm() -> None:
     """Lines left out (the cord's band) take no modes elsewhere with them."""
     truth = a_truth(4, 8, 6)

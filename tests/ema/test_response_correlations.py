@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from chladni.ema.identification import identify
-from chladni.ema.response_correlations import one_sided, responses
+from chladni.ema.response_correlations import LINES, free_decays, one_sided, responses
 from chladni.ema.setup import Function
 
 F = np.array([11.0, 17.0, 31.0])
@@ -69,3 +69,50 @@ def test_a_record_with_a_force_is_left_to_others():
     assert responses(()) == ()
     rounded = [replace(f, x=np.round(f.x + 50.0, 4)) for f in some]  # as files write the time
     assert len(responses(rounded)) == 3
+
+
+def ringing(strengths, seconds, seed, noise=0.01, offset=0.3, quiet=40):
+    """Free decays of the three modes after some quiet, each block begun otherwise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(seconds * RATE)) / RATE
+    found = []
+    for begun in strengths:
+        w = 2 * np.pi * F
+        q = begun * np.exp(-ZETA * w * t[:, None]) * np.cos(w * np.sqrt(1 - ZETA**2) * t[:, None])
+        y = np.vstack([np.zeros((quiet, 3)), q @ SHAPES.T])[: len(t)].T
+        y = y + offset + noise * np.abs(y).max() * rng.normal(size=y.shape)
+        found += [Function("time", f"{k + 1}:+Z", "", t, row, "m/s^2") for k, row in enumerate(y)]
+    return tuple(found)
+
+
+@pytest.mark.parametrize("strengths", [[(1.0, 0.8, 0.6)], [(1.0, 0.1, 0.4), (0.2, 1.0, 0.7)]])
+def test_free_decays_have_their_poles_at_once(strengths):
+    """Of one block or of several, frequency and damping; what the window added is taken off."""
+    heard = ringing(np.array(strengths), 12.0, 3)
+    assert free_decays(responses(heard))
+    known, found = frequencies(heard)
+    frf, sigma = one_sided(heard)
+    assert frf.values.shape[1:] == (3, len(strengths))
+    for f, zeta in zip(F, ZETA, strict=True):
+        k = np.abs(known - f).argmin()
+        assert abs(known[k] - f) < 2e-4 * f
+        assert -(found.poles[k].real + sigma) / (2 * np.pi * f) == pytest.approx(zeta, rel=0.05)
+
+
+def test_a_wide_record_is_cut_to_the_lines_that_are_asked_for():
+    """A quarter of an hour is no better than what the band needs."""
+    frf, _ = one_sided(ringing(np.ones((1, 3)), 900.0, 1), (15.0, 25.0))
+    inside = (frf.frequency >= 15.0) & (frf.frequency <= 25.0)
+    assert abs(int(inside.sum()) - LINES) < 5
+
+
+def test_what_goes_on_is_no_decay():
+    """White noise drives it all the time, or hits come one after another."""
+    assert not free_decays(simulated(60, 2))
+    hits = [ringing(np.ones((1, 3)), 4.0, k) for k in range(3)]
+    t = np.arange(3 * len(hits[0][0].x)) / RATE
+    whole = tuple(
+        replace(one, x=t, values=np.concatenate([h[k].values for h in hits]))
+        for k, one in enumerate(hits[0])
+    )
+    assert not free_decays(whole)

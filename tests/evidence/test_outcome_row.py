@@ -81,9 +81,12 @@ def test_outcome(given, truth, outcome):
     assert row(given, truth)["outcome"] == outcome
 
 
-def test_the_veto_is_told_from_the_evidence():
+@pytest.mark.parametrize(
+    "why", ["left the data no fit saw worse explained", "made the deck worse on data no fit saw"]
+)
+def test_the_veto_is_told_from_the_evidence(why):
     """A name the held-out data refused counts by evidence, and the veto was wrong to refuse it."""
-    note = "point-mass gained 1314 in -2 ln evidence but left the data no fit saw worse explained"
+    note = f"point-mass gained 1314 in -2 ln evidence but {why}"
     given = answer(None, "calibration only", notes=["first", note])
     r = row(given, told())
     assert (r["outcome"], r["by_evidence"], r["vetoed"]) == ("none", "right", "point-mass")

@@ -1,5 +1,6 @@
 """One test as WAV, MAT, CSV, NPZ and universal file; what is wrong is one sentence."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -143,10 +144,38 @@ def test_a_quantity_that_is_asked_for_counts(tmp_path: Path) -> None:
     assert "read as receptance as asked" in found.notes[-1]
 
 
+def test_responses_without_a_force_are_time_histories(tmp_path: Path) -> None:
+    """Of a CSV, a WAV of a microphone, an NPZ of two blocks, a universal file: SI, no FRF."""
+    head = "time_s,7:+Z [g],9:-X [m/s^2]"
+    rows = np.column_stack([np.arange(N) / RATE, MOTION.T])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=head, comments="", fmt="%.17g")
+    numbers = np.round(MOTION[:1].T * 32767).astype(np.int16)
+    wavfile.write(tmp_path / "b.wav", int(RATE), numbers)
+    (tmp_path / "b.channels.csv").write_text("channel,label,unit,scale\n1,7:+Z,mPa,500\n")
+    np.savez(tmp_path / "c.npz", acceleration=np.stack([MOTION] * 2), fs=RATE, outputs=LABELS[1:])
+    for name, labels, first in (
+        ("a.csv", ("7:+Z", "9:-X"), GRAVITY), ("b.wav", ("7:+Z",), 0.5),
+        ("c.npz", ("7:+Z", "9:-X") * 2, 1.0),
+    ):  # fmt: skip
+        (found,) = read_recordings(tmp_path / name)
+        assert found.time is None
+        assert tuple(f.output for f in found.functions) == labels
+        assert {(f.kind, f.input) for f in found.functions} == {("time", "")}
+        np.testing.assert_allclose(found.functions[0].values, first * MOTION[0], atol=1e-4)
+        np.testing.assert_allclose(found.functions[0].x, np.arange(N) / RATE, atol=1e-9)
+
+
+def test_sound_has_no_frequency_response(tmp_path: Path) -> None:
+    path = csv(tmp_path / "a.csv", "Pa")
+    path.write_text(path.read_text().replace("[g]", "[Pa]"))
+    with pytest.raises(ChladniError, match=r"a\.csv: .*1 inputs and 2 outputs"):
+        read_recordings(path)
+
+
 BAD_CSV = {
     "unit": (lambda t: t.replace("[g]", "[V]"), r"7:\+Z is in 'V'; known are N"),
     "no unit": (lambda t: t.replace(" [g]", ""), r"is in 'no unit'"),
-    "no force": (lambda t: t.replace("[N]", "[g]"), "0 inputs and 3 outputs"),
+    "no motion": (lambda t: re.sub(r"\[(g|m/s.2)\]", "[N]", t), "3 inputs and 0 outputs"),
     "two kinds": (lambda t: t.replace("[m/s^2]", "[mm]"), "one kind of motion"),
     "word": (lambda t: t.replace("\n0,", "\nzero,", 1), "is not 4 numbers"),
     "uneven": (lambda t: t + "9.5,0,0,0\n", "not evenly spaced"),

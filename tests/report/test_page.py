@@ -152,6 +152,14 @@ def test_what_is_missing_is_left_out(tmp_path, d):
     assert "None" not in text
 
 
+@pytest.mark.parametrize(("written", "told"), [(0.5, True), (0.0151, False)])
+def test_a_mesh_too_coarse_is_told_where_the_deck_as_written_is_worse(written, told):
+    """Named it may be for all that: the error of the mesh is in both models then."""
+    held = {**DIAGNOSIS["fit"]["held_out"], "Q_with_effect": written, "Q_with_mesh_error": 0.009}
+    d = {**DIAGNOSIS, "fit": {**DIAGNOSIS["fit"], "held_out": held}}
+    assert ("and to 0.009 with the error of its mesh" in sentence(from_json(d))) == told
+
+
 def test_a_missing_picture_is_a_sentence_and_no_page(tmp_path):
     with pytest.raises(FileError, match=r"nix\.png"):
         write_page(tmp_path, RESULT, {"where": tmp_path / "nix.png"})

@@ -9,9 +9,10 @@ from chladni.effects.effect import Parameter
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.model_families import ModelFamily
 from chladni.effects.registry import families
+from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers, with_doubt
 from chladni.updating.diagnosis import Diagnosis
-from chladni.updating.result_parts import why_not
+from chladni.updating.result_parts import remainder, why_not
 from chladni.updating.ties import TIED, simplest_first
 
 ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
@@ -130,3 +131,41 @@ def test_a_value_a_thing_cannot_have_yields_to_one_it_can():
     assert answer.one_of[:2] == ("hem-contact", "adhesive-stiffness")
     assert "cut through the hem" in answer.one_of[2]
     assert "no sealant" in answer.notes[-1]
+
+
+RUBS = "1 of 5 modes are damped by 2.0%"
+
+
+@pytest.mark.parametrize(
+    ("gain", "passes", "said"),
+    [
+        (2.0, True, "mesh error and scatter within the parts account for it as well as any"),
+        (TIED + 20, True, "point-mass accounts for more of it"),
+        (2.0, False, "nothing that was tried accounts for it"),
+        (TIED + 200, False, "nothing that was tried accounts for it"),
+    ],
+)
+def test_mesh_error_is_not_made_the_reason_of_what_it_does_not_explain(gain, passes, said):
+    """What calibration leaves, 40 times what the recording is known to, where nothing is named."""
+    data = SimpleNamespace(Q=lambda state, use: 0.04)
+    score = SimpleNamespace(use=None, over=lambda model: data)
+    prepared = SimpleNamespace(score=score, identified=None)
+    fit = SimpleNamespace(state=None)
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None, model=None, fit=fit)
+    test = FitTest(passes, 0.5 if passes else 1e-4, RUBS, "near 410 Hz")
+    answer = Diagnosis(
+        null, null, null, (tried("point-mass", -gain),), "calibration only", adequacy=test
+    )
+    assert said in remainder(prepared, answer).sentence
+
+
+def test_a_leader_that_is_refused_is_told_with_what_refused_it():
+    """By what it leaves, not by held-out data that were never asked."""
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    lead, second = tried("local-resonator", -183.0), tried("point-mass", -180.0)
+    answer = Diagnosis(
+        null, null, null, (lead, second), "not in catalogue",
+        refused=f"what it leaves is not explained: {RUBS}",
+    )  # fmt: skip
+    assert why_not(answer, lead, null).endswith(f"but what it leaves is not explained: {RUBS}")
+    assert why_not(answer, second, null).endswith("but local-resonator, ahead of it, is not named")

@@ -112,6 +112,15 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
     assert called != REST or not judged.adequacy.passes
+    if called == NAMED:
+        return
+    against = not outcome.carried(ahead, heard, DUE)  # what refused it is said, and nothing else
+    worse = not against and (left[1] > outcome.HARM or (ahead < 2 * DUE and left[1] > 1))
+    assert ("data no fit saw worse explained" in judged.refused) == against
+    assert ("worse on data no fit saw" in judged.refused) == worse
+    assert ("leaves more than it explains" in judged.refused) == (not against and not worse)
+    if called == REST and not against:
+        assert outcome.AGAINST not in judged.adequacy.what
 
 
 @pytest.mark.parametrize(
@@ -236,8 +245,12 @@ def test_where_no_number_serves_the_deck_stays_as_it_is(monkeypatch, reduced, re
     assert "its own, which stay" in found.notes[-1]
 
 
-def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses):
-    """A stiffness that is no longer positive has no Q: the calibration stays, without a fault."""
+@pytest.mark.parametrize("begun", [True, False])
+def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, responses, begun):
+    """A stiffness that is no longer positive has no Q: the calibration stays, without a fault.
+
+    Nor where no fit of them could even be begun.
+    """
     data = responses.over(reduced.model)
     base = (ordinary(reduced.groups, "E", [0]),)
     found = fit(reduced.model, base, data, None, np.array([0.04]), max_steps=0)
@@ -250,9 +263,14 @@ def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, res
             raise ModelError("an effect left negative stiffness")
         return real(model, effects, x, gradient)
 
+    def asked(null, mass_measurement=None):
+        if begun:
+            return none
+        raise ModelError("an effect left negative stiffness")
+
     monkeypatch.setattr(outcome, "evaluate", evaluated)
     for made in ("as_found", "as_written"):
-        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: none)
+        monkeypatch.setattr(outcome, made, asked)
     problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
     prepared = SimpleNamespace(problem=problem, score=data)
     diagnosis = Diagnosis(plain, plain, plain, (), "calibration only")

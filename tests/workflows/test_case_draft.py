@@ -233,3 +233,16 @@ def test_errors_are_ours(tmp_path):
     (tmp_path / "empty.bdf").write_text("")
     with pytest.raises(ChladniError):
         draft(tmp_path / "empty.bdf")
+
+
+def test_a_ring_down_alone_is_a_recording(deck, tmp_path):
+    """Nothing but the mass is missing: natural frequencies are taken from it."""
+    t = np.arange(2048) / 1024.0
+    ring = np.exp(-3 * t) * np.sin(2 * np.pi * 40 * t)
+    text = "\n".join(f"{a:.6f},{b:.6g}" for a, b in zip(t, ring, strict=True))
+    (tmp_path / "ring.csv").write_text(f"time_s,3:+Z [m/s^2]\n{text}\n")
+    ran = call("init", deck, tmp_path / "ring.csv", "--out", tmp_path / "case")
+    assert ran.exit_code == 0, ran.output
+    said = ran.output.replace("\n", " ")
+    assert "no force: their natural frequencies are compared" in said
+    assert "the recordings hold neither" not in said

@@ -65,6 +65,26 @@ def test_identify_says_who_can_use_them(ambient):
         chladni.identify(ambient)
 
 
+def test_poles_of_free_decays_are_identified(ambient):
+    """Frequency and damping of what it was made of; nothing is said of a drive point or delay."""
+    t, f, zeta = np.arange(6144) / RATE, np.array([40.0, 71.0, 110.0]), 0.004
+    rows = np.random.default_rng(2).normal(size=(2, 3)) @ np.array(
+        [np.exp(-zeta * 2 * np.pi * g * t) * np.sin(2 * np.pi * g * t) for g in f]
+    )
+    rows = rows + 0.002 * np.random.default_rng(3).normal(size=rows.shape)
+    heard = tuple(
+        Function("time", label, "", t, row, "m/s^2")
+        for label, row in zip(("2:+Z", "7:+Z"), rows, strict=True)
+    )
+    case = replace(ambient, recordings=(Recording("ring.csv", functions=heard),), band=(20, 150))
+    found = chladni.identify(case)
+    (one,) = found.recordings
+    np.testing.assert_allclose(one.poles.frequency, f, rtol=1e-4)
+    np.testing.assert_allclose(one.poles.damping, zeta, rtol=0.05)
+    assert not one.screening.findings
+    assert any("no force was measured" in note for note in found.notes)
+
+
 def test_noise_has_no_natural_frequencies(ambient):
     """White noise on every sensor: one sentence, no table."""
     case = ambient

@@ -17,9 +17,11 @@ from ..dofs import label
 from ..errors import ModelError
 from ..sparse.factor import Factor, factorise
 from ..sparse.multifrontal import NotDefinite
+from .massless import stiffened
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
+MASSLESS = 1e-20  # of the heaviest dof moving as far: what rounding leaves of no mass at all
 ROWS = 4096  # of an operator that are multiplied at once, or the product is as large as a basis
 
 
@@ -40,10 +42,16 @@ def orthonormal(
 def beyond(
     M: sp.csr_array, known: Sequence[np.ndarray], block: np.ndarray, cut: float = CUT
 ) -> np.ndarray:
-    """What a block (n, m) adds to M-orthonormal ones, M-orthonormal itself (n, k)."""
-    if not block.shape[1]:
-        return block
-    V = block / np.sqrt(np.maximum(np.einsum("ij,ij->j", block, M @ block), 1e-300))
+    """What a block (n, m) adds to M-orthonormal ones, M-orthonormal itself (n, k).
+
+    What moves no mass (the spin of a straight row of bars) has no place among them.
+    """
+    heavy = np.einsum("ij,ij->j", block, M @ block)
+    heaviest = float(M.diagonal().max(initial=0.0)) * (block**2).max(axis=0, initial=0.0)
+    moves = heavy > MASSLESS * heaviest
+    if not moves.any():
+        return np.zeros((len(block), 0))
+    V = block[:, moves] / np.sqrt(heavy[moves])
     V = _without(M, known, V)
     w, U = np.linalg.eigh(V.T @ (M @ V))
     keep = w > cut**2
@@ -120,15 +128,20 @@ def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> F
     """Factor of K + (2π f)² M, positive definite for a free structure too.
 
     The dofs of a node are kept together: to cut between them takes forty times as long to order.
+    What can move without stiffness and without mass is held, as it is where modes are sought.
 
     Raises
     ------
     ModelError
-        If something can move without stiffness and without mass; the sentence says what.
+        If something moves without stiffness and mass even so; the sentence says what.
     """
-    A = sp.csc_array(system.K + (2 * np.pi * hertz) ** 2 * system.M)
+    mass = (2 * np.pi * hertz) ** 2 * system.M
     try:
-        return factorise(A, points, nodes=system.dofs[:, 0])
+        return factorise(sp.csc_array(system.K + mass), points, nodes=system.dofs[:, 0])
+    except NotDefinite:
+        held = stiffened(sp.csr_array(system.elastic))
+    try:
+        return factorise(sp.csc_array(held + mass), points, nodes=system.dofs[:, 0])
     except NotDefinite as error:
         point, component = system.dofs[error.row].tolist()
         raise ModelError(

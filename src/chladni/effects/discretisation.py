@@ -86,8 +86,9 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
 
     The error of its elements, and, where it has joints on whole shells, that of their footprints:
     of all alike, and of each region by itself, for two meshers hang one joint on unlike shells.
-    With Ψ the refined modes at the old points, each the partner of one of Φ, B = polar(ΦᵀMΨ) and
-    ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives the refined frequencies exactly.
+    With Ψ the refined modes at the old points, each the partner of one of Φ, B = ΦᵀMΨ made
+    orthogonal, the softest modes first, and ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives
+    the refined frequencies exactly.
     """
     built = model.structure
     made = built.assembly
@@ -183,12 +184,25 @@ class _CoarseModes:
         """What a finer structure with these modes Ψ changes."""
         overlap = self.M_phi.T @ (finer.rows(self.dofs) @ modes.shapes)
         own, partner = linear_sum_assignment(-(overlap**2))
-        U, _, Vt = np.linalg.svd(overlap[np.ix_(own, partner)])
-        B, lam = U @ Vt, (2 * np.pi * modes.frequency[partner]) ** 2
+        soft = np.argsort(self.lam[own], kind="stable")
+        own, partner = own[soft], partner[soft]
+        B = _orthogonal(overlap[np.ix_(own, partner)])
+        lam = (2 * np.pi * modes.frequency[partner]) ** 2
         stiffness, seen = np.zeros((len(self.lam),) * 2), np.zeros_like(self.at_places)
         stiffness[np.ix_(own, own)] = (B * lam) @ B.T - np.diag(self.lam[own])
         seen[:, own] = self.places(finer) @ modes.shapes[:, partner] @ B.T - self.at_places[:, own]
         return _ModalChange(self.M_phi, self.lam, (stiffness + stiffness.T) / 2, seen)
+
+
+def _orthogonal(overlap: np.ndarray) -> np.ndarray:
+    """Columns (n, n) of an overlap of modes made orthogonal in their order, the softest first.
+
+    Another mass matrix puts δM_ij of a soft mode i into a stiff one j, and only λ_i/λ_j as much of
+    j into i.  The polar factor would share both evenly and turn the soft mode towards the stiff
+    one, which x beyond 1 takes for a loss of x(x - 1) λ_j δM_ij²/4: it can be more than λ_i.
+    """
+    Q, R = np.linalg.qr(overlap)
+    return np.asarray(Q * np.where(np.diag(R) < 0, -1.0, 1.0))
 
 
 def modal_discrepancy(

@@ -3,7 +3,8 @@
 Between grids the motion of the sheet is interpolated by moving least squares with quadratic
 polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a fit can follow its
 slope. On a line of beams it moves along the line; the second parameter of its place does nothing
-there and stays at its prior.
+there and stays at its prior. Nothing sits beside the grids: a fit that goes on beyond them has the
+place where they end.
 """
 
 from collections.abc import Callable
@@ -47,9 +48,13 @@ class Patch:
     rows: tuple[sp.csr_array, ...]
     size: float
 
+    def inside(self, at: np.ndarray) -> np.ndarray:
+        """The place of the plane, no farther out than the grids reach (2,)."""
+        return np.asarray(np.clip(at, self.flat.min(axis=0), self.flat.max(axis=0)))
+
     def weights(self, at: np.ndarray) -> np.ndarray:
         """Interpolation weights of the grids at a place of the plane (k,)."""
-        d = (self.flat - at) / self.size
+        d = (self.flat - self.inside(at)) / self.size
         if not self.plane[1].any():
             d[:, 1] = 0.0
         w = np.exp(-(d**2).sum(axis=1) / 1.8)
@@ -77,10 +82,12 @@ class Patch:
         return self._weighted(self.weights(at))
 
     def slope(self, at: np.ndarray, axis: int) -> sp.csr_array:
-        """Change of those rows along an axis of the plane (d, n)."""
+        """Change of those rows along an axis of the plane, inwards at its end (d, n)."""
         e = STEP * self.size * np.eye(2)[axis]
-        change = self.weights(at + e) - self.weights(at - e)
-        return self._weighted(change / (2 * STEP * self.size))
+        above, below = (self.inside(at + way * e) for way in (1, -1))
+        apart = float(above[axis] - below[axis])
+        change = self.weights(above) - self.weights(below)
+        return self._weighted(change / apart if apart else 0.0 * change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +130,7 @@ class MovableAttachment(Effect):
     def at(self, x: np.ndarray) -> np.ndarray:
         """The place in the basic frame (3,) [m]."""
         assert self.patch is not None
-        return self.patch.origin + self.patch.size * x[1:3] @ self.patch.plane
+        return self.patch.origin + self.patch.inside(self.patch.size * x[1:3]) @ self.patch.plane
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The strength; the place stands in ``location``."""

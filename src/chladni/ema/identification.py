@@ -20,6 +20,7 @@ from .pole_selection import ORDERS, Rule
 from .response_variance import frf_variance
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
+AWAY = 3.0  # times the band, above or below: of a pole there damping moves H by ζ of a small part
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,8 +242,12 @@ def equalised(identified: Identified, s: np.ndarray) -> np.ndarray:
     Evaluated on s = ω(ζ_e + i) it meets the undamped model Σ φ φᵀ / (ω_r² + s²) on the same
     line, with no pairing of modes. The residue φφᵀ / 2i Im p becomes φφᵀ / 2i |p|.
 
+    Poles beyond ``AWAY`` of the band stay: what they bring there hardly knows their damping, and
+    several that stand for one smooth rest are large and cancel only where they are.
+
     Abrahamsson and Kammer (2015), IMAC XXXIII, eqs. 26.14-26.28 (damping equalisation).
     """
-    p = identified.poles
-    R = identified.residues * (p.imag / np.abs(p))[:, None, None]
-    return evaluate(identified, s, 1j * np.abs(p), R)
+    p, (low, high) = identified.poles, identified.band
+    near = (identified.frequency > low / AWAY) & (identified.frequency < high * AWAY)
+    R = identified.residues * np.where(near, p.imag / np.abs(p), 1.0)[:, None, None]
+    return evaluate(identified, s, np.where(near, 1j * np.abs(p), p), R)

@@ -4,15 +4,19 @@ Under a force that is white and stationary in the band, correlations of response
 decay as the free structure does: r_ij(τ) = Σ_r c_r exp(p_r τ) + conjugate (NExT: James, Carne and
 Lauffer 1995, Int. J. Analytical and Experimental Modal Analysis 10, 260-277).  Their one-sided
 transform Σ_r c_r / (s - p_r) + ... has the poles of an FRF, and residues of no known scale.
+
+So has that of a free decay itself, from its loudest moment on: nothing is correlated there.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..dynamics.frf import FRF
-from .setup import Function
+from .setup import Function, Recording
 from .signals import window
+from .time_record import TimeRecord
 
 FORCES = ("N", "kN", "mN", "lbf", "lb", "kgf")
 FEWEST = 64  # samples of a record
@@ -21,6 +25,9 @@ SEGMENTS = 8  # of the record: the lags that are used, and the spread of their c
 DECAY = 0.01  # of the window at the last lag
 ALIKE = -np.log(DECAY) / 2  # lines of one noise: the window's equivalent noise bandwidth
 REFERENCES = 3  # responses of most energy
+RELEASE = "decay"  # what stands in the place of a force: the block that was let go
+LINES = 2500  # of the band: more take minutes to identify
+PIECES, DIED = 32, 0.1  # of a free decay: in its last half no piece is as loud as that of the first
 
 
 def responses(functions: Sequence[Function]) -> tuple[Function, ...]:
@@ -47,25 +54,100 @@ def _step(x: np.ndarray) -> float:
     return float(x[-1] - x[0]) / (len(x) - 1)
 
 
-def one_sided(functions: Sequence[Function]) -> tuple[FRF, float]:
+def of_responses(record: TimeRecord) -> tuple[Function, ...]:
+    """Time histories of a record without inputs: one a channel and block, block by block."""
+    t = np.arange(record.response.shape[2]) / record.rate
+    unit = {"receptance": "m", "mobility": "m/s"}.get(record.quantity, "m/s^2")
+    return tuple(
+        Function("time", label, "", t, y, unit)
+        for block in record.response
+        for label, y in zip(record.outputs, block, strict=True)
+    )
+
+
+def free_decays(functions: Sequence[Function]) -> bool:
+    """Whether time histories ring down, every block of them."""
+    return functions[0].kind == "time" and all(_onset(y) is not None for y in _blocks(functions)[1])
+
+
+def ringing(r: Recording, band: tuple[float, float] = (0.0, np.inf)) -> Recording:
+    """A recording that holds free decays alone with their transforms; any other as it is.
+
+    Poles are those of an FRF, residues have no scale and no drive point: modal shapes times what
+    each block was let go with.
+    """
+    used = responses(r.functions)
+    if r.frf is not None or r.poles is not None or not used or not free_decays(used):
+        return r
+    frf, sigma = one_sided(used, band)
+    note = (
+        f"{r.name}: no force was measured; poles and damping are those of its free decays, shapes "
+        "have no scale"
+    )
+    return replace(r, frf=frf, added_damping=sigma, notes=(*r.notes, note))
+
+
+def _blocks(functions: Sequence[Function]) -> tuple[tuple[str, ...], np.ndarray]:
+    """Labels and time histories (blocks, channels, n): records of one label are blocks.
+
+    Where some have more than others, as many are taken as all have.
+    """
+    of: dict[str, list[np.ndarray]] = {}
+    for f in functions:
+        of.setdefault(f.output, []).append(np.real(f.values))
+    fewest = min(len(records) for records in of.values())
+    return tuple(of), np.array([y[:fewest] for y in of.values()]).swapaxes(0, 1)
+
+
+def _at_rest(y: np.ndarray) -> np.ndarray:
+    """Channels (..., n) less what they show at last, when all has died."""
+    return np.asarray(y - y[..., -max(y.shape[-1] // 10, 1) :].mean(axis=-1, keepdims=True))
+
+
+def _onset(y: np.ndarray) -> int | None:
+    """The sample from which channels (k, n) ring down: their loudest; None where they do not.
+
+    It lies in the first half, and in the last half of what follows none of its ``PIECES`` has
+    ``DIED`` of the mean square of the first: random forces, and hits in a row, keep it up.
+    """
+    y = _at_rest(y)
+    power = np.maximum((y**2).mean(axis=1, keepdims=True), np.finfo(float).tiny)
+    loud = (y**2 / power).sum(axis=0)
+    start = int(loud.argmax())
+    n = (len(loud) - start) // PIECES
+    if start > len(loud) // 2 or not n:
+        return None
+    piece = loud[start : start + n * PIECES].reshape(PIECES, n).mean(axis=1)
+    return start if piece[PIECES // 2 :].max() < DIED * piece[0] else None
+
+
+def one_sided(
+    functions: Sequence[Function], band: tuple[float, float] = (0.0, np.inf)
+) -> tuple[FRF, float]:
     """Transforms of the correlations at positive lags, and the damping σ [1/s] the window adds.
 
     Parameters
     ----------
     functions : from :func:`responses`
+    band : that is asked about [Hz]; of free decays no more is taken than gives it ``LINES``
 
     The result is called a receptance, for it has that form: Σ R_r / (s - p_r) and residual terms.
     """
     if functions[0].kind == "time":
-        return _of_time(functions)
+        return _of_time(functions, band)
     return _of_spectra(functions)
 
 
-def _of_time(functions: Sequence[Function]) -> tuple[FRF, float]:
-    """Correlations of each segment of the record, their mean and its variance."""
-    y = np.array([np.real(f.values) for f in functions])
-    y = y - y.mean(axis=1, keepdims=True)
+def _of_time(functions: Sequence[Function], band: tuple[float, float]) -> tuple[FRF, float]:
+    """Of free decays themselves; else correlations of each segment, their mean and its variance."""
+    labels, blocks = _blocks(functions)
     rate = 1 / _step(functions[0].x)
+    starts = [k for y in blocks if (k := _onset(y)) is not None]
+    if len(starts) == len(blocks):
+        width = min(band[1], rate / 2) - band[0]
+        return _of_decays(labels, blocks, starts, rate, round(LINES * rate / max(width, 1e-9)))
+    y = np.concatenate(blocks, axis=1)
+    y = y - y.mean(axis=1, keepdims=True)
     order = np.argsort(-(y**2).sum(axis=1), kind="stable")[:REFERENCES]
     n = y.shape[1] // SEGMENTS
     lags = n // 2
@@ -76,7 +158,6 @@ def _of_time(functions: Sequence[Function]) -> tuple[FRF, float]:
         parts.append(np.fft.irfft(S, axis=0)[:lags] / (n - np.arange(lags))[:, None, None])
     H = np.array([_transformed(r, rate) for r in parts])
     frequency = np.fft.rfftfreq(lags, 1 / rate)
-    labels = tuple(f.output for f in functions)
     variance = H.var(axis=0, ddof=1) / SEGMENTS
     smooth = np.maximum(variance, np.median(variance, axis=0))
     made = FRF(
@@ -84,6 +165,21 @@ def _of_time(functions: Sequence[Function]) -> tuple[FRF, float]:
         variance=smooth,
     )  # fmt: skip
     return made, -np.log(DECAY) * rate / lags
+
+
+def _of_decays(
+    labels: tuple[str, ...], blocks: np.ndarray, starts: Sequence[int], rate: float, most: int
+) -> tuple[FRF, float]:
+    """Each block (channels, n) from its start on, ``most`` samples: a reference of its own."""
+    n = min(blocks.shape[2] - max(starts), most)
+    still = _at_rest(blocks)
+    free = np.stack([y[:, k : k + n] for y, k in zip(still, starts, strict=True)], axis=2)
+    names = tuple(f"{RELEASE} {k + 1}" for k in range(len(blocks)))
+    made = FRF(
+        _transformed(np.moveaxis(free, 1, 0), rate), np.fft.rfftfreq(n, 1 / rate), labels, names,
+        "receptance",
+    )  # fmt: skip
+    return made, -np.log(DECAY) * rate / n
 
 
 def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:

@@ -227,9 +227,12 @@ def _gain(agreement: Agreement | None) -> str:
     held = Scores() if agreement is None else agreement.held_out
     if not held.nominal or held.after is None:
         return ""
+    mesh, said = held.with_mesh_error, ""
+    if mesh is not None and mesh < held.nominal < held.after:
+        said = f", and to {number(mesh, 3)} with the error of its mesh, which no deck holds"
     return (
         f"; on data the fit never saw the deviation Q goes from {number(held.nominal, 3)} "
-        f"to {number(held.after, 3)}"
+        f"to {number(held.after, 3)}{said}"
     )
 
 

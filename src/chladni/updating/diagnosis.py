@@ -55,6 +55,7 @@ class Diagnosis:
     heard : what data that no fit saw say of the leading effect
     sets : several effects together, each of which pays, in the order in which the sets grew
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
+    refused : why the leader is not named although it gains what is due
     """
 
     nominal: HypothesisFit
@@ -69,12 +70,18 @@ class Diagnosis:
     heard: HeldOutEvidence | None = None
     sets: tuple[Several, ...] = ()
     gains: tuple[float, ...] = ()
+    refused: str = ""
 
     @property
     def found(self) -> HypothesisFit | None:
         """The named effect, if any."""
         named = self.verdict in ("missing physics", "measurement fault")
         return self.hypotheses[0] if named and self.hypotheses else None
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether neither what is answered nor calibration alone explains the recording."""
+        return self.adequacy is not None and not self.adequacy.passes
 
     @property
     def due(self) -> float:
@@ -155,7 +162,11 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
         return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
     note = f"{note}, {fits.where}; nothing in the catalogue explains the recording"
     notes = (*diagnosis.notes, note)
-    return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None)
+    refused = f"what it leaves is not explained: {fits.what}" if diagnosis.found else ""
+    return replace(
+        diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None,
+        refused=refused or diagnosis.refused,
+    )  # fmt: skip
 
 
 def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> HypothesisFit:

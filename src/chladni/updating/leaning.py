@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TypeGuard
 
 import numpy as np
+from scipy.stats import chi2
 
 from ..effects.effect import Effect
 from ..effects.freed import Freed
@@ -26,9 +27,11 @@ def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
     """Why a calibration that explains everything is not to be trusted, if it is not.
 
     That no physics is missing is a claim: a number no structure of this deck has, in the deck that
-    is answered with or beside it in the null, may hold what is.
+    is answered with or beside it in the null, may hold what is. So may numbers none of which is far
+    by itself: one direction of E, rho and t is all that the frequencies of a strip tell.
     """
-    far = list(dict.fromkeys((*leaning(plain), *strained(null))))
+    own = leaning(plain) or _far_together(plain)
+    far = list(dict.fromkeys((*own, *strained(null))))
     if not far:
         return ()
     return (
@@ -55,6 +58,32 @@ def _more(family: Effect, x: np.ndarray) -> str:
         f"{_away(family, x):.2g} standard deviations of what it may be by itself: it may be what "
         "is wrong"
     )
+
+
+def _far_together(fit: Fit) -> list[str]:
+    """A sentence where all ordinary numbers together are as far off as one beyond ``FAR`` is.
+
+    Of z = (x - μ)/σ data tell as many directions as their covariance lost of the prior's trace;
+    |z|² over these is χ² where the deck is right.
+    """
+    own = [e for e in fit.effects if e.kind == "ordinary" and e.parameters]
+    if not own:
+        return []
+    z = np.concatenate([(fit.of(e) - _each(e, "mean")) / _each(e, "sd") for e in own])
+    left = sum(float(((fit.sd(e) / _each(e, "sd")) ** 2).sum()) for e in own)
+    told = max(1.0, len(z) - left)
+    if chi2.sf(z @ z, told) >= chi2.sf(FAR**2, 1):
+        return []
+    names = ", ".join(e.text for e in own)
+    return [
+        f"{names} together ended {np.sqrt(z @ z):.2g} standard deviations of their priors from the "
+        f"deck's values, so they stand for something else"
+    ]
+
+
+def _each(effect: Effect, name: str) -> np.ndarray:
+    """A property of each of its parameters."""
+    return np.array([getattr(p, name) for p in effect.parameters])
 
 
 def _said(effect: Effect, x: np.ndarray) -> str:

@@ -47,7 +47,7 @@ def withheld(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     return replace(
         diagnosis, verdict="not in catalogue", notes=(*diagnosis.notes, note), written=None,
-        one_of=("calibration alone", *one_of), sets=(),
+        one_of=("calibration alone", *one_of), sets=(), refused=prepared.too_little,
     )  # fmt: skip
 
 

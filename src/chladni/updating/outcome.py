@@ -92,6 +92,7 @@ CONFLICT = 2.0  # times the gain due: what was fitted refutes calibration, whate
 HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
 MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
 AGAINST = "the data that no fit saw speak against it"
+WORSE = "but the deck with it is worse on the data that no fit saw"
 MORE_LEFT = "but with it in place more is left than it explains"
 
 
@@ -143,13 +144,18 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     together = gain + (heard.held_out or 0.0)
     due = diagnosis.due
     poles = isinstance(lead.data, Poles)
-    borne = carried(gain, heard, due, poles) and not held.effect > HARM * held.calibrated
+    voted = carried(gain, heard, due, poles)
+    borne = voted and not held.effect > HARM * held.calibrated
     faint = gain < CONFLICT * due and held.effect > held.calibrated
     left = all(q.effect > MOST_LEFT * q.calibrated for q in (seen, held)) and lead.physics
     if borne and not (faint or left):
         notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
-    why = "leaves more than it explains" if borne else "left the data no fit saw worse explained"
+    why, but = "left the data no fit saw worse explained", AGAINST
+    if voted:
+        why, but = "leaves more than it explains", MORE_LEFT
+    if voted and (faint or not borne):
+        why, but = "made the deck worse on data no fit saw", WORSE
     note = (
         f"{lead.name} gained {gain:.0f} in -2 ln evidence but {why} ({said(heard)}; held-out Q "
         f"{held.calibrated:.3g} calibrated, {held.effect:.3g} with it; of what was fitted "
@@ -157,11 +163,11 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
-    refused = replace(diagnosis, verdict=plainly, notes=notes, written=None)
+    refused = replace(diagnosis, verdict=plainly, notes=notes, written=None, refused=f"it {why}")
     if together > due and not borne:
-        return _unexplained(refused, lead, together, "all data")
+        return _unexplained(refused, lead, together, "all data", but)
     if gain > CONFLICT * due:
-        return _unexplained(refused, lead, gain, "what was fitted", MORE_LEFT if borne else AGAINST)
+        return _unexplained(refused, lead, gain, "what was fitted", but)
     return tested(refused, problem)
 
 
@@ -176,7 +182,7 @@ def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False
 
 
 def _unexplained(
-    diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str, but: str = AGAINST
+    diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str, but: str
 ) -> Diagnosis:
     """Calibration alone is refuted by some data, and what refuted it does not stand either."""
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
@@ -214,7 +220,10 @@ def prudently_calibrated(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
     before = Q(problem.base, _given(problem, null))
     for made in (as_found, partial(as_written, mass_measurement=mass)):
-        prudent = made(null)
+        try:
+            prudent = made(null)
+        except ModelError:  # without scatter its numbers are no structure's
+            continue
         if not (Q(prudent.fit.effects, prudent.fit.x) > before).any():  # no Q is no worse
             return replace(diagnosis, plain=prudent)
     plain = diagnosis.plain.fit
@@ -236,8 +245,10 @@ def _deck_stays(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )  # fmt: skip
     note = (
         "no calibrated numbers that a structure of this deck may have fit better than its own, "
-        "which stay: what is left is of mesh, joints and scatter"
+        "which stay"
     )
+    if not (diagnosis.unexplained or diagnosis.one_of):
+        note = f"{note}: what is left is of mesh, joints and scatter"
     verdict = "nothing missing" if diagnosis.verdict == "calibration only" else diagnosis.verdict
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, plain=replace(plain, fit=given), verdict=verdict, notes=notes)

@@ -22,6 +22,7 @@ from .result import (
     Remainder,
     Scores,
 )
+from .ties import TIED
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 
@@ -116,7 +117,9 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
     """Why a hypothesis was not named, with a number."""
     gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due
     if diagnosis.found is None and gain > due:
-        return f"gains {gain:.1f} in -2 ln evidence, but does not help on the data held out"
+        lead = diagnosis.hypotheses[0]
+        but = diagnosis.refused if hypothesis is lead else f"{lead.name}, ahead of it, is not named"
+        return f"gains {gain:.1f} in -2 ln evidence, but {but or 'is not named'}"
     if diagnosis.found is None:
         return (
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
@@ -212,6 +215,11 @@ def _meaning(diagnosis: Diagnosis, far: bool, structured: bool) -> str:
         return "that is structured, not noise"
     if not far:
         return "nothing more can be read from that"
-    if diagnosis.hypotheses:
-        return "mesh error and scatter within the parts account for it as well as any effect tried"
-    return "more than noise; a diagnosis says whether physics is missing"
+    if not diagnosis.hypotheses:
+        return "more than noise; a diagnosis says whether physics is missing"
+    if diagnosis.unexplained:
+        return "nothing that was tried accounts for it, nor do mesh error and scatter in the parts"
+    lead = diagnosis.hypotheses[0]
+    if diagnosis.two_log_bayes_factor(lead) > TIED:
+        return f"{lead.effect.name} accounts for more of it than mesh error and scatter do"
+    return "mesh error and scatter within the parts account for it as well as any effect tried"

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case.free_parameters import fields_of
+from ..ema.response_correlations import responses
 from ..ema.setup import Recording
 from ..errors import FileError
 from ..fem.energy import mass_properties
@@ -151,7 +152,7 @@ def _missing(
         )
     if not read:
         out.append("a recording: [test] recordings, a universal file, .npz or .csv")
-    elif all(r.frf is None and r.poles is None for r in read):
+    elif all(r.frf is None and r.poles is None and not responses(r.functions) for r in read):
         out.append("FRFs or a table of poles: the recordings hold neither")
     if weighed is None:
         out.append(
@@ -271,6 +272,11 @@ def said_of(r: Recording) -> str:
     """A recording in one sentence."""
     if r.poles is not None and r.frf is None:
         return f"{r.name}: {len(r.poles.frequency)} poles"
+    if r.frf is None and (used := responses(r.functions)):
+        return (
+            f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: their "
+            "natural frequencies are compared"
+        )
     if r.frf is None:
         return f"{r.name}: neither FRFs nor poles"
     f = r.frf

@@ -78,7 +78,10 @@ def evaluate_recordings(
     made = [with_frf(r, settings) for r in read]
     held = [(r, e) for r, e in made if r.frf is not None]
     if not held:
-        raise FileError("the recordings hold neither time data nor frequency responses")
+        raise FileError(
+            "the recordings hold neither a force and what answers it nor frequency responses; of "
+            "free decays identify gives poles and damping"
+        )
     found = []
     with threadpool_limits(1):
         for k, (r, e) in enumerate(held):

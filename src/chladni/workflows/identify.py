@@ -15,12 +15,13 @@ from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
 from ..ema.recording_screening import screened
-from ..ema.response_correlations import responses
+from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent
+from ..updating.measured_frequencies import LEAST_DELTA_CHI2
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted
 
@@ -123,7 +124,7 @@ def identify(
     progress: Progress = silent,
     choice: PoleChoice = PoleChoice(),
 ) -> Identification:
-    """Poles of every recording that holds an FRF.
+    """Poles of every recording that holds an FRF, or free decays.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ def identify(
     Raises
     ------
     FileError
-        If no recording holds an FRF.
+        If no recording holds either.
     """
     if isinstance(source, Case):
         recordings = source.recordings
@@ -147,7 +148,7 @@ def identify(
         band, gaps, said = band or source.band, source.exclude, source.said("identify")
         if ("test", "use") in source.given:
             recordings = recordings[:1]
-    held = [r for r in recordings if r.frf is not None]
+    held = [r for r in (ringing(r, band or (0.0, np.inf)) for r in recordings) if r.frf is not None]
     if not held:
         where = f"{source.path} " if isinstance(source, Case) else "what was recorded "
         raise FileError(f"{where}holds no frequency responses to identify from{_has(recordings)}")
@@ -198,7 +199,11 @@ def _modes(
         frf, band, averages=averages, use=use,
         states=choice.states, drop=choice.drop, pick=choice.pick,
     )  # fmt: skip
-    screening = screened(recording, found, others)
+    if all(name.startswith(RELEASE) for name in frf.inputs):
+        found = found.sel(~found.inside | clear(found))
+        screening = Screening(recording.name)  # there is no force to hold channels against
+    else:
+        screening = screened(recording, found, others)
     diagram = stabilisation(frf, found, use, averages)
     found = without_window(found, recording.added_damping)
     return RecordingModes(recording, found, screening, diagram)
@@ -208,6 +213,11 @@ def firm(modal: Identified) -> np.ndarray:
     """Poles known to 2 % in frequency and to half their damping: (r,) bool."""
     known = modal.frequency_sd < 0.02 * modal.frequency
     return known & (modal.damping_sd < 0.5 * modal.damping)
+
+
+def clear(found: Identified) -> np.ndarray:
+    """Poles that stand out of noise which a window has made alike on neighbouring lines (r,)."""
+    return np.asarray(found.relative_delta_chi2 > LEAST_DELTA_CHI2 * ALIKE)
 
 
 def without_window(found: Identified, added: float) -> Identified:

@@ -7,11 +7,10 @@ import numpy as np
 from ..case import Case
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
-from ..ema.response_correlations import ALIKE, one_sided, responses
+from ..ema.response_correlations import free_decays, one_sided, responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from ..updating.measured_frequencies import LEAST_DELTA_CHI2
-from .identify import firm
+from .identify import clear, firm
 
 HIGHEST = 0.8  # of the highest frequency a record holds: above it filters fall off
 
@@ -40,25 +39,24 @@ def with_natural_frequencies(case: Case) -> Case:
 
 def _identified(case: Case, recording: Recording) -> tuple[Identified, str]:
     used = responses(recording.functions)
-    frf, sigma = one_sided(used)
     low, high = case.band or (0.0, np.inf)
+    frf, sigma = one_sided(used, (low, high))
     low = max(low, float(frf.frequency[1]) * 4)
     high = min(high, HIGHEST * float(frf.frequency[-1]))
     found = identified(frf, (low, high), use=case.lines(frf.frequency))
     free = found.poles + sigma  # without what the window adds
     found = replace(found, poles=free)
-    clear = found.relative_delta_chi2 > LEAST_DELTA_CHI2 * ALIKE
-    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear)
+    known = found.sel(found.inside & firm(found) & (free.real < 0) & clear(found))
     if not known.order:
         raise FileError(
             f"{recording.name}: no natural frequency stands out of its {len(used)} records of "
             f"responses ({used[0].kind}) between {low:.4g} and {high:.4g} Hz, and no force was "
             "measured"
         )
+    how = "from where they ring freely on," if free_decays(used) else "as if the force were white"
     note = (
         f"{recording.name}: the force was not measured, so {known.order} natural frequencies were "
-        f"taken from {len(used)} records of responses ({used[0].kind}), as if the force were white "
-        "between "
+        f"taken from {len(used)} records of responses ({used[0].kind}), {how} between "
         f"{low:.4g} and {high:.4g} Hz; damping and levels are not used"
     )
     return known, note

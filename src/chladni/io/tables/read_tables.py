@@ -10,6 +10,7 @@ from typing import cast, get_args
 import numpy as np
 
 from ...dynamics.frf import FRF, Quantity
+from ...ema.response_correlations import of_responses
 from ...ema.setup import PoleTable, Recording
 from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError, named
@@ -65,6 +66,8 @@ _TIMED = {".wav": read_wav, ".mat": read_mat, ".csv": read_time_csv}
 
 def _timed(path: Path, read: tuple[TimeRecord, list[str]], quantity: str | None) -> Recording:
     record, notes = read
+    if not record.inputs:
+        return Recording(path.name, functions=of_responses(record), notes=tuple(notes))
     return _asked(Recording(path.name, time=record, notes=tuple(notes)), quantity)
 
 

@@ -16,6 +16,7 @@ BY_NAME = {  # what an array is by its name, and the unit where none is stated
     **dict.fromkeys(("velocity", "vel", "v"), "m/s"),
     **dict.fromkeys(("displacement", "disp", "d"), "m"),
 }
+SOUND = {"Pa": 1.0, "mPa": 1e-3}  # of a microphone: good for natural frequencies alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +38,19 @@ def assembled(
 ) -> tuple[TimeRecord, list[str]]:
     """The record in SI, and notes of how it was read.
 
+    Without any force it has no inputs: motions or sound that die away, or go on.
+
     Raises
     ------
     FileError
-        If a unit is not known, or there is no input or no output, or outputs differ in kind.
+        If a unit is not known, or there is no output, or outputs differ in kind.
     """
     parts: dict[str, list[tuple[TimeChannel, Quantity | None, float]]] = {"input": [], "output": []}
     for k, channel in enumerate(channels):
         role, quantity, factor = _meaning(name, channel, k)
         parts[role].append((channel, quantity, factor))
     inputs, outputs = parts["input"], parts["output"]
-    if not inputs or not outputs:
+    if not outputs or (inputs and any(c.unit in SOUND for c, *_ in outputs)):
         units = ", ".join(dict.fromkeys(c.unit for c in channels)) or "none"
         raise FileError(
             f"{name}: {len(inputs)} inputs and {len(outputs)} outputs among its {len(channels)} "
@@ -60,19 +63,16 @@ def assembled(
                         "one kind of motion a file")  # fmt: skip
     kind: Quantity = motions.pop() or "accelerance"
     bases = {q for _, q, _ in inputs}
-    if bases != {None}:
+    if inputs and bases != {None}:
         if bases != {kind}:
             raise FileError(f"{name}: its base and its outputs are not the same kind of motion")
         kind = "transmissibility"
     labels, notes = _labels(name, inputs, outputs)
-    stacks = [
-        np.stack([np.asarray(c.values, float) * f for c, _, f in part], axis=1)
-        for part in (inputs, outputs)
-    ]
-    if not all(np.isfinite(s).all() for s in stacks):
+    every = np.stack([np.asarray(c.values, float) * f for c, _, f in (*inputs, *outputs)], axis=1)
+    if not np.isfinite(every).all():
         raise FileError(f"{name}: a sample is not a number")
     try:
-        force, response = stacks
+        force, response = every[:, : len(inputs)], every[:, len(inputs) :]
         n = len(inputs)
         record = TimeRecord(force, response, float(rate), labels[:n], labels[n:], kind)
     except ChladniError as error:
@@ -88,11 +88,14 @@ def _meaning(name: str, channel: TimeChannel, k: int) -> tuple[str, Quantity | N
         if channel.role == "output":
             raise FileError(f"{name}: {called} is in {channel.unit}, a force, and cannot be output")
         return "input", None, force
+    if channel.unit in SOUND and channel.role != "input":
+        return "output", None, SOUND[channel.unit]
     quantity, factor = numerator(channel.unit)
     if quantity is None:
         raise FileError(
             f"{name}: {called} is in {channel.unit or 'no unit'!r}; known are N, lbf, kgf for "
-            "forces and m, mm, in, m/s, mm/s, m/s^2, g, ... for motions"
+            "forces, m, mm, in, m/s, mm/s, m/s^2, g, ... for motions, and Pa of a microphone that "
+            "hears a free decay"
         )
     return channel.role or "output", quantity, factor  # type: ignore[return-value]
 
@@ -220,17 +223,21 @@ def _role(name: str, text: str) -> str:
 
 
 def _of_named(name: str, rest: dict[str, np.ndarray]) -> tuple[list[TimeChannel], list[str]]:
-    """Channels of a force and a motion by the names of their arrays."""
+    """Channels of a force, if there is one, and a motion by the names of their arrays."""
     found = {w: _cube(name, w, rest.pop(w)) for w in list(rest) if w in BY_NAME}
     forces = [w for w in found if BY_NAME[w] == "N"]
     motions = [w for w in found if BY_NAME[w] != "N"]
-    if len(forces) != 1 or len(motions) != 1:
+    if len(forces) > 1 or len(motions) != 1:
         raise FileError(
             f"{name}: time data holds one array force and one of acceleration, velocity or "
-            f"displacement; there are {', '.join(found) or 'none'}"
+            f"displacement, or such a motion alone; there are {', '.join(found) or 'none'}"
         )
-    F, Y = found[forces[0]], found[motions[0]]
+    Y = found[motions[0]]
     labels = [_texts(rest, "inputs"), _texts(rest, "outputs")]
+    if not forces:
+        note = f"{name} states no units: {motions[0]} is read in {BY_NAME[motions[0]]}"
+        return _called(name, motions[0], Y, labels[1]), [note]
+    F = found[forces[0]]
     notes = [f"{name} states no units: {forces[0]} is read in N, {motions[0]} in "
              f"{BY_NAME[motions[0]]}"]  # fmt: skip
     if not any(labels) and F.shape[:2] == Y.shape[:2] == (1, F.shape[1]) and F.shape[1] > 1:
@@ -238,18 +245,20 @@ def _of_named(name: str, rest: dict[str, np.ndarray]) -> tuple[list[TimeChannel]
         notes.append(
             f"{name}: {len(F)} rows in both arrays are {len(F)} blocks of one channel each"
         )
-    out = []
-    for word, x, names in ((forces[0], F, labels[0]), (motions[0], Y, labels[1])):
-        if len(names) not in (0, x.shape[1]):
-            raise FileError(f"{name}: {len(names)} labels for the {x.shape[1]} channels of {word}")
-        out += [
-            TimeChannel(names[c] if names else "", BY_NAME[word], x[:, c])
-            for c in range(x.shape[1])
-        ]
+    out = _called(name, forces[0], F, labels[0]) + _called(name, motions[0], Y, labels[1])
     if F.shape[0] != Y.shape[0] or F.shape[2] != Y.shape[2]:
         raise FileError(f"{name}: {forces[0]} is {F.shape}, {motions[0]} {Y.shape}: blocks and "
                         "samples differ")  # fmt: skip
     return out, notes
+
+
+def _called(name: str, word: str, x: np.ndarray, labels: Sequence[str]) -> list[TimeChannel]:
+    """Channels of one array (blocks, channels, samples), their labels if there are any."""
+    if len(labels) not in (0, x.shape[1]):
+        raise FileError(f"{name}: {len(labels)} labels for the {x.shape[1]} channels of {word}")
+    return [
+        TimeChannel(labels[c] if labels else "", BY_NAME[word], x[:, c]) for c in range(x.shape[1])
+    ]
 
 
 def _cube(name: str, word: str, x: np.ndarray) -> np.ndarray:

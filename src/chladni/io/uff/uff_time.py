@@ -26,6 +26,8 @@ def time_record(pile: Pile) -> TimeRecord | None:
     except FileError as error:
         pile.notes.append(f"no FRF can be estimated from the time data: {error}")
         return None
+    if not record.inputs:  # responses alone: natural frequencies are taken from the functions
+        return None
     used = {id(one.function) for one in pile.time}
     pile.functions[:] = [f for f in pile.functions if id(f) not in used]
     pile.notes += notes
