@@ -80,6 +80,9 @@ def test_an_unknown_array_is_refused_before_it_is_unpacked(
     [
         ("a = " + "[" * 3000 + "]" * 3000, "is no TOML"),
         ("a = " + "9" * 5000, "is no TOML"),
+        ("[model]", r"is no TOML: \[model\] is there twice \(at line 2,"),
+        ("[test.a]\n[test.a]", r"is no TOML: \[test\.a\] is there twice"),
+        ("a = 1\na = 2\nb = 3", "is no TOML: a key is there twice"),
     ],
 )
 def test_toml_beyond_any_use(tmp_path: Path, text: str, said: str) -> None:
