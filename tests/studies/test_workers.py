@@ -66,6 +66,28 @@ def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     assert not [p for p in children if p.is_running()], "workers outlived the study"
 
 
+@pytest.mark.parametrize("ended", [2, 3])
+def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
+    """Started again twice; then it is one sentence, and no fault of chladni."""
+    import distributed
+
+    made, tries = distributed.LocalCluster, []
+
+    def started(**options):
+        tries.append(options)
+        if len(tries) <= ended:
+            raise RuntimeError("Nanny failed to start.") from RuntimeError("Worker died")
+        return made(**options)
+
+    monkeypatch.setattr(distributed, "LocalCluster", started)
+    if ended == 3:
+        with pytest.raises(FileError, match=r"2 local workers could not .* 3 tries \(Worker died"):
+            chladni.study(model, RANGES, SETTINGS, workers=2)
+        return
+    found = chladni.study(model, RANGES, SETTINGS, workers=2)
+    np.testing.assert_allclose(found.column("f1_hz"), straight.column("f1_hz"), rtol=1e-9)
+
+
 @pytest.fixture
 def cluster():
     """A scheduler and two workers as a user starts them, each a process of its own."""
