@@ -14,12 +14,12 @@ from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
 from ..workflows.loaded_model import Model, load_model, on_faces
-from .run import Out, Run, Units, started
+from .run import Allow, DeckOrCase, Out, Run, Units, started
 from .shape_pictures import against_scan, cuts
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     modes: Annotated[str, typer.Option(help="Modes in one picture, as 1-12 or 7,9.")] = "",
     gif: Annotated[list[int] | None, typer.Option(help="A mode to animate (repeatable).")] = None,
     energy: Annotated[
@@ -41,6 +41,7 @@ def run(
         bool, typer.Option("--align", help="Bring the scan onto the model first.")
     ] = False,
     units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
     """Pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
@@ -51,7 +52,7 @@ def run(
     chosen = numbers(modes)
     with started("render", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units, command="render")
+        model = load_model(source, units, allow or (), command="render")
         job.notes += model.notes
         count = max([0, *chosen, *(gif or []), *(energy or [])])
         shown = sorted({*chosen, *(gif or []), *(energy or [])})

@@ -23,7 +23,20 @@ from .console import console, say, say_table, watched
 
 Out = Annotated[
     Path | None,
-    typer.Option("--out", help="Folder for the results (made if needed).", metavar="DIR"),
+    typer.Option(
+        "--out", help="Folder for the results (made if needed); else runs/COMMAND-NAME.",
+        metavar="DIR",
+    ),
+]  # fmt: skip
+CaseFolder = Annotated[
+    Path,
+    typer.Argument(
+        metavar="CASE", help="Folder with a case.toml, or that file; chladni init drafts one."
+    ),
+]
+DeckOrCase = Annotated[
+    Path,
+    typer.Argument(metavar="DECK_or_CASE", help="A Nastran deck, or a folder with a case.toml."),
 ]
 Units = Annotated[
     str | None,

@@ -16,6 +16,7 @@ from ..planning.plan_summary import (
     sensors_csv,
     summary,
 )
+from ..planning.sensor_candidates import FOOT, SensorCandidates
 from ..planning.whole_plan import Plan, motion
 from ..view import annotations, plots, scene
 from ..view.surface import Surface
@@ -54,12 +55,8 @@ def lead(result: PlanSummary) -> str:
 
 def notes(found: Plan) -> list[str]:
     """What was decided on the way, and what to mind."""
-    refused = [f"{count} grids {why}" for why, count in found.places.refused.items()]
     centres = int((~found.places.is_grid).sum())
-    out = [
-        f"{len(found.places)} places were looked at, spread over all flat surfaces that can be "
-        f"reached; left out: {', '.join(refused)}."
-    ]
+    out = _places_notes(found.places)
     if centres:
         out.append(
             f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
@@ -87,11 +84,38 @@ def notes(found: Plan) -> list[str]:
     return out
 
 
+def _places_notes(places: SensorCandidates) -> list[str]:
+    """Where places were looked for, and what was left out."""
+    if not places.foot:
+        return [
+            f"{len(places)} places and directions were looked at: grids of the beams, each with "
+            "the two axes of the basic frame that lie most across them. A sensor sits on the wall "
+            "or, where that is slanted, on a block."
+        ]
+    refused = [f"{count} grids {why}" for why, count in places.refused.items() if count]
+    out = [
+        f"{len(places)} places were looked at, spread over all flat surfaces that can be reached; "
+        f"left out: {', '.join(refused) or 'none'}."
+    ]
+    if places.foot < 1:
+        out.append(
+            "Nowhere is the surface flat over a sensor's whole foot, which has a radius of "
+            f"{1e3 * FOOT:g} mm: places were taken that are flat over {100 * places.foot:g} % of "
+            "it. Look at them before you glue."
+        )
+    return out
+
+
 def _rattle_notes(found: Plan) -> list[str]:
     """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
     out, force = [], found.settings.force
     if rattling := int((found.rattle.force < force).sum()):
         out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
+    if not np.isfinite(found.actuators.condition).any():
+        out.append(
+            "No place drives all modes by itself, since some share a frequency or stand still "
+            "wherever others move: take two shakers (--shakers 2), or measure from two places."
+        )
     if blocked := int((~found.places.straight).sum()):
         out.append(f"To {blocked} places no straight rod leads: they are for sensors only.")
     if not found.actuators.allowed[found.together].all():

@@ -91,7 +91,9 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 
 
-_NO_RECORDING = "none yet: modes, plan, render and study need none, all other commands do"
+_NO_RECORDING = (
+    "none yet: modes, frf, plan, bench, render and study need none, all other commands do"
+)
 
 
 def _facts(case: Case) -> list[tuple[str, str]]:
