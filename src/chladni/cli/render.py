@@ -13,7 +13,7 @@ from ..errors import FileError
 from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
-from ..workflows.loaded_model import Model, load_model, on_faces
+from ..workflows.loaded_model import LEAST, Model, load_model, on_faces
 from .run import Allow, DeckOrCase, Out, Run, Units, started
 from .shape_pictures import against_scan, cuts
 
@@ -95,7 +95,7 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(max(count, _LEAST))
+    modal = model.modes(max(count, LEAST))
     if len(modal) < count:
         raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
     rigid = int(rigid_modes(modal).sum())
@@ -107,9 +107,6 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if rigid:
         job.notes.append(f"Modes 1 to {rigid} are rigid motions; the first elastic is {rigid + 1}.")
     return modal
-
-
-_LEAST = 7  # with them the six rigid motions of a free structure are told from the first elastic
 
 
 def _still(job: Run, model: Model, thickness: bool) -> None:

@@ -22,7 +22,7 @@ from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
-from .words import hertz, number
+from .words import direction, hertz, number
 
 PICTURES = {
     "sensors.png": "the layout",
@@ -151,7 +151,7 @@ def _sensors(
     shakers = [_marker(at, "shaker") for at in result.actuators_together]
     picture = scene.sensors(path, seen, outputs, shakers)
     rows = [
-        (str(s.rank), s.at.label, *_where(s.at), _vector(s.at.direction), s.at.mounted)
+        (str(s.rank), s.at.label, *_where(s.at), direction(s.at.direction.tolist()), s.at.mounted)
         for s in result.sensors
     ]
     table = Table(
@@ -175,7 +175,7 @@ def _sensors(
 
 
 def _where(at: PlannedPlace) -> tuple[str, str]:
-    return "" if at.grid is None else str(at.grid), _vector(at.point_m)
+    return "" if at.grid is None else str(at.grid), ", ".join(f"{x:.3f}" for x in at.point_m)
 
 
 def _marker(at: PlannedPlace, text: str) -> annotations.Marker:
@@ -289,7 +289,3 @@ def _test(t: Durations) -> str:
         f"with {AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
         f"{number(t.burst_random_s / 60, 3)} minutes."
     )
-
-
-def _vector(direction: np.ndarray) -> str:
-    return "(" + ", ".join(f"{x:.3f}" for x in direction) + ")"

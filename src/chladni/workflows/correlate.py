@@ -91,7 +91,8 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
         return replace(_by_poles(case, near), numbers=numbers)
-    progress("modes of the test", 0.4)
+    many = len(test.outputs) * len(test.inputs)
+    progress(f"modes of the test, {many} channels of {len(test.frequency)} lines", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & found.inside)
