@@ -19,7 +19,7 @@ from ..units import Units
 from .vary_text import VaryText
 
 _SAME = 1e-9
-_REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # joints are unknown by decades; of a sheet's t FARTHEST
+_REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # in the logarithm: joints are unknown by decades
 FARTHEST = 20.0  # times the deck's own value, or a part of it
 _SDS = 2.0  # prior standard deviations to either side, where a case gives no bounds
 
@@ -169,13 +169,14 @@ def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Unit
 def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]:
     """(low, high) in the unit of the nominal value; refused where it is far from that."""
     low, high = asked.ends(scale, nominal)
-    reach = _REACH.get(asked.name, FARTHEST)
+    reach = _REACH.get(asked.name, FARTHEST) if asked.log else FARTHEST
     for value in (low, high):
         if not 1 / reach <= value / nominal <= reach:
             raise asked.refused(
                 f"{value / scale:g} is {value / nominal:.3g} times the deck's own "
                 f"{nominal / scale:g}; plain numbers are in the deck's own units, a share of its "
                 "value is written 90%:110%"
+                + ("" if asked.log or asked.name not in _REACH else ", decades 1e2:1e6:log")
             )
     return low, high
 
