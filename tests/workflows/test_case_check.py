@@ -72,6 +72,14 @@ def test_the_page_counts_what_it_found(case, tmp_path, faults, rest, said):
     assert check_page(tmp_path, case, checked).lead == said
 
 
+@pytest.mark.parametrize("command", ["diagnose", "calibrate", "correlate"])
+def test_a_case_without_a_recording_is_told_where_to_name_one(copied, tmp_path, command):
+    rewritten(copied, 'recordings = ["frf.npz"]\n', "")
+    done = call(command, copied, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "names no recording to compare the model with; give it as recordings = [" in done.stderr
+
+
 def test_words_nobody_reads_are_told_by_command(copied):
     rewritten(copied, "[band]", "hangers = [1]\n[band]")
     found = chladni.check(chladni.load_case(copied))

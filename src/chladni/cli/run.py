@@ -153,7 +153,9 @@ def opened(source: Path) -> Case:
         If it is no case.
     """
     if source.exists() and not is_case(source):
-        raise FileError(f"{source} is no case; give a folder with case.toml")
+        raise FileError(
+            f"{source} is no case; give a folder with case.toml, as chladni init drafts one"
+        )
     return load_case(source)
 
 
