@@ -129,3 +129,10 @@ def test_nothing_to_glue_a_sensor_to_is_said(frame):
     springs = Scalars(np.array([1]), ends, np.array([[1, 1]]), np.array([1e3]), np.zeros(1))
     with pytest.raises(ModelError, match="no sheet, solid or beam a sensor could be glued to"):
         find_sensor_candidates(replace(frame, beams=Beams(), springs=springs))
+
+
+def test_a_small_structure_takes_as_many_sensors_as_it_has_room_for():
+    """Asked for thirty, as by default, it is planned with those that fit."""
+    found = plan(plate(0.1, 0.08, 4, 4, 1e-3), PlanSettings(sensors=30, modes=4))
+    assert len(found.layout) == len(found.places) == found.settings.sensors < 30
+    assert any("Every place bears a sensor" in note for note in notes(found))

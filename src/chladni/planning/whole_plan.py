@@ -13,7 +13,7 @@ from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..effects.ordinary import thickness_of
 from ..ema.correlation import auto_mac
-from ..errors import ModelError
+from ..errors import ModelError, ShapeError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
@@ -170,6 +170,7 @@ def plan(
         settings = replace(settings, draws=0)  # nothing to draw
     progress("places a sensor can sit at", 0.05)
     places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
+    settings = replace(settings, sensors=min(settings.sensors, len(places)))
     progress("modes", 0.2)
     built = built or structure(assembly)
     modal, above, first = target_modes(built, settings)
@@ -346,14 +347,18 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 
     Echaniz Granado (2015), section 4.1 and figure 8.
 
-    Each entry is (modes, overlap of its layout with that of the entry before).
+    Each entry is (modes, overlap of its layout with that of the entry before); it ends where the
+    places tell no more modes apart.
     """
     most = min(n_sensors, phi.shape[1])
     counts = sorted({*np.linspace(max(2, target // 3), most, 7).astype(int).tolist(), target})
     layouts = {}
     for count in counts:
-        layouts[count] = effective_independence(phi[:, :count], n_sensors)
-    pairs = pairwise(counts)
+        try:
+            layouts[count] = effective_independence(phi[:, :count], n_sensors)
+        except ShapeError:
+            break
+    pairs = pairwise(layouts)
     return tuple((b, overlap(layouts[b], layouts[a])) for a, b in pairs)
 
 

@@ -57,6 +57,10 @@ def notes(found: Plan) -> list[str]:
     """What was decided on the way, and what to mind."""
     centres = int((~found.places.is_grid).sum())
     out = _places_notes(found.places)
+    if len(found.layout) == len(found.places):
+        out.append(
+            f"Every place bears a sensor: there is room for {len(found.places)} and no more."
+        )
     if centres:
         out.append(
             f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
