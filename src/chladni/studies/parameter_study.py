@@ -33,7 +33,7 @@ from .study_store import OWN, StudyStore, opened_store, row_of
 from .variation import Variation, of_case, of_parts, refuse_impossible
 from .varied_effects import of_effect
 from .vary_text import VaryText, vary_text
-from .workers import affordable, results
+from .workers import affordable, refuse_many, results
 
 RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
             "frf_real", "frf_imag", "channel_name")  # names in the NetCDF file  # fmt: skip
@@ -133,8 +133,8 @@ def study(
     Interrupted
         By Ctrl-C; the sentence says what is kept.
     """
-    if workers is not None and workers < 1:
-        raise FileError(f"workers = {workers}; at least one has to do it")
+    if workers is not None:
+        refuse_many(workers)
     settings = settings or StudySettings()
     wanted = [vary_text(text) for text in vary]
     if isinstance(source, Case) and any(asked.name == "suspension" for asked in wanted):
@@ -161,7 +161,7 @@ def study(
         rows |= before
         clock = _Clock(len(X), len(before), progress)
         try:
-            many = workers or affordable(len(todo), nominal.seconds)
+            many = min(workers or affordable(len(todo), nominal.seconds), max(1, len(todo)))
             for result in results(asked, X, todo, many, scheduler):
                 values = dict(zip(names, X[result.number].tolist(), strict=True))
                 row = store.keep(result, values) if store else row_of(result, values)

@@ -15,17 +15,40 @@ from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
 STARTS = 3  # tries to start local workers
+MOST = 4  # local processes a core
 WORTH = 10.0  # seconds of one process above which it pays to start others
 _AHEAD = 2  # samples per thread that are on the cluster at a time
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
+
+
+def cores() -> int:
+    """Of this machine, as many as this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def refuse_many(workers: int) -> None:
+    """Refuse numbers of local processes that are a slip.
+
+    Raises
+    ------
+    FileError
+        If there is none to do it, or there are more than ``MOST`` a core.
+    """
+    if workers < 1:
+        raise FileError(f"workers = {workers}; at least one has to do it")
+    if workers > MOST * cores():
+        raise FileError(
+            f"workers = {workers}; more than {MOST * cores()} gain nothing on {cores()} cores"
+        )
 
 
 def affordable(samples: int, seconds: float) -> int:
     """Local processes for so many samples of so many seconds each."""
     if samples * seconds < WORTH:
         return 1
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(1, min(cores or 1, samples))
+    return max(1, min(cores(), samples))
 
 
 def results(
