@@ -1,6 +1,7 @@
 """``python -m chladni_evidence``: evidence that does not flatter, made, diagnosed, scored."""
 
 import argparse
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from .blind_make import make
 from .blind_run import run
 from .blind_score import score
 from .evidence_sets import MEANT, SETS, chosen, purpose, seed_range
-from .fuzz import DUE, fuzz
+from .fuzz import DUE, fuzz, until
 from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
@@ -56,7 +57,8 @@ def _fuzzed(asked: argparse.Namespace) -> int:
     kinds = asked.kinds.split(",") if asked.kinds else KINDS
     if unknown := [k for k in kinds if k not in KINDS]:
         raise LabelError(f"no kind {unknown[0]}; there are {', '.join(KINDS)}")
-    found = fuzz(fuzz_inputs(asked.inputs, asked.seed, kinds, asked.decks), asked.out, _say)
+    inputs = fuzz_inputs(asked.inputs, asked.seed, kinds, asked.decks)
+    found = fuzz(until(inputs, asked.minutes), asked.out, _say)
     return int(any(name not in DUE for count in found.values() for name in count))
 
 
@@ -92,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     screen.add_argument("--faults", default="", help="only these, with commas")
     fuzzed = commands.add_parser("fuzz", help="injured inputs: a sentence or a result, always")
     fuzzed.add_argument("--inputs", type=int, default=10_000)
+    fuzzed.add_argument("--minutes", type=float, default=math.inf, help="no longer than this")
     fuzzed.add_argument("--seed", type=int, default=1)
     fuzzed.add_argument("--kinds", default="", help="only these, with commas")
     fuzzed.add_argument("--decks", type=Path, help="a folder of more decks to injure")

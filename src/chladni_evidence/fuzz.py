@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -132,6 +132,15 @@ def _whole(out: Path) -> str:
     return "answered" if any(out.iterdir()) else "nothing written"
 
 
+def until(inputs: Iterable[FuzzInput], minutes: float) -> Iterator[FuzzInput]:
+    """Inputs for so long and no longer, so that the table of what was tried is written."""
+    begun = time.monotonic()
+    for one in inputs:
+        if time.monotonic() - begun > 60 * minutes:
+            return
+        yield one
+
+
 def fuzz(
     inputs: Iterable[FuzzInput], out: Path, say: Callable[[str], object]
 ) -> dict[str, Counter[str]]:
@@ -150,6 +159,7 @@ def fuzz(
             say(f"{k} {one.kind}: {found.called}, {tail[:160]}")
     write_json(out / "fuzz.json", counts)
     say(table(counts))
+    say(f"{sum(c.total() for c in counts.values())} inputs")
     say(f"slowest {slowest:.1f} s of the processor, largest {largest:.2f} GB")
     return counts
 

@@ -23,7 +23,7 @@ from chladni.workflows.frf import frf as evaluated
 from chladni.workflows.loaded_model import load_model
 from chladni_specimens.plates import box, plate
 
-from .mutations import injured_archive, injured_text
+from .mutations import WORDS, injured_archive, injured_text
 
 DECKS = {
     "chain.bdf": """SOL 103
@@ -213,12 +213,29 @@ def _finished() -> DiagnosisResult:
     return DiagnosisResult(verdict="missing physics", effects=(effect,), notes=("one note",))
 
 
+DECK_COMMANDS = (
+    ("modes", "--count", "8"),
+    ("modes", "--units", "SI"),
+    ("frf", "--input", "2:+Z", "--output", "3:+Z", "--lines", "20"),
+    ("frf",),
+    ("init",),
+    ("plan", "--sensors", "3", "--modes", "3", "--candidates", "12", "--drawn", "2"),
+    ("study", "--vary", "E=90%:110%", "--samples", "3", "--modes", "3", "--workers", "1"),
+)
+
+
 def _deck(rng: random.Random, sound: Files) -> FuzzInput:
     name = rng.choice([n for n in sound if n.endswith(".bdf")])
-    ask = rng.choice((("modes", "--count", "8"), ("modes", "--units", "SI"), ("frf", "--input",
-          "2:+Z", "--output", "3:+Z", "--lines", "20"), ("frf",)))  # fmt: skip
-    files = {name: injured_text(sound[name], rng)}
-    return FuzzInput("deck", files, (ask[0], name, *ask[1:]))
+    command, *options = rng.choice(DECK_COMMANDS)
+    return FuzzInput("deck", {name: injured_text(sound[name], rng)}, (command, name, *options))
+
+
+def _options(rng: random.Random, sound: Files) -> FuzzInput:
+    """A sound deck, and one word of the command line another."""
+    command, *options = rng.choice(DECK_COMMANDS)
+    words = [command, "plate.bdf", *options, "--units", "mm-t-s"]
+    words[rng.randrange(1, len(words))] = rng.choice([w for w in WORDS if "\0" not in w])
+    return FuzzInput("options", {"plate.bdf": sound["plate.bdf"]}, tuple(words))
 
 
 def _recording(kind: str, *names: str) -> Maker:
@@ -233,13 +250,20 @@ def _recording(kind: str, *names: str) -> Maker:
     return made
 
 
+CASE_COMMANDS = (
+    *(("check",), ("correlate",), ("modes",), ("frf",)),
+    *((name, *options) for name, *options in DECK_COMMANDS if name in ("plan", "study")),
+)
+
+
 def _case(rng: random.Random, sound: Files) -> FuzzInput:
     """A case of which the case file or the table of sensors is injured."""
     names = ("case.toml", "plate.bdf", "frf.npz", "frf.uff", "sensors.csv")
     files = {name: sound[name] for name in names}
     bad = rng.choice(("case.toml", "case.toml", "case.toml", "sensors.csv"))
     files[bad] = injured_text(files[bad], rng)
-    return FuzzInput("case", files, (rng.choice(("check", "correlate", "modes", "frf")), "."))
+    command, *options = rng.choice(CASE_COMMANDS)
+    return FuzzInput("case", files, (command, ".", *options))
 
 
 def _page(rng: random.Random, sound: Files) -> FuzzInput:
@@ -254,5 +278,6 @@ _MAKERS: dict[str, Maker] = {
     "archive": _recording("archive", "frf.npz"),
     "case": _case,
     "page": _page,
+    "options": _options,
 }
 KINDS = tuple(_MAKERS)

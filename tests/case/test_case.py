@@ -225,7 +225,7 @@ def test_recordings_that_disagree_on_labels(folder: Path) -> None:
 
 
 def test_no_case_at_all(tmp_path: Path) -> None:
-    with pytest.raises(ChladniError, match=r"no file .*case\.toml"):
+    with pytest.raises(ChladniError, match=r"no case\.toml in the folder .*chladni init"):
         load_case(tmp_path)
 
 

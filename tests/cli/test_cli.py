@@ -86,6 +86,20 @@ def test_modes(tmp_path):
     assert "\n   7  " in done.output  # the table of modes, on the terminal too
 
 
+@pytest.mark.parametrize("count", [2, 5, 6])
+def test_rigid_motions_are_told_where_no_other_mode_is_asked_for(tmp_path, count):
+    """Among the six alone rounding would pass for elastic modes, with shares of an energy of 0."""
+    deck = tmp_path / "plate.bdf"
+    deck.write_text(deck_text(6))
+    done = call("modes", deck, "--count", count, "--units", "SI", "--out", tmp_path / "out")
+    assert done.exit_code == 0, (done.output, done.stderr)
+    result = json.loads((tmp_path / "out" / "modes.json").read_text())
+    assert len(result["frequency_hz"]) == count
+    (share,) = (part["strain_energy"] for part in result["parts"].values())
+    assert share == [None] * count
+    assert "6 modes are rigid motions" in done.output
+
+
 def test_frf_peaks_at_its_modes(deck, tmp_path):
     out = tmp_path / "out"
     ends = ["--input", "1:+Z", "--output", "1:+Z", "--output", "49:n"]
@@ -424,7 +438,7 @@ DECKLESS = ("report", "specimen", "init", "map")  # they take no case
 def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
     done = call(command, tmp_path, *NEEDED.get(command, []), "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
-    assert "case.toml" in done.stderr
+    assert "no case.toml in the folder" in done.stderr
 
 
 @pytest.mark.parametrize(

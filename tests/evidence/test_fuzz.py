@@ -31,6 +31,12 @@ def test_the_same_seed_makes_the_same_inputs():
     assert first != other
 
 
+def test_it_stops_in_time_and_counts_what_it_tried(tmp_path, monkeypatch):
+    clock = iter([0.0, 10.0, 50.0, 61.0, 62.0])
+    monkeypatch.setattr(fuzzing.time, "monotonic", lambda: next(clock))
+    assert len(list(fuzzing.until(fuzz_inputs(12, 1, KINDS), 1.0))) == 2
+
+
 def test_every_kind_is_made():
     for kind in KINDS:
         (one,) = fuzz_inputs(1, 3, [kind])

@@ -6,25 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.workflows.conftest import write_case as plate_case
 
-import chladni
-from chladni.effects.points import with_masses
-from chladni.io.nastran import write_assembly
-from chladni.io.tables.write_tables import write_npz
 from chladni_evidence.blind_folder import BlindFolder, Seals, hash_of, hash_of_case
 from chladni_evidence.blind_run import run
-from chladni_specimens.plates import plate
 
-CASE = """[model]
-deck = "plate.bdf"
-units = "SI"
-damping = 0.01
-[test]
-recordings = ["frf.npz"]
-mass = {mass}
-[band]
-fit = [20.0, 130.0]
-"""
 WATCH = """import os, sys
 log = os.open({log!r}, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 def hook(event, args):
@@ -37,17 +23,10 @@ sys.addaudithook(hook)
 
 
 def write_case(folder):
-    """A plate of 4 x 4 shells with a mass on a corner, of which the deck does not know."""
+    """A small case in a folder that holds nothing else."""
     folder.mkdir(parents=True)
-    deck, article = plate(0.3, 0.22, 4, 4, 1e-3), folder.parent / "article.bdf"
-    write_assembly(deck, folder / "plate.bdf")
-    write_assembly(with_masses(deck, (25,), 0.02), article)
-    built = chladni.load_model(article, "SI")
-    ends = [f"{g}:+Z" for g in (2, 4, 7, 18)]
-    (made,) = chladni.frf(built, ends, ["2:+Z"], np.linspace(15, 150, 200)).frfs
-    write_npz(folder / "frf.npz", made.to("accelerance"))
-    (folder / "case.toml").write_text(CASE.format(mass=round(chladni.modes(built, 7).mass, 5)))
-    article.unlink()
+    plate_case(folder, 4, (2, 4, 7, 18), np.linspace(15, 150, 200), 130.0)
+    (folder / "article.bdf").unlink()
 
 
 @pytest.fixture(scope="module")

@@ -34,6 +34,8 @@ GOOD = {
         ("frequency_hz", np.append(F[:-1], np.inf), "negative or not a number"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
+        ("quantity", np.array(["mobility", "mobility"]), "quantity holds 2 texts; it is one"),
+        ("outputs", np.array([["1:+Z"], ["2:+Z"]]), "outputs holds an array of 2 dimensions"),
         (
             "values",
             np.where(F[:, None, None] == F[2], np.nan, np.ones((6, 2, 1))),
@@ -46,6 +48,16 @@ def test_npz(tmp_path: Path, name: str, value: np.ndarray, said: str) -> None:
     np.savez(path, **{**GOOD, name: value})
     with pytest.raises(ChladniError, match=rf"a\.npz.*{said}"):
         read_npz(path)
+
+
+@pytest.mark.parametrize("made", [str, lambda text: [text], str.encode])
+def test_a_text_of_an_npz_may_be_the_only_one_of_a_row(tmp_path: Path, made) -> None:
+    path = tmp_path / "a.npz"
+    words = {"inputs": [b"1:+Z"], "quantity": made("mobility"), "article": made("B")}
+    np.savez(path, **{**GOOD, **words})
+    found = read_npz(path)
+    assert found.frf is not None
+    assert (found.frf.inputs, found.frf.quantity, found.article) == (("1:+Z",), "mobility", "B")
 
 
 def test_an_unknown_array_is_refused_before_it_is_unpacked(
@@ -68,6 +80,9 @@ def test_an_unknown_array_is_refused_before_it_is_unpacked(
     [
         ("a = " + "[" * 3000 + "]" * 3000, "is no TOML"),
         ("a = " + "9" * 5000, "is no TOML"),
+        ("[model]", r"is no TOML: \[model\] is there twice \(at line 2,"),
+        ("[test.a]\n[test.a]", r"is no TOML: \[test\.a\] is there twice"),
+        ("a = 1\na = 2\nb = 3", "is no TOML: a key is there twice"),
     ],
 )
 def test_toml_beyond_any_use(tmp_path: Path, text: str, said: str) -> None:

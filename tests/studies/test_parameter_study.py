@@ -10,7 +10,8 @@ import chladni
 from chladni.errors import ChladniError, FileError, LabelError, ModelError
 from chladni.io.nastran import write_assembly
 from chladni.studies import StudySettings, sample
-from chladni.studies.variation import of_text
+from chladni.studies.variation import of_parts
+from chladni.studies.vary_text import vary_text
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.plates import plate
 
@@ -207,18 +208,18 @@ def mm(tmp_path_factory):
     ],
 )
 def test_ranges_are_in_the_decks_units(mm, text, nominal, low, high, unit):
-    v = of_text(text, mm.assembly, mm.deck, mm.units)
+    v = of_parts(vary_text(text), mm.assembly, mm.deck, mm.units)
     np.testing.assert_allclose([v.nominal, v.low, v.high], [nominal, low, high])
     assert v.unit == unit
     assert v.log == text.endswith("log")
 
 
 def test_a_number_is_written_everywhere_it_stands(mm):
-    v = of_text("t=50%:200%", mm.assembly, mm.deck, mm.units)
+    v = of_parts(vary_text("t=50%:200%"), mm.assembly, mm.deck, mm.units)
     made = v.applied(mm.assembly, 2.0)
     np.testing.assert_allclose(made.shells.thickness, 2 * mm.assembly.shells.thickness)
     assert [p.section.thickness for p in made.parts] == pytest.approx([1.4e-3, 2.4e-3])
-    k = of_text("K of PELAS 8=10:20", mm.assembly, mm.deck, mm.units)
+    k = of_parts(vary_text("K of PELAS 8=10:20"), mm.assembly, mm.deck, mm.units)
     assert k.applied(mm.assembly, 2e4).springs.value == pytest.approx([2e4])
 
 
@@ -226,21 +227,28 @@ def test_a_number_is_written_everywhere_it_stands(mm):
     ("text", "named"),
     [
         ("t of 1=600:800", "857 times"),
+        ("E=1:2", "4.76e-06 times the deck's own 210000; "),
+        ("E=1:2e5", "decades 1e2:1e6:log"),
         ("t=0.6:0.8", "2 different values"),
         ("t of 3=0.6:0.8", "no part '3'"),
         ("t of 1", "is not of the form"),
         ("q=1:2", "there are E, rho"),
-        ("E=2:1", "must increase"),
+        ("E=3e5:1e5", "must increase"),
         ("E=0%:100%", "above zero"),
         ("E=1:2:3", "is no range"),
         ("E=nan:2", "must increase"),
         ("K of PBUSH 9=1:2", "no element of PBUSH 9"),
         ("suspension=1:2", "is an effect"),
+        ("E at 12=1:2", 'write "E of PART=LOW:HIGH"'),
+        ("E=1", "is no range"),
+        ("E=90%:", "is no range"),
+        ("E=%:2", "is no range"),
+        ("E of 1=90%:110%:lin", "is no range"),
     ],
 )
 def test_a_bad_range_names_itself(mm, text, named):
     with pytest.raises(ChladniError, match="--vary") as caught:
-        of_text(text, mm.assembly, mm.deck, mm.units)
+        of_parts(vary_text(text), mm.assembly, mm.deck, mm.units)
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
 

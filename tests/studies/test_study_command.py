@@ -117,7 +117,7 @@ def test_others_read_it_in_one_line(out):
 
 def test_the_page_tells_what_moves_what(out):
     page = (out / "report.html").read_text(encoding="utf-8")
-    for word in ("What moves what", "sheet", "open_dataset", "suspension"):
+    for word in ("What moves what", "sheet", "open_dataset", "suspension", "first elastic one"):
         assert word in page
     for name in ("slopes.png", "parallel.png", "responses.png", "design.csv", "study_begun.json"):
         assert (out / name).is_file()
@@ -139,6 +139,7 @@ def test_it_goes_on_by_the_same_command(out, folder):
         (("--sampler", "dice"), "saltelli"),
         (("--seed", "-1"), "seed"),
         (("--workers", "0"), "workers"),
+        (("--workers", "7777777777777777"), "gain nothing on"),
         (("--band", "9"), "--band"),
         (("--input", "1:+Z"), "both ends"),
         (("--input", "999:+Z", "--output", "1:+Z"), "999"),

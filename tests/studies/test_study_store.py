@@ -1,11 +1,6 @@
-"""A study's folder: what a kill at any instant leaves, and that nothing is run twice."""
+"""A study's folder: how it goes on where it stopped, and that nothing is run twice."""
 
 import json
-import os
-import random
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -181,54 +176,3 @@ def test_rows_are_written_as_json_alone(model, tmp_path):
     chladni.study(model, THREE, SETTINGS, out=tmp_path / "out")
     write_json(tmp_path / "x.json", rows(tmp_path / "out"))
     assert "NaN" not in (tmp_path / "out" / ROWS).read_text()
-
-
-def command(deck, out, samples, *more):
-    return [
-        *(sys.executable, "-m", "chladni", "study", str(deck), "--units", "SI", "--modes", "2"),
-        *("--vary", "t=90%:110%", "--vary", "E=80%:120%", "--samples", str(samples)),
-        *("--out", str(out), *more),
-    ]
-
-
-def killed_often(deck, out, samples, kills, seed, *more):
-    """A study killed with SIGKILL at random instants, started again until it ends."""
-    rng, starts = random.Random(seed), 0
-    while True:
-        starts += 1
-        study = subprocess.Popen(
-            command(deck, out, samples, *more), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            env=os.environ, text=True,
-        )  # fmt: skip
-        if starts <= kills:
-            file, before = out / ROWS, len((out / ROWS).read_bytes()) if starts > 1 else -1
-            while study.poll() is None and not (file.exists() and file.stat().st_size > before):
-                time.sleep(0.01)
-            time.sleep(rng.uniform(0.0, 0.4))
-            study.kill()
-        said, _ = study.communicate()
-        if study.returncode == 0:
-            return starts, said
-        assert study.returncode == -9, said
-        assert starts <= kills, said
-
-
-@pytest.mark.parametrize(
-    ("kills", "samples", "more"),
-    [
-        (3, 60, ("--workers", "1")),
-        pytest.param(50, 400, ("--workers", "2"), marks=pytest.mark.slow),
-    ],
-)
-def test_kill_9_loses_nothing_and_repeats_nothing(deck, model, tmp_path, kills, samples, more):
-    starts, said = killed_often(deck, tmp_path / "out", samples, kills, 7, *more)
-    assert starts > 1
-    assert f"{samples} of {samples} samples" in said
-    written = rows(tmp_path / "out")
-    assert sorted(r["sample"] for r in written) == list(range(samples))
-    straight = chladni.study(
-        model, ["t=90%:110%", "E=80%:120%"], StudySettings(samples=samples, modes=2)
-    )
-    by_sample = sorted(written, key=lambda r: r["sample"])
-    np.testing.assert_allclose([r["f1_hz"] for r in by_sample], straight.column("f1_hz"))
-    assert not [p for p in tmp_path.iterdir() if p.name != "out"], "scratch was left"

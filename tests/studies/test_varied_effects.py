@@ -15,7 +15,8 @@ from chladni.fem.assemble import structure
 from chladni.model.ground_springs import with_ground_bushes
 from chladni.studies import StudySettings
 from chladni.studies.parameter_study import study
-from chladni.studies.varied_effects import effect_of, of_effect
+from chladni.studies.varied_effects import of_effect
+from chladni.studies.vary_text import vary_text
 from chladni.units import UNITS
 from chladni.workflows.loaded_model import Model
 from chladni_specimens.forms import FORMS
@@ -37,7 +38,7 @@ def model(tmp_path, made=None):
 
 
 def test_a_mass_at_a_grid_is_a_mass_at_that_grid():
-    varied = of_effect(f"point-mass at {GRID}=1e-5:2e-4", sheet(), None, UNITS["mm-t-s"])
+    varied = of_effect(vary_text(f"point-mass at {GRID}=1e-5:2e-4"), sheet(), None, UNITS["mm-t-s"])
     assert (varied.low, varied.high, varied.unit) == pytest.approx((0.01, 0.2, "kg"))
     made, due = varied.applied(sheet(), 0.15), with_masses(sheet(), (GRID,), 0.15)
     assert_allclose(made.masses.matrix, due.masses.matrix, atol=1e-15)
@@ -47,7 +48,7 @@ def test_a_mass_at_a_grid_is_a_mass_at_that_grid():
 
 
 def test_a_support_pushes_across_the_sheet():
-    varied = of_effect(f"extra-support at {GRID}=1e2:1e5:log", sheet(), None, None)
+    varied = of_effect(vary_text(f"extra-support at {GRID}=1e2:1e5:log"), sheet(), None, None)
     row = sheet().rows([GRID])
     due = with_ground_bushes(sheet(), row, np.array([[0.0, 0, 1]]), 5e3)
     assert_allclose(first(varied.applied(sheet(), 5e3)), first(due), rtol=1e-9)
@@ -56,7 +57,7 @@ def test_a_support_pushes_across_the_sheet():
 
 def test_it_goes_to_workers_and_is_known_again():
     a, b, c = (
-        of_effect(f"point-mass at {grid}=0.01:0.2", sheet(), None, UNITS["SI"])
+        of_effect(vary_text(f"point-mass at {grid}=0.01:0.2"), sheet(), None, UNITS["SI"])
         for grid in (GRID, GRID, GRID + 1)
     )
     again = pickle.loads(pickle.dumps(a))
@@ -99,21 +100,22 @@ def test_a_mass_on_a_tube(tmp_path):
         ("suspension=1:2", "where it acts is not known; a case"),
         ("point-mass at 12=90%:110%", "nothing there of which to take a share"),
         ("point-mass at 12=2:1", "must increase"),
-        ("point-mass at 12=0:1:log", "must increase and not begin below zero"),
+        ("point-mass at 12=0:1:log", "must increase and be above zero"),
+        ("point-mass at 12=-1:1", "must increase and not begin below zero"),
         ("point-mass at 12=a:b", "is no range"),
-        ("point-mass of plate=1:2", 'is not of the form "point-mass at 412'),
+        ("point-mass of plate=1:2", 'write "point-mass at GRID=LOW:HIGH"'),
     ],
 )
 def test_what_cannot_be_varied_is_told(text, said):
-    assert effect_of(text)
+    asked = vary_text(text)
+    assert asked.is_effect
     with pytest.raises(FileError, match=said):
-        of_effect(text, sheet(), None, UNITS["SI"])
+        of_effect(asked, sheet(), None, UNITS["SI"])
 
 
 def test_numbers_of_the_deck_are_no_effects():
-    assert [effect_of(t) for t in ("t of inner=0.6:0.8", "E=90%:110%", "K of PBUSH 7=1:2")] == [
-        "", "", "",
-    ]  # fmt: skip
+    texts = ("t of inner=0.6:0.8", "E=90%:110%", "K of PBUSH 7=1:2", "t of a at 5=1:2")
+    assert not any(vary_text(text).is_effect for text in texts)
 
 
 def test_cords_of_a_case_are_used_where_they_are_varied(deck, tmp_path):

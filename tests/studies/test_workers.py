@@ -4,15 +4,18 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import psutil
 import pytest
+from distributed import Client
 
 import chladni
 from chladni.errors import FileError
 from chladni.studies import StudySettings
 from chladni.studies.study_store import ROWS
+from chladni.studies.workers import _AHEAD
 
 RANGES = ["t=90%:110%", "E=80%:120%"]
 SETTINGS = StudySettings(samples=40, modes=3)
@@ -66,13 +69,35 @@ def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     assert not [p for p in children if p.is_running()], "workers outlived the study"
 
 
-@pytest.fixture
-def cluster():
-    """A scheduler and two workers as a user starts them, each a process of its own."""
+@pytest.mark.parametrize("ended", [2, 3])
+def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
+    """Started again twice; then it is one sentence, and no fault of chladni."""
+    import distributed
+
+    made, tries = distributed.LocalCluster, []
+
+    def started(**options):
+        tries.append(options)
+        if len(tries) <= ended:
+            raise RuntimeError("Nanny failed to start.") from RuntimeError("Worker died")
+        return made(**options)
+
+    monkeypatch.setattr(distributed, "LocalCluster", started)
+    if ended == 3:
+        with pytest.raises(FileError, match=r"2 local workers could not .* 3 tries \(Worker died"):
+            chladni.study(model, RANGES, SETTINGS, workers=2)
+        return
+    found = chladni.study(model, RANGES, SETTINGS, workers=2)
+    np.testing.assert_allclose(found.column("f1_hz"), straight.column("f1_hz"), rtol=1e-9)
+
+
+@contextmanager
+def clustered(port=0):
+    """(address, scheduler, workers): two workers as a user starts them, each process its own."""
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
     scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"], **quiet
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"], **quiet
     )
     address = next(
         word for line in scheduler.stderr for word in line.split() if word.startswith("tcp://")
@@ -80,14 +105,27 @@ def cluster():
     options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
     quiet["stderr"] = subprocess.DEVNULL
     workers = [subprocess.Popen([*dask, "worker", address, *options], **quiet) for _ in range(2)]
-    yield address, scheduler, workers
-    for process in (*workers, scheduler):
-        process.kill()
-        process.wait()
-    scheduler.stderr.close()
+    try:
+        yield address, scheduler, workers
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+        scheduler.stderr.close()
+
+
+@pytest.fixture
+def cluster():
+    with clustered() as started:
+        yield started
+
+
+FOUND = """[str(t.key) for s in __import__("distributed").Scheduler._instances
+            for t in s.transition_log if t.finish == "memory"]"""
 
 
 def test_a_cluster_of_others_that_loses_a_worker(deck, straight, tmp_path, cluster):
+    """It costs the samples it had not handed over, of which few are on the cluster at a time."""
     address, _, workers = cluster
     study = started(deck, tmp_path / "out", "--scheduler", address)
     wait_for(tmp_path / "out", 3, study)
@@ -95,24 +133,40 @@ def test_a_cluster_of_others_that_loses_a_worker(deck, straight, tmp_path, clust
     said, _ = study.communicate()
     assert study.returncode == 0, said
     agrees(tmp_path / "out", straight)
+    with Client(address, timeout=20) as client:
+        solved = [key for key in client.run_on_scheduler(eval, FOUND) if "_on_worker" in key]
+    assert 40 <= len(solved) <= 40 + _AHEAD * len(workers)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("again", ["--workers", "--scheduler"])
 def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
-    deck, straight, tmp_path, cluster
+    deck, straight, tmp_path, cluster, again
 ):
+    """The same command goes on here, or on a scheduler that was started again at its address."""
     address, scheduler, _ = cluster
-    study = started(deck, tmp_path / "out", "--scheduler", address)
-    wait_for(tmp_path / "out", 3, study)
+    out = tmp_path / "out"
+    study = started(deck, out, "--scheduler", address)
+    wait_for(out, 3, study)
     scheduler.kill()
     said, _ = study.communicate()
     assert study.returncode == 2, said
     assert said.splitlines()[-1].startswith("chladni: the connection to the scheduler was lost; ")
     assert "Traceback" not in said
-    again = started(deck, tmp_path / "out", "--workers", "1")
-    said, _ = again.communicate()
-    assert again.returncode == 0, said
-    agrees(tmp_path / "out", straight)
+    scheduler.wait()
+    before = (out / ROWS).read_bytes()
+    assert 3 <= before.count(b"\n") < 40
+    if again == "--workers":
+        study = started(deck, out, "--workers", "1")
+        said, _ = study.communicate()
+    else:
+        with clustered(address.rpartition(":")[2]) as (same, _, _):
+            assert same == address
+            study = started(deck, out, "--scheduler", address)
+            said, _ = study.communicate()
+    assert study.returncode == 0, said
+    assert (out / ROWS).read_bytes().startswith(before)
+    agrees(out, straight)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x:1", ""])

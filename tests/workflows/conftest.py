@@ -23,22 +23,29 @@ damping = 0.01
 recordings = ["frf.npz"]
 mass = {mass}
 [band]
-fit = [20.0, 170.0]
+fit = [20.0, {top}]
 """
+
+
+def write_case(folder, shells, sensors, frequency, top):
+    """A plate of so many shells a side with a mass on its last corner, which the deck lacks.
+
+    No two modes of the plate are alike, and none has a node at the shaker.
+    """
+    deck, corner = plate(0.3, 0.22, shells, shells, 1e-3), (shells + 1) ** 2
+    write_assembly(deck, folder / "plate.bdf")
+    write_assembly(with_masses(deck, (corner,), 0.02), folder / "article.bdf")
+    article = chladni.load_model(folder / "article.bdf", "SI")
+    made = chladni.frf(article, [f"{g}:+Z" for g in sensors], ["2:+Z"], frequency).frfs[0]
+    write_npz(folder / "frf.npz", made.to("accelerance"))
+    mass = round(chladni.modes(article, 7).mass, 5)
+    (folder / "case.toml").write_text(CASE.format(mass=mass, top=top))
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """No two modes of the plate are alike, and none has a node at the shaker."""
     folder = tmp_path_factory.mktemp("case")
-    deck = plate(0.3, 0.22, 6, 6, 1e-3)
-    write_assembly(deck, folder / "plate.bdf")
-    write_assembly(with_masses(deck, (49,), 0.02), folder / "article.bdf")
-    article = chladni.load_model(folder / "article.bdf", "SI")
-    ends = [f"{g}:+Z" for g in SENSORS]
-    made = chladni.frf(article, ends, ["2:+Z"], np.linspace(15, 200, 900)).frfs[0]
-    write_npz(folder / "frf.npz", made.to("accelerance"))
-    (folder / "case.toml").write_text(CASE.format(mass=round(chladni.modes(article, 7).mass, 5)))
+    write_case(folder, 6, SENSORS, np.linspace(15, 200, 900), 170.0)
     return folder
 
 

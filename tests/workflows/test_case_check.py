@@ -12,7 +12,9 @@ import chladni
 from chladni.cli.app import application
 from chladni.io.tables.write_tables import write_npz
 from chladni.output import plain
+from chladni.report.check_page import check_page
 from chladni.report.result_json import to_json
+from chladni.workflows.case_check import CaseFinding
 from chladni.workflows.unit_check import refuse_other_units
 
 
@@ -53,6 +55,29 @@ def test_what_the_command_writes(copied, tmp_path):
     page = (out / "report.html").read_text(encoding="utf-8")
     for word in ("sensors.png", "What will be used", *case.outputs.labels):
         assert word in page
+
+
+@pytest.mark.parametrize(
+    ("faults", "rest", "said"),
+    [
+        (1, 0, "1 thing is to be mended first."),
+        (2, 1, "2 things are to be mended first, 1 thing is worth a look."),
+        (0, 2, "2 things are worth a look."),
+        (0, 0, "Nothing looks wrong with the case."),
+    ],
+)
+def test_the_page_counts_what_it_found(case, tmp_path, faults, rest, said):
+    found = [CaseFinding("a", "b", True)] * faults + [CaseFinding("c", "d")] * rest
+    checked = replace(chladni.check(replace(case, recordings=())), findings=tuple(found))
+    assert check_page(tmp_path, case, checked).lead == said
+
+
+@pytest.mark.parametrize("command", ["diagnose", "calibrate", "correlate"])
+def test_a_case_without_a_recording_is_told_where_to_name_one(copied, tmp_path, command):
+    rewritten(copied, 'recordings = ["frf.npz"]\n', "")
+    done = call(command, copied, "--out", tmp_path / "x")
+    assert done.exit_code == 2, (done.output, done.exception)
+    assert "names no recording to compare the model with; give it as recordings = [" in done.stderr
 
 
 def test_words_nobody_reads_are_told_by_command(copied):

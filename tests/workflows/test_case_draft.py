@@ -180,6 +180,21 @@ def test_a_plan_is_read(deck, frf, tmp_path):
     assert "by the table given" in done.output
 
 
+def test_a_plan_is_the_table_of_a_test_that_is_still_to_come(deck, tmp_path):
+    """Without a recording the rows of the table are the case's own, and the bench can test it."""
+    table = tmp_path / "sensors.csv"
+    table.write_text("label,grid,direction,role,mass\n9:+Z,9,+Z,output,0.004\n2:+Z,2,+Z,input,\n")
+    done = call("init", deck, "--sensors", table, "--out", tmp_path / "case")
+    assert done.exit_code == 0, done.output
+    assert "2 by the table given" in done.output
+    case = chladni.load_case(tmp_path / "case")
+    assert (case.outputs.labels, case.inputs.labels) == (("9:+Z",), ("2:+Z",))
+    assert case.outputs.mass.tolist() == [0.004]
+    lost = call("init", deck, "--sensors", tmp_path / "no.csv", "--out", tmp_path / "other")
+    assert lost.exit_code == 2
+    assert "no.csv" in lost.stderr
+
+
 def test_nothing_is_replaced(deck, tmp_path):
     (tmp_path / "case.toml").write_text("mine")
     done = call("init", deck, "--out", tmp_path)

@@ -189,6 +189,8 @@ def test_a_case_without_sensors_is_refused(case):
         (["--excitation", "noise"], "no excitation"),
         (["--sensors", "x.csv"], "names its sensors"),
         (["--band", "100:20"], "must increase"),
+        (["--band", "50:90000"], "GB of time data, more than the 1 GB"),
+        (["--resolution", "0.001", "--averages", "500"], "take lines of --resolution"),
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, said):

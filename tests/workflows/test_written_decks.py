@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import chladni
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.updating.accuracy import LIMIT
 from chladni.updating.preparation import ZETA_Q, prepare
-from chladni.updating.written_scores import seen, written_Q
+from chladni.updating.written_scores import noise_Q, seen, written_Q
 from chladni.workflows.question_of_case import question
 
 LN10 = np.log(10.0)
@@ -83,3 +84,11 @@ def test_an_unknown_gain_is_no_hidden_parameter(case):
         prepared = prepare(q)
         found.append(written_Q(q, prepared, prepared.nominal, (prepared.score.use,))[0])
     assert found[1] == pytest.approx(found[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(("variance", "told"), [(0.01, 0.01), (0.1, 0.1), (0.3, None), (1e5, None)])
+def test_noise_as_large_as_the_response_leaves_no_floor_that_is_told(variance, told):
+    """To first order E|Δ log10 H|² = E|Δ H / H|² / ln² 10: of no use beyond."""
+    prepared = SimpleNamespace(score=None, noise=np.full((4, 2, 1), variance))
+    Q = noise_Q(prepared, np.ones((4, 2, 1), bool))
+    assert Q == (None if told is None else pytest.approx(told))

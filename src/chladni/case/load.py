@@ -124,6 +124,13 @@ def load_case(path: str | Path) -> Case:
         One sentence naming file, line, offender and alternatives.
     """
     path = Path(path)
+    if path.is_dir() and not (path / "case.toml").is_file():
+        raise FileError(
+            f"no case.toml in the folder {path}; chladni init DECK RECORDING --out {path} drafts "
+            "one"
+        )
+    if not path.exists():
+        raise FileError(f"no file or folder {path}")
     path = path / "case.toml" if path.is_dir() else path
     keys = read_keys(path, sections())
     model, test = (

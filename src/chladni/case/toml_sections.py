@@ -10,6 +10,25 @@ from typing import Any
 from ..errors import FileError, did_you_mean, nearest, not_text
 
 _LONGEST = 60  # characters of a value that a sentence repeats
+_QUOTED = r"""(['"])((?:(?!\1)[^\\]|\\.)*)\1"""
+
+
+def _why(said: str) -> str:
+    """What tomllib says, its tuples of names as a user writes them.
+
+    >>> _why("Cannot declare ('model',) twice (at line 2, column 7)")
+    '[model] is there twice (at line 2, column 7)'
+    """
+    if "digits)" in said:
+        return "a number has thousands of digits"
+    said = re.sub(rf"\((?:{_QUOTED},? ?)+\)", _dotted, said)
+    said = re.sub(r"Cannot declare (\[.*\]) twice", r"\1 is there twice", said)
+    said = re.sub(r"Cannot mutate immutable namespace (\[.*\])", r"\1 has a value already", said)
+    return said.replace("Cannot overwrite a value", "a key is there twice")
+
+
+def _dotted(names: re.Match[str]) -> str:
+    return f"[{'.'.join(text for _, text in re.findall(_QUOTED, names[0]))}]"
 
 
 def _short(value: object) -> str:
@@ -178,8 +197,7 @@ def read_keys(path: Path, known: Sequence[str]) -> KeyFile:
     except RecursionError as error:
         raise FileError(f"{path.name} is no TOML: its brackets are nested too deep") from error
     except ValueError as error:  # TOMLDecodeError, and numbers beyond any use
-        why = "a number has thousands of digits" if "digits)" in str(error) else str(error)
-        raise FileError(f"{path.name} is no TOML: {why}") from error
+        raise FileError(f"{path.name} is no TOML: {_why(str(error))}") from error
     headers, lines = _places(text)
     tables = {}
     for name, value in values.items():

@@ -1,5 +1,6 @@
 """``chladni bench``: a virtual test of a case or a deck, and the case it leaves."""
 
+import json
 import shutil
 import tempfile
 from pathlib import Path
@@ -18,11 +19,11 @@ from ..progress import Progress, within
 from ..report.result_json import to_json
 from ..workflows.loaded_model import beside, is_case, load_deck
 from ..workflows.virtual_test import BenchSettings, virtual_test
-from .run import Out, Units, limits, started
+from .run import Allow, DeckOrCase, Out, Units, limits, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE_or_DECK")],
+    source: DeckOrCase,
     excitation: Annotated[
         str, typer.Option(help="burst-random, stepped-sine, multisine or hammer.")
     ] = "burst-random",
@@ -78,6 +79,7 @@ def run(
         ),
     ] = "",
     units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
     """Test a structure on the virtual bench: articles, shaker, sensors, front end, recordings.
@@ -110,7 +112,7 @@ def run(
         job.progress("reading", 0.0)
         with tempfile.TemporaryDirectory() as scratch:
             stage = within(job.progress, 0.0, 0.2)
-            case = _case(source, units, sensors, input, Path(scratch), stage)
+            case = _case(source, units, allow or [], sensors, input, Path(scratch), stage)
             found = virtual_test(case, settings, within(job.progress, 0.2, 0.95))
             job.progress("writing", 0.95)
             job.files += write_bench(job.folder, case, found)
@@ -133,6 +135,7 @@ def _factors(text: str) -> tuple[float, ...]:
 def _case(
     source: Path,
     units: str | None,
+    allow: list[str],
     sensors: Path | None,
     driven: str,
     scratch: Path,
@@ -140,12 +143,13 @@ def _case(
 ) -> Case:
     """The case itself; of a bare deck one that is drafted in a scratch folder."""
     if source.exists() and is_case(source):
-        if sensors is not None or units is not None or driven:
+        if sensors is not None or units is not None or allow or driven:
             raise FileError(
-                f"{source} is a case, which names its sensors, what drives it and its units itself"
+                f"{source} is a case, which names its sensors, what drives it, its units and the "
+                "cards it allows itself"
             )
         return load_case(source)
-    bare = load_deck(source, units)
+    bare = load_deck(source, units, allow)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
     if driven:
@@ -168,7 +172,7 @@ def _case(
     write_deck(bare.deck, scratch / "deck.bdf", [])
     write_text(
         scratch / "case.toml",
-        f'[model]\ndeck = "deck.bdf"\nunits = "{units}"\n'
+        f'[model]\ndeck = "deck.bdf"\nunits = "{units}"\nallow = {json.dumps(allow)}\n'
         f'[test]\nsensors = "sensors.csv"\n{hangers}',
     )
     return load_case(scratch)

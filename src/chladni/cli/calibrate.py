@@ -1,16 +1,11 @@
 """``chladni calibrate``: ordinary parameters alone, no new physics."""
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from ..workflows.calibrate import calibrate
-from .run import Out, diagnosed
+from .run import CaseFolder, Out, diagnosed
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE")],
+    source: CaseFolder,
     out: Out = None,
 ) -> None:
     """Fit E, rho and t of the parts (or what the case frees); write the updated deck and a page."""

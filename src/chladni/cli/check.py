@@ -1,19 +1,14 @@
 """``chladni check``: what of a case will be used, what not, what cannot be right."""
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from ..errors import AccuracyError
 from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.case_check import check
-from .run import Out, opened, started
+from .run import CaseFolder, Out, opened, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE")],
+    source: CaseFolder,
     out: Out = None,
 ) -> None:
     """Look a case over before minutes are spent on it: units, mass, size, places, band, words."""

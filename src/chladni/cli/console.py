@@ -22,7 +22,7 @@ from ..report.blocks import Table
 QUIET = 10.0  # seconds after which a run without a terminal says what it does
 AGAIN = 60.0  # and how often from then on
 ROWS = 24  # of a table on the terminal; the page has them all
-_CELL = 40  # characters
+_CELL, _LAST = 48, 110  # characters of a cell, and of a sentence at the end of a row
 
 
 @dataclass
@@ -127,7 +127,7 @@ def table_lines(table: Table, most: int = ROWS) -> list[str]:
     ['mode    Hz', '   1   5.2', '   2  11.4']
     """
     shown = [tuple(table.columns), *(tuple(row) for row in table.rows[:most])]
-    cells = [[_cell(text) for text in row] for row in shown]
+    cells = [[*map(_cell, row[:-1]), *(_cell(text, _LAST) for text in row[-1:])] for row in shown]
     width = [max(map(len, column)) for column in zip(*cells, strict=True)]
     left = [name in table.words for name in table.columns]
     lines = ["  ".join(_aligned(row, width, left)).rstrip() for row in cells]
@@ -136,9 +136,9 @@ def table_lines(table: Table, most: int = ROWS) -> list[str]:
     return lines
 
 
-def _cell(text: object) -> str:
+def _cell(text: object, most: int = _CELL) -> str:
     said = " ".join(str(text).split())
-    return said if len(said) <= _CELL else f"{said[: _CELL - 3]}..."
+    return said if len(said) <= most else f"{said[: most - 3]}..."
 
 
 def _aligned(row: Sequence[str], width: Sequence[int], left: Sequence[bool]) -> Iterator[str]:

@@ -11,11 +11,11 @@ from ..report.result_json import to_json
 from ..workflows.correlate import correlate
 from ..workflows.loaded_model import is_case, load_model
 from ..workflows.other_modes import other_modes
-from .run import Allow, Out, Run, Units, opened, started
+from .run import Allow, DeckOrCase, Out, Run, Units, opened, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE_or_DECK")],
+    source: DeckOrCase,
     modes: Annotated[
         Path | None,
         typer.Option(

@@ -23,11 +23,23 @@ from ..workflows.loaded_model import (
     load_deck,
     load_model,
 )
-from .run import Allow, Answering, Damping, Driven, Kind, Out, Run, Units, limits, started
+from .run import (
+    Allow,
+    Answering,
+    Damping,
+    DeckOrCase,
+    Driven,
+    Kind,
+    Out,
+    Run,
+    Units,
+    limits,
+    started,
+)
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     input: Driven = None,
     output: Answering = None,
     band: Annotated[str, typer.Option(help="From and to, in Hz.")] = "1:200",

@@ -14,7 +14,12 @@ from .run import Out, limits, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE_or_RECORDING")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CASE_or_RECORDING", help="A folder with a case.toml, or a recording's file."
+        ),
+    ],
     band: Annotated[str, typer.Option(help="From and to, in Hz; default the whole.")] = "",
     quantity: Annotated[
         str, typer.Option(help="receptance, mobility, ... where the file does not say.")

@@ -1,6 +1,5 @@
 """``chladni modes``: normal modes of a deck or case."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,11 +8,11 @@ from ..progress import within
 from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
 from ..workflows.modes import modes
-from .run import Allow, Out, Units, started
+from .run import Allow, DeckOrCase, Out, Units, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     count: Annotated[int, typer.Option(help="How many modes.", min=1)] = 20,
     units: Units = None,
     allow: Allow = None,

@@ -1,7 +1,6 @@
 """``chladni plan``: where to put sensors and shakers, and which lines to measure."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,11 +12,11 @@ from ..report.result_json import to_json
 from ..workflows.loaded_model import load_model
 from ..workflows.plan import plan
 from ..workflows.smallest_findings import smallest_findings
-from .run import Out, Units, started
+from .run import Allow, DeckOrCase, Out, Units, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     sensors: Annotated[int, typer.Option(help="How many sensors.", min=1)] = 30,
     modes: Annotated[
         int | None, typer.Option(help="Elastic modes to tell apart; else by --top.", min=1)
@@ -47,6 +46,7 @@ def run(
         float, typer.Option(help="Noise expected, of |H|, for --detect.", min=1e-5, max=0.5)
     ] = 0.01,
     units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
     """Sensors by effective independence and exchange, shaker and cords, lines and duration."""
@@ -68,7 +68,7 @@ def run(
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units, command="plan")
+        model = load_model(source, units, allow or (), command="plan")
         job.notes += model.notes
         found = plan(model, settings, within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))

@@ -13,13 +13,13 @@ from ..errors import FileError
 from ..geometry.clearance import Gaps, PairClearance, all_gaps, nearest, summary
 from ..report.blocks import Block, Picture, Table
 from ..report.words import number
-from ..workflows.loaded_model import Model, load_model, on_faces
-from .run import Out, Run, Units, started
+from ..workflows.loaded_model import LEAST, Model, load_model, on_faces
+from .run import Allow, DeckOrCase, Out, Run, Units, started
 from .shape_pictures import against_scan, cuts
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     modes: Annotated[str, typer.Option(help="Modes in one picture, as 1-12 or 7,9.")] = "",
     gif: Annotated[list[int] | None, typer.Option(help="A mode to animate (repeatable).")] = None,
     energy: Annotated[
@@ -41,6 +41,7 @@ def run(
         bool, typer.Option("--align", help="Bring the scan onto the model first.")
     ] = False,
     units: Units = None,
+    allow: Allow = None,
     out: Out = None,
 ) -> None:
     """Pictures: modes, animations, thickness, strain energy, clearance, sections, a scan.
@@ -51,7 +52,7 @@ def run(
     chosen = numbers(modes)
     with started("render", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units, command="render")
+        model = load_model(source, units, allow or (), command="render")
         job.notes += model.notes
         count = max([0, *chosen, *(gif or []), *(energy or [])])
         shown = sorted({*chosen, *(gif or []), *(energy or [])})
@@ -94,7 +95,7 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if not count:
         return None
     job.progress(f"modes of {len(model.structure.system.dofs)} degrees of freedom", 0.2)
-    modal = model.modes(max(count, _LEAST))
+    modal = model.modes(max(count, LEAST))
     if len(modal) < count:
         raise FileError(f"{job.source} has {len(modal)} modes, number {count} was asked for")
     rigid = int(rigid_modes(modal).sum())
@@ -106,9 +107,6 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     if rigid:
         job.notes.append(f"Modes 1 to {rigid} are rigid motions; the first elastic is {rigid + 1}.")
     return modal
-
-
-_LEAST = 7  # with them the six rigid motions of a free structure are told from the first elastic
 
 
 def _still(job: Run, model: Model, thickness: bool) -> None:

@@ -23,7 +23,20 @@ from .console import console, say, say_table, watched
 
 Out = Annotated[
     Path | None,
-    typer.Option("--out", help="Folder for the results (made if needed).", metavar="DIR"),
+    typer.Option(
+        "--out", help="Folder for the results (made if needed); else runs/COMMAND-NAME.",
+        metavar="DIR",
+    ),
+]  # fmt: skip
+CaseFolder = Annotated[
+    Path,
+    typer.Argument(
+        metavar="CASE", help="Folder with a case.toml, or that file; chladni init drafts one."
+    ),
+]
+DeckOrCase = Annotated[
+    Path,
+    typer.Argument(metavar="DECK_or_CASE", help="A Nastran deck, or a folder with a case.toml."),
 ]
 Units = Annotated[
     str | None,
@@ -140,7 +153,9 @@ def opened(source: Path) -> Case:
         If it is no case.
     """
     if source.exists() and not is_case(source):
-        raise FileError(f"{source} is no case; give a folder with case.toml")
+        raise FileError(
+            f"{source} is no case; give a folder with case.toml, as chladni init drafts one"
+        )
     return load_case(source)
 
 

@@ -1,5 +1,6 @@
 """``chladni study``: parameters of a model sampled, on this machine or on a cluster."""
 
+import sys
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -8,17 +9,29 @@ import typer
 from ..case import Case, load_case
 from ..dynamics.frf import Quantity
 from ..errors import AccuracyError, FileError
-from ..progress import Progress, silent, terminal
+from ..progress import Progress
 from ..report.result_json import to_json
 from ..studies.parameter_study import ParameterStudy, study
 from ..studies.study_settings import StudySettings
 from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
-from .console import say
-from .run import Allow, Answering, Damping, Driven, Kind, Out, Units, limits, place_of, started
+from .console import say, watched
+from .run import (
+    Allow,
+    Answering,
+    Damping,
+    DeckOrCase,
+    Driven,
+    Kind,
+    Out,
+    Units,
+    limits,
+    place_of,
+    started,
+)
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="DECK_or_CASE")],
+    source: DeckOrCase,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -67,8 +80,8 @@ def run(
         raise FileError("--frf needs --input and --output, or a case with FRFs")
     place = place_of("study", source, out)
     model = _source(source, units, allow or [])
-    with terminal() as bar:
-        progress = bar if bar is not silent else _tenths()
+    with watched() as stage:
+        progress = stage if sys.stderr.isatty() else _both(stage, _tenths())
         found = study(
             model, vary or (), settings, out=place, workers=workers, scheduler=scheduler,
             progress=progress,
@@ -100,6 +113,14 @@ def _written(source: Path, place: Path, found: ParameterStudy) -> None:
             f"{len(found.failed)} of {len(found.rows)} samples failed, the first of them, "
             f"{number}: {why}"
         )
+
+
+def _both(one: Progress, other: Progress) -> Progress:
+    def told(what: str, share: float) -> None:
+        one(what, share)
+        other(what, share)
+
+    return told
 
 
 def _tenths() -> Progress:

@@ -15,7 +15,12 @@ from .run import Out, limits, started
 
 
 def run(
-    source: Annotated[Path, typer.Argument(metavar="CASE_or_RECORDING")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CASE_or_RECORDING", help="A folder with a case.toml, or a recording's file."
+        ),
+    ],
     excitation: Annotated[
         str, typer.Option(help="hammer, burst, random, sine, multisine; else what it looks like.")
     ] = "",

@@ -83,11 +83,11 @@ def defaults(groups: ElementGroups) -> list[PartScale]:
 
 
 def thickness_of(part: Part) -> str:
-    """What of a part is its thickness: t of a sheet, wall of a tube, "" of a solid bar."""
+    """What of a part is its thickness: t of a sheet, wall of a tube, "" of what is solid."""
     section = part.section
     if isinstance(section, BeamSection):
         return "wall" if section.tube else ""
-    return "t"
+    return "t" if isinstance(section, ShellSection) else ""
 
 
 def _material(part: Part) -> Material | None:

@@ -9,6 +9,21 @@ LARGEST = 1.0  # GB; a deck of a million grids has 0.3, an hour of 16 channels a
 OVERRIDE = "CHLADNI_LARGEST_GB"  # of the environment
 
 
+def most_gigabytes() -> float:
+    """The limit, which the environment may raise.
+
+    Raises
+    ------
+    FileError
+        If what the environment says is no number.
+    """
+    text = os.environ.get(OVERRIDE, "")
+    try:
+        return float(text) if text else LARGEST
+    except ValueError:
+        raise FileError(f"{OVERRIDE} = {text[:20]!r} is no number of gigabytes") from None
+
+
 def refuse_large(path: Path, size: int | None = None, what: str = "holds") -> None:
     """Refuse a file, or what an archive says it unpacks to, above the limit.
 
@@ -21,11 +36,7 @@ def refuse_large(path: Path, size: int | None = None, what: str = "holds") -> No
     FileError
         With the variable that lets the file in.
     """
-    text = os.environ.get(OVERRIDE, "")
-    try:
-        limit = float(text) if text else LARGEST
-    except ValueError:
-        raise FileError(f"{OVERRIDE} = {text[:20]!r} is no number of gigabytes") from None
+    limit = most_gigabytes()
     gigabytes = (path.stat().st_size if size is None else size) / 1e9
     if gigabytes > limit:
         raise FileError(

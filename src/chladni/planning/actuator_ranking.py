@@ -153,16 +153,21 @@ def ranked_actuators(
     margin: np.ndarray | None = None,
     access: np.ndarray | None = None,
 ) -> ActuatorRanking:
-    """Candidates by condition number; no access or a rattle margin below 1 is a veto."""
+    """Candidates by condition number; no access or a rattle margin below 1 is a veto.
+
+    Where none drives all modes, as where two share a frequency, every condition is infinite: then
+    the least residue decides.
+    """
     n = len(phi)
     margin = np.full(n, np.inf) if margin is None else margin
     allowed = (np.ones(n, bool) if access is None else np.asarray(access, bool)) & (margin >= 1)
     kappa = shaker.conditions()
     residue = driving_point_residue(frequency, phi)
+    least = residue.min(axis=1) / np.maximum(residue.mean(axis=1), 1e-300)
     return ActuatorRanking(
-        np.lexsort((kappa, ~allowed)),
+        np.lexsort((-least, kappa, ~allowed)),
         kappa,
-        residue.min(axis=1) / np.maximum(residue.mean(axis=1), 1e-300),
+        least,
         margin,
         allowed,
     )

@@ -135,10 +135,14 @@ def _factors(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def condition(hankel: np.ndarray) -> np.ndarray:
-    """Largest over smallest Hankel value: the lower, the better all modes are seen and driven."""
+    """Largest over smallest Hankel value: the lower, the better all modes are seen and driven.
+
+    Infinite where the smallest squared is within n ε of the largest squared: rounding, no motion.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = hankel[..., 0] / hankel[..., -1]
-    return np.where(hankel[..., -1] > 1e-12 * hankel[..., 0], ratio, np.inf)
+    rounding = np.sqrt(hankel.shape[-1] * np.finfo(float).eps)
+    return np.where(hankel[..., -1] > rounding * hankel[..., 0], ratio, np.inf)
 
 
 @dataclass(frozen=True, eq=False)

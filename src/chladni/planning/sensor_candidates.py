@@ -1,4 +1,4 @@
-"""Where a sensor can be glued: flat, off edges and folds, with room above, reachable by hand."""
+"""Where a sensor can be glued: flat, off edges and folds, with room above; across a beam."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from ..view.surface import Surface, surface
 
 TILT = np.radians(35.0)  # of the four slanting lines of sight beside the straight one
 FOOT, ROOM = 0.008, 0.03  # radius of a sensor's foot, height it needs [m]
+SMALLER = (1.0, 0.5, 0.25)  # of a foot, in turn, until something passes
 RELATIVE = 400.0  # where the unit of length is unknown a foot is this part of the structure
 
 
@@ -37,6 +38,8 @@ class SensorCandidates:
     side : (n,)             +1, -1: the side of that normal which can be reached
     straight : (n,) bool    nothing stands in the way along the normal: room for a shaker's rod
     refused : {why: count}  places of the surface that were not taken
+    foot : share of a sensor's foot over which the surface is flat: 1, or 1/2 or 1/4 where nothing
+           else is; 0 on beams, which have no sheet
     """
 
     ids: np.ndarray
@@ -48,6 +51,7 @@ class SensorCandidates:
     side: np.ndarray
     straight: np.ndarray
     refused: Mapping[str, int]
+    foot: float = 1.0
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -80,9 +84,12 @@ def find_sensor_candidates(
 ) -> SensorCandidates:
     """At most ``count`` places spread over the sheets, each farthest from those before it.
 
+    A structure of beams alone has them at its grids, across the beams.
+
     Parameters
     ----------
-    foot : radius that must be flat and free of edges, folds and joints [m]
+    foot : radius that must be flat and free of edges, folds and joints [m]; half of it, and half of
+           that, where the whole is nowhere
     room : height that must be free above [m]
     flat : greatest root mean square angle of the surface within the foot [degree]
     unit : "" where lengths are in an unknown unit: foot and room are then parts of the structure
@@ -93,16 +100,16 @@ def find_sensor_candidates(
         If nothing passes.
     """
     seen = surface(assembly, unit)
+    if not len(seen.faces):
+        return _across_beams(assembly, count)
     foot = foot or (FOOT if unit else seen.size / RELATIVE)
     room = room or (ROOM if unit else 4 * foot)
     sheet = seen.faces[: len(assembly.shells)] if len(assembly.shells) else seen.faces
-    if not len(sheet):
-        raise ModelError("the model has no surface a sensor could be glued to, only lines")
     every = _every(assembly, seen, sheet)
-    normals, bend = _bend(seen, sheet, every, foot)
-    smooth = bend <= np.sin(np.radians(flat)) ** 2
-    clear = smooth.copy()
-    clear[smooth] = _off_edges(seen, every.points[smooth], foot)
+    for share in SMALLER:
+        normals, smooth, clear = _flat(seen, sheet, every, share * foot, flat)
+        if clear.any():
+            break
     grid = every.is_grid
     refused = {
         "not flat": int((~smooth & grid).sum()),
@@ -110,7 +117,12 @@ def find_sensor_candidates(
     }
     clear &= grid | ~_has_one(every, clear)
     if not clear.any():
-        raise ModelError("no grid of the surface is flat and off the edges: refine the mesh")
+        raise ModelError(
+            f"no place of the surface is flat within {1e3 * SMALLER[-1] * foot:.2g} mm and off "
+            "edges, folds and joints by as much: refine the mesh, or give the places you have"
+            if unit
+            else "no place of the surface is flat and off edges, folds and joints; give --units"
+        )
     at = np.flatnonzero(clear)
     at = at[farthest_point_sample(every.points[at], min(3 * count, len(at)))]
     side, straight = _reachable(seen, every.points[at], normals[at], foot, room, count)
@@ -118,7 +130,28 @@ def find_sensor_candidates(
     refused["not reachable"] = int((side[: good[-1]] == 0).sum()) if len(good) else len(at)
     if not len(good):
         raise ModelError("no flat grid can be reached from outside")
-    return every.taken(at[good], normals[at[good]], side[good], straight[good], refused)
+    return every.taken(at[good], normals[at[good]], side[good], straight[good], refused, share)
+
+
+def _across_beams(assembly: Assembly, count: int) -> SensorCandidates:
+    """Grids of beams, each with the two axes of the basic frame that lie most across its beams."""
+    nodes = assembly.beams.nodes
+    if not len(nodes):
+        raise ModelError("the model has no sheet, solid or beam a sensor could be glued to")
+    along = assembly.points[nodes[:, 1]] - assembly.points[nodes[:, 0]]
+    own = np.zeros((len(assembly.points), 3))
+    for end in nodes.T:  # Σ l cos² to each axis
+        np.add.at(own, end, along**2 / np.linalg.norm(along, axis=1)[:, None])
+    grids = np.unique(nodes)
+    few = farthest_point_sample(assembly.points[grids], min((count + 1) // 2, len(grids)))
+    at = np.repeat(grids[few], 2)
+    axes = np.argsort(own[grids[few]], axis=1, kind="stable")[:, :2].ravel()
+    n = len(at)
+    return SensorCandidates(
+        assembly.ids[at], np.ones(n, bool), np.repeat(at[:, None], 4, axis=1),
+        np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), assembly.points[at], np.eye(3)[axes], np.ones(n),
+        np.ones(n, bool), {}, 0.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +171,7 @@ class _Every:
         side: np.ndarray,
         straight: np.ndarray,
         refused: Mapping[str, int],
+        foot: float,
     ) -> SensorCandidates:
         """Some of them, with what was found out about them."""
         return SensorCandidates(
@@ -150,6 +184,7 @@ class _Every:
             side,
             straight,
             refused,
+            foot,
         )
 
 
@@ -176,6 +211,17 @@ def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
     grids = np.zeros(int(every.nodes.max()) + 1, bool)
     grids[every.nodes[clear & every.is_grid, 0]] = True
     return grids[every.nodes].any(axis=1)
+
+
+def _flat(
+    seen: Surface, sheet: np.ndarray, every: _Every, foot: float, flat: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normals of all places; which are flat within a foot, and which of these off the edges."""
+    normals, bend = _bend(seen, sheet, every, foot)
+    smooth = bend <= np.sin(np.radians(flat)) ** 2
+    clear = smooth.copy()
+    clear[smooth] = _off_edges(seen, every.points[smooth], foot)
+    return normals, smooth, clear
 
 
 def _bend(

@@ -3,7 +3,7 @@
 The road is that of Echaniz Granado (2015), section 4.1.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,8 +11,9 @@ import numpy as np
 from ..dofs import label
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel, rigid_modes
+from ..effects.ordinary import thickness_of
 from ..ema.correlation import auto_mac
-from ..errors import ModelError
+from ..errors import ModelError, ShapeError
 from ..fem.assemble import Structure, structure
 from ..model.assembly import Assembly
 from ..progress import Progress, silent, within
@@ -165,8 +166,11 @@ def plan(
     unit : "" where the deck's unit of length is not known
     """
     settings = settings or PlanSettings()
+    if not any(map(thickness_of, assembly.parts)):
+        settings = replace(settings, draws=0)  # nothing to draw
     progress("places a sensor can sit at", 0.05)
     places = find_sensor_candidates(assembly, settings.candidates, unit=unit)
+    settings = replace(settings, sensors=min(settings.sensors, len(places)))
     progress("modes", 0.2)
     built = built or structure(assembly)
     modal, above, first = target_modes(built, settings)
@@ -200,6 +204,9 @@ def plan(
         shaker, f[aimed], flat, margin=rattle.force / settings.force, access=places.straight
     )
     enough = ranking.allowed.sum() >= settings.actuators
+    together = best_actuators(shaker, settings.actuators, ranking.allowed if enough else None)
+    if not np.isfinite(shaker.condition(together)):
+        together = np.sort(ranking.order[: settings.actuators])
     hangers, quiet = hang_points(moving[:, :, :r], places)
     three = places.moving(moving, mounts.place[layout])[..., :r]
     return Plan(
@@ -219,7 +226,7 @@ def plan(
         ranking,
         rattle,
         gaps,
-        best_actuators(shaker, settings.actuators, ranking.allowed if enough else None),
+        together,
         (modal_rank(f, seen), 2 * r),
         gramian_quotient(observed, f),
         auto_mac(seen),
@@ -273,13 +280,16 @@ def mounts_at(places: SensorCandidates) -> Mount:
         place.append(np.flatnonzero(good))
         directions.append(axes[good])
     at, along = np.concatenate(place), np.concatenate(directions)
+    labels = _labels(places.ids[at], along)
+    once = np.sort(np.unique(labels, return_index=True)[1])  # of a beam two ways are places already
+    at, along, labels = at[once], along[once], [labels[k] for k in once]
     ids = places.ids[at]
     return Mount(
         ids,
         at,
         places.points[at],
         along,
-        tuple(_labels(ids, along)),
+        tuple(labels),
         np.arange(len(at)) < len(places),
         places.side[at],
     )
@@ -337,14 +347,18 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 
     Echaniz Granado (2015), section 4.1 and figure 8.
 
-    Each entry is (modes, overlap of its layout with that of the entry before).
+    Each entry is (modes, overlap of its layout with that of the entry before); it ends where the
+    places tell no more modes apart.
     """
     most = min(n_sensors, phi.shape[1])
     counts = sorted({*np.linspace(max(2, target // 3), most, 7).astype(int).tolist(), target})
     layouts = {}
     for count in counts:
-        layouts[count] = effective_independence(phi[:, :count], n_sensors)
-    pairs = pairwise(counts)
+        try:
+            layouts[count] = effective_independence(phi[:, :count], n_sensors)
+        except ShapeError:
+            break
+    pairs = pairwise(layouts)
     return tuple((b, overlap(layouts[b], layouts[a])) for a, b in pairs)
 
 

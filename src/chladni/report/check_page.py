@@ -9,7 +9,7 @@ from ..view.surface import surface
 from ..workflows.case_check import CaseCheck, CheckedDof
 from ..workflows.case_model import cords, markers
 from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table
-from .words import number
+from .words import counted, direction, number
 
 
 def check_json(found: CaseCheck) -> dict[str, Any]:
@@ -50,15 +50,17 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
 
 def _lead(found: CaseCheck) -> str:
     faults, rest = len(found.faults), len(found.findings) - len(found.faults)
-    if not found.findings:
-        return "Nothing looks wrong with the case."
-    return f"{faults} things are to be mended first, {rest} more are worth a look."
+    said = [
+        *([counted(faults, "thing is", "things are") + " to be mended first"] if faults else []),
+        *([counted(rest, "thing is", "things are") + " worth a look"] if rest else []),
+    ]
+    return f"{', '.join(said) or 'Nothing looks wrong with the case'}."
 
 
 def _table(dofs: tuple[CheckedDof, ...]) -> Table:
     rows = [
         (d.label, d.role, d.place, *(number(x) for x in d.point_m),
-         " ".join(f"{x:+.2f}" for x in d.direction), number(1e3 * d.off_mesh_m, 3),
+         direction(d.direction), number(1e3 * d.off_mesh_m, 3),
          number(1e3 * d.mass_kg, 3))
         for d in dofs
     ]  # fmt: skip

@@ -16,12 +16,13 @@ from ..planning.plan_summary import (
     sensors_csv,
     summary,
 )
+from ..planning.sensor_candidates import FOOT, SensorCandidates
 from ..planning.whole_plan import Plan, motion
 from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
-from .words import hertz, number
+from .words import direction, hertz, number
 
 PICTURES = {
     "sensors.png": "the layout",
@@ -54,12 +55,12 @@ def lead(result: PlanSummary) -> str:
 
 def notes(found: Plan) -> list[str]:
     """What was decided on the way, and what to mind."""
-    refused = [f"{count} grids {why}" for why, count in found.places.refused.items()]
     centres = int((~found.places.is_grid).sum())
-    out = [
-        f"{len(found.places)} places were looked at, spread over all flat surfaces that can be "
-        f"reached; left out: {', '.join(refused)}."
-    ]
+    out = _places_notes(found.places)
+    if len(found.layout) == len(found.places):
+        out.append(
+            f"Every place bears a sensor: there is room for {len(found.places)} and no more."
+        )
     if centres:
         out.append(
             f"{centres} of the places are centres of shells, in strips too narrow for a grid that "
@@ -87,11 +88,38 @@ def notes(found: Plan) -> list[str]:
     return out
 
 
+def _places_notes(places: SensorCandidates) -> list[str]:
+    """Where places were looked for, and what was left out."""
+    if not places.foot:
+        return [
+            f"{len(places)} places and directions were looked at: grids of the beams, each with "
+            "the two axes of the basic frame that lie most across them. A sensor sits on the wall "
+            "or, where that is slanted, on a block."
+        ]
+    refused = [f"{count} grids {why}" for why, count in places.refused.items() if count]
+    out = [
+        f"{len(places)} places were looked at, spread over all flat surfaces that can be reached; "
+        f"left out: {', '.join(refused) or 'none'}."
+    ]
+    if places.foot < 1:
+        out.append(
+            "Nowhere is the surface flat over a sensor's whole foot, which has a radius of "
+            f"{1e3 * FOOT:g} mm: places were taken that are flat over {100 * places.foot:g} % of "
+            "it. Look at them before you glue."
+        )
+    return out
+
+
 def _rattle_notes(found: Plan) -> list[str]:
     """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
     out, force = [], found.settings.force
     if rattling := int((found.rattle.force < force).sum()):
         out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")
+    if not np.isfinite(found.actuators.condition).any():
+        out.append(
+            "No place drives all modes by itself, since some share a frequency or stand still "
+            "wherever others move: take two shakers (--shakers 2), or measure from two places."
+        )
     if blocked := int((~found.places.straight).sum()):
         out.append(f"To {blocked} places no straight rod leads: they are for sensors only.")
     if not found.actuators.allowed[found.together].all():
@@ -127,7 +155,7 @@ def _sensors(
     shakers = [_marker(at, "shaker") for at in result.actuators_together]
     picture = scene.sensors(path, seen, outputs, shakers)
     rows = [
-        (str(s.rank), s.at.label, *_where(s.at), _vector(s.at.direction), s.at.mounted)
+        (str(s.rank), s.at.label, *_where(s.at), direction(s.at.direction.tolist()), s.at.mounted)
         for s in result.sensors
     ]
     table = Table(
@@ -151,7 +179,7 @@ def _sensors(
 
 
 def _where(at: PlannedPlace) -> tuple[str, str]:
-    return "" if at.grid is None else str(at.grid), _vector(at.point_m)
+    return "" if at.grid is None else str(at.grid), ", ".join(f"{x:.3f}" for x in at.point_m)
 
 
 def _marker(at: PlannedPlace, text: str) -> annotations.Marker:
@@ -265,7 +293,3 @@ def _test(t: Durations) -> str:
         f"with {AVERAGES} averages of {number(t.burst_random_resolution_hz, 3)} Hz needs "
         f"{number(t.burst_random_s / 60, 3)} minutes."
     )
-
-
-def _vector(direction: np.ndarray) -> str:
-    return "(" + ", ".join(f"{x:.3f}" for x in direction) + ")"

@@ -1,6 +1,7 @@
 """Numbers as an engineer writes them: four digits, SI prefixes, intervals in one unit."""
 
 import math
+from collections.abc import Sequence
 
 _PREFIX = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 _SCALED = ("Pa", "N/m", "N m", "N s/m")  # units that take a prefix in front
@@ -85,6 +86,27 @@ def percent(new: float | None, old: float | None) -> str:
         return _NONE
     change = 100 * (new / old - 1)
     return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
+
+
+def direction(vector: Sequence[float]) -> str:
+    """A unit vector: its axis where it is one.
+
+    >>> direction((0.0, 0.0, -1.0)), direction((0.6, 0.0, 0.8))
+    ('-Z', '0.60 0.00 0.80')
+    """
+    axis = max(range(3), key=lambda k: abs(vector[k]))
+    if abs(vector[axis]) > 1 - 1e-6:
+        return ("+" if vector[axis] > 0 else "-") + "XYZ"[axis]
+    return " ".join(f"{x:.2f}" for x in vector)
+
+
+def counted(n: int, one: str, many: str) -> str:
+    """A number and its noun, with the verb where one follows.
+
+    >>> counted(1, "thing is", "things are"), counted(0, "thing is", "things are")
+    ('1 thing is', '0 things are')
+    """
+    return f"{n} {one if n == 1 else many}"
 
 
 def _scale(value: float | None, unit: str) -> tuple[float, str]:

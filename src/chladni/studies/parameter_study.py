@@ -30,9 +30,10 @@ from .sample import StudyModel, computed
 from .sensitivity import Sensitivity, sensitivity, worth_telling
 from .study_settings import StudySettings
 from .study_store import OWN, StudyStore, opened_store, row_of
-from .variation import Variation, of_case, of_text, refuse_impossible
-from .varied_effects import effect_of, of_effect
-from .workers import affordable, results
+from .variation import Variation, of_case, of_parts, refuse_impossible
+from .varied_effects import of_effect
+from .vary_text import VaryText, vary_text
+from .workers import affordable, refuse_many, results
 
 RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
             "frf_real", "frf_imag", "channel_name")  # names in the NetCDF file  # fmt: skip
@@ -132,14 +133,15 @@ def study(
     Interrupted
         By Ctrl-C; the sentence says what is kept.
     """
-    if workers is not None and workers < 1:
-        raise FileError(f"workers = {workers}; at least one has to do it")
+    if workers is not None:
+        refuse_many(workers)
     settings = settings or StudySettings()
-    if isinstance(source, Case) and any(effect_of(text) == "suspension" for text in vary):
+    wanted = [vary_text(text) for text in vary]
+    if isinstance(source, Case) and any(asked.name == "suspension" for asked in wanted):
         source = replace(source, given=tuple(g for g in source.given if g[1] != "hangers"))  # used
     model = as_model(source, "study")
     case = source if isinstance(source, Case) else None
-    varied, notes = _varied(model, case, vary)
+    varied, notes = _varied(model, case, wanted)
     progress("the nominal model", 0.0)
     asked = _asked(model, case, varied, settings)
     own = np.array([v.nominal for v in varied])
@@ -159,7 +161,7 @@ def study(
         rows |= before
         clock = _Clock(len(X), len(before), progress)
         try:
-            many = workers or affordable(len(todo), nominal.seconds)
+            many = min(workers or affordable(len(todo), nominal.seconds), max(1, len(todo)))
             for result in results(asked, X, todo, many, scheduler):
                 values = dict(zip(names, X[result.number].tolist(), strict=True))
                 row = store.keep(result, values) if store else row_of(result, values)
@@ -180,16 +182,16 @@ def study(
 
 
 def _varied(
-    model: Model, case: Case | None, vary: Sequence[str]
+    model: Model, case: Case | None, vary: Sequence[VaryText]
 ) -> tuple[tuple[Variation, ...], list[str]]:
     """What is varied, and what the user should know of it."""
     notes: list[str] = []
     if vary:
         found = [
-            of_effect(text, model.assembly, case, model.units)
-            if effect_of(text)
-            else of_text(text, model.assembly, model.deck, model.units)
-            for text in vary
+            of_effect(asked, model.assembly, case, model.units)
+            if asked.is_effect
+            else of_parts(asked, model.assembly, model.deck, model.units)
+            for asked in vary
         ]
         if case is not None and case.parameters:
             notes = ["The [[parameter]] of the case are not used: --vary says what is varied."]

@@ -1,6 +1,5 @@
 """What a study varies: a number of the deck, between two values."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +16,10 @@ from ..io.nastran import Deck
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..units import Units
+from .vary_text import VaryText
 
 _SAME = 1e-9
-_FORM = re.compile(r"\s*([A-Za-z][\w-]*)(?:\s+of\s+(.+?))?\s*")
-_REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # joints are unknown by decades; of a sheet's t FARTHEST
+_REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # in the logarithm: joints are unknown by decades
 FARTHEST = 20.0  # times the deck's own value, or a part of it
 _SDS = 2.0  # prior standard deviations to either side, where a case gives no bounds
 
@@ -82,8 +81,10 @@ def of_case(
     return out, notes
 
 
-def of_text(text: str, assembly: Assembly, deck: Deck | None, units: Units | None) -> Variation:
-    """A range as `t of inner=0.6:0.8`, `E=90%:110%` or `K of PBUSH 7=10:1e4:log`.
+def of_parts(
+    asked: VaryText, assembly: Assembly, deck: Deck | None, units: Units | None
+) -> Variation:
+    """A number of parts over a range.
 
     Plain numbers are in the deck's own units, as they stand in its cards; per cent are of the
     deck's own value.
@@ -93,20 +94,16 @@ def of_text(text: str, assembly: Assembly, deck: Deck | None, units: Units | Non
     FileError, LabelError
         One sentence that names the text, what is wrong with it, and what there is.
     """
-    wanted, _, span = text.rpartition("=")
-    found = _FORM.fullmatch(wanted)
-    if not found:
-        raise FileError(
-            f'--vary {text!r} is not of the form "t of inner=0.6:0.8" or "E=90%:110%"; fields are '
-            f"{', '.join(FIELDS)}"
+    free = free_parameter(_section(asked, assembly), assembly, deck)
+    if asked.grid is not None or free.field not in FIELDS:
+        raise asked.refused(
+            f'{asked.name} is a number of parts; write "{asked.name} of PART=LOW:HIGH"'
+            if free.field in FIELDS
+            else f"{free.field} is an effect, which no part has"
         )
-    section = _section(text, found[1], found[2], assembly)
-    free = free_parameter(section, assembly, deck)
-    if free.field not in FIELDS:
-        raise FileError(f"--vary {text!r}: {free.field} is an effect, which no part has")
     nominal, unit = _nominal(assembly, free, units is not None)
-    low, high, log = _range(text, span, nominal, _scale(text, span, assembly, free, units))
-    return Variation(_called(free), free, nominal, low, high, unit, log)
+    low, high = _range(asked, nominal, _scale(asked, assembly, free, units))
+    return Variation(_called(free), free, nominal, low, high, unit, asked.log)
 
 
 class _Wish(TomlSection):
@@ -116,12 +113,12 @@ class _Wish(TomlSection):
         return f"{self.name} ({key})"
 
 
-def _section(text: str, field: str, parts: str | None, assembly: Assembly) -> TomlSection:
-    values: dict[str, Any] = {"field": field}
-    if parts is not None:
+def _section(asked: VaryText, assembly: Assembly) -> TomlSection:
+    values: dict[str, Any] = {"field": asked.name}
+    if (parts := asked.parts) is not None:
         whole = any(parts == p.name for p in assembly.parts)
         values["parts"] = [parts] if whole else [p.strip() for p in parts.split(",")]
-    return _Wish(Path("--vary"), f"--vary {text!r}", values, {}, 0)
+    return _Wish(Path("--vary"), f"--vary {asked.text!r}", values, {}, 0)
 
 
 def _called(free: FreeParameter) -> str:
@@ -148,20 +145,17 @@ def _turns(assembly: Assembly, free: FreeParameter) -> bool:
     return bool((springs > 3).any() or turned.any())
 
 
-def _scale(
-    text: str, span: str, assembly: Assembly, free: FreeParameter, units: Units | None
-) -> float:
+def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Units | None) -> float:
     """What a plain number is multiplied by; refused where there is no one value to stand for."""
-    plain = any("%" not in piece for piece in span.split(":")[:2])
     _, unit = _nominal(assembly, free, True)
-    if not plain or (units is None and unit != "of the deck's"):
+    if not asked.plain or (units is None and unit != "of the deck's"):
         return 1.0
     if free.field == "wall":
         return 1.0
     if unit == "of the deck's":
         values = np.unique(values_of(assembly, free))
-        raise FileError(
-            f"--vary {text!r}: {_called(free)} has {len(values)} different values in the deck; "
+        raise asked.refused(
+            f"{_called(free)} has {len(values)} different values in the deck; "
             "give a share of the deck's own, as 90%:110%, or vary one part at a time"
         )
     assert units is not None
@@ -172,35 +166,19 @@ def _scale(
     }.get(free.field, 1.0)
 
 
-def _range(text: str, span: str, nominal: float, scale: float) -> tuple[float, float, bool]:
-    """(low, high, sampled in the logarithm), in the unit of the nominal value."""
-    pieces = span.split(":")
-    log = len(pieces) == 3 and pieces[2].strip() == "log"
-    try:
-        low, high = (_number(p, nominal, scale) for p in pieces[: 2 if log else None])
-    except ValueError:
-        raise FileError(
-            f"--vary {text!r}: {span.strip()!r} is no range; write 0.6:0.8, 90%:110% or 1e2:1e6:log"
-        ) from None
-    if not 0 < low < high < np.inf:
-        raise FileError(f"--vary {text!r}: the range must increase and be above zero")
-    field = text.split("=")[0].split()[0]
-    reach = _REACH.get(field, FARTHEST)
+def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]:
+    """(low, high) in the unit of the nominal value; refused where it is far from that."""
+    low, high = asked.ends(scale, nominal)
+    reach = _REACH.get(asked.name, FARTHEST) if asked.log else FARTHEST
     for value in (low, high):
         if not 1 / reach <= value / nominal <= reach:
-            raise FileError(
-                f"--vary {text!r}: {value / scale:g} is {value / nominal:.3g} times the deck's own "
+            raise asked.refused(
+                f"{value / scale:g} is {value / nominal:.3g} times the deck's own "
                 f"{nominal / scale:g}; plain numbers are in the deck's own units, a share of its "
                 "value is written 90%:110%"
+                + ("" if asked.log or asked.name not in _REACH else ", decades 1e2:1e6:log")
             )
-    return low, high, log
-
-
-def _number(piece: str, nominal: float, scale: float) -> float:
-    piece = piece.strip()
-    if piece.endswith("%"):
-        return float(piece[:-1]) / 100 * nominal
-    return float(piece) * scale
+    return low, high
 
 
 def refuse_impossible(chosen: Sequence[Variation], assembly: Assembly) -> None:

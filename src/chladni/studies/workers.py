@@ -14,17 +14,41 @@ from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
+STARTS = 3  # tries to start local workers
+MOST = 4  # local processes a core
 WORTH = 10.0  # seconds of one process above which it pays to start others
 _AHEAD = 2  # samples per thread that are on the cluster at a time
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
+
+
+def cores() -> int:
+    """Of this machine, as many as this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def refuse_many(workers: int) -> None:
+    """Refuse numbers of local processes that are a slip.
+
+    Raises
+    ------
+    FileError
+        If there is none to do it, or there are more than ``MOST`` a core.
+    """
+    if workers < 1:
+        raise FileError(f"workers = {workers}; at least one has to do it")
+    if workers > MOST * cores():
+        raise FileError(
+            f"workers = {workers}; more than {MOST * cores()} gain nothing on {cores()} cores"
+        )
 
 
 def affordable(samples: int, seconds: float) -> int:
     """Local processes for so many samples of so many seconds each."""
     if samples * seconds < WORTH:
         return 1
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(1, min(cores or 1, samples))
+    return max(1, min(cores(), samples))
 
 
 def results(
@@ -50,7 +74,7 @@ def results(
 @contextmanager
 def _client(workers: int, scheduler: Any) -> Iterator[Any]:
     """A client of the scheduler, or of processes started for this study and ended with it."""
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     if isinstance(scheduler, Client):
         yield scheduler
@@ -60,14 +84,28 @@ def _client(workers: int, scheduler: Any) -> Iterator[Any]:
             with _connected(str(scheduler)) as client:
                 yield client
             return
-        with (
-            LocalCluster(
+        with _local_cluster(workers) as cluster, Client(cluster) as client:
+            yield client
+
+
+def _local_cluster(workers: int) -> Any:
+    """Processes of this machine; what ends one of them in its start is no reason to give up."""
+    from distributed import LocalCluster
+
+    for again in reversed(range(STARTS)):
+        try:
+            return LocalCluster(
                 n_workers=workers, threads_per_worker=1, dashboard_address=None,
                 silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster) as client,
-        ):  # fmt: skip
-            yield client
+            )  # fmt: skip
+        except (RuntimeError, OSError, TimeoutError) as error:
+            if not again:
+                why = " ".join(str(error.__cause__ or error).split())[:120]
+                raise FileError(
+                    f"{workers} local workers could not be started in {STARTS} tries ({why}); "
+                    "--workers 1 needs none"
+                ) from error
+    raise AssertionError
 
 
 @contextmanager

@@ -92,11 +92,16 @@ def _state(lam: np.ndarray, phi: np.ndarray) -> State:
 
 
 def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None) -> float | None:
-    """Q that the noise of the recording alone leaves; None where nothing is in use."""
+    """Q that the noise of the recording alone leaves; None where nothing is in use.
+
+    Of responses it is known to first order: where noise is as large as the response (1/ln² 10),
+    that says nothing, and neither does this.
+    """
     if isinstance(prepared.score, Poles):
         chosen = use if real is None else use & real
         variance = (prepared.score.sd[chosen] / LN10) ** 2
     else:
         assert prepared.noise is not None
         variance = prepared.noise[use]
-    return float(variance.mean()) if variance.size else None
+    Q = float(variance.mean()) if variance.size else np.inf
+    return Q if Q < LN10**-2 else None

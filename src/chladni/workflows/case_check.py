@@ -10,7 +10,7 @@ from ..errors import ChladniError, FileError
 from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
-from ..progress import Progress, silent
+from ..progress import Progress, silent, within
 from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model
@@ -86,12 +86,14 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     ]  # fmt: skip
     if not any(f.fault for f in findings):
         progress("the recording beside the model", 0.8)
-        findings += _correlated(case)
+        findings += _correlated(case, within(progress, 0.8, 1.0))
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 
 
-_NO_RECORDING = "none yet: modes, plan, render and study need none, all other commands do"
+_NO_RECORDING = (
+    "none yet: modes, frf, plan, bench, render and study need none, all other commands do"
+)
 
 
 def _facts(case: Case) -> list[tuple[str, str]]:
@@ -201,12 +203,12 @@ def _same(a: CheckedDof, b: CheckedDof) -> bool:
     return near and abs(float(np.dot(a.direction, b.direction))) > 1 - 1e-6
 
 
-def _correlated(case: Case) -> list[CaseFinding]:
+def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
     """What only shows when the recording is held against the model."""
     if not case.frfs:
         return []
     try:
-        screening = correlate(case).screening
+        screening = correlate(case, progress).screening
     except ChladniError as error:
         said = str(error).removeprefix(f"{case.path}: ")
         return [CaseFinding(said, "nothing can be fitted before", True)]

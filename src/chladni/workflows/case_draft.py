@@ -106,7 +106,7 @@ def draft(
     made = assembly(bare.deck, system)
     read = [r for path in recordings for r in _recordings(path, quantity)]
     read.sort(key=lambda r: (r.frf is None, r.poles is None))
-    dofs, notes = matched(made, read[0], read_sensors(table) if table else ()) if read else ([], [])
+    dofs, notes = matched(made, read[0] if read else None, read_sensors(table) if table else ())
     mass = float(mass_properties(made)[0])
     notes += [note for r in read for note in r.notes]
     notes += _far(dofs)
@@ -252,8 +252,11 @@ def _comment(text: str) -> list[str]:
 
 def _of_recordings(made: CaseDraft, name: object) -> list[str]:
     assert callable(name)
+    where = []
+    if made.dofs:
+        where = [*_comment(f"Found on the deck: {made.found}."), 'sensors = "sensors.csv"']
     if not made.read:
-        return ['# recordings = ["recording.uff"]  # universal file, .npz or .csv']
+        return ['# recordings = ["recording.uff"]  # universal file, .npz or .csv', *where]
     out = [f"recordings = [{', '.join(name(p) for p in made.recordings)}]"]
     for r in made.read:
         out += _comment(said_of(r))
@@ -262,10 +265,7 @@ def _of_recordings(made: CaseDraft, name: object) -> list[str]:
         out.append(f'quantity = "{made.quantity}"')
     elif frf is not None:
         out.append(f'# quantity = "{frf.quantity}"  # the file says so; only to overrule it')
-    if made.dofs:
-        out += _comment(f"Found on the deck: {made.found}.")
-        out.append('sensors = "sensors.csv"')
-    return out
+    return [*out, *where]
 
 
 def said_of(r: Recording) -> str:

@@ -15,7 +15,7 @@ from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import ModePairs, pair
 from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
-from ..errors import ChladniError, FileError
+from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
 from ..view.paired_shapes import PairedShapes
@@ -23,6 +23,7 @@ from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
 from .identify import firm
 from .output_only import with_natural_frequencies
+from .question_of_case import nothing_measured
 from .screening_of_case import screened_by_model
 from .unit_check import refuse_other_units
 
@@ -91,7 +92,8 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
         return replace(_by_poles(case, near), numbers=numbers)
-    progress("modes of the test", 0.4)
+    many = len(test.outputs) * len(test.inputs)
+    progress(f"modes of the test, {many} channels of {len(test.frequency)} lines", 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & found.inside)
@@ -156,14 +158,14 @@ def _f_max(case: Case, test: FRF | None) -> float:
         return float(test.frequency[-1])
     poles = [float(r.poles.frequency.max()) for r in case.recordings if r.poles is not None]
     if not poles:
-        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+        raise nothing_measured(case)
     return max(poles)
 
 
 def _by_poles(case: Case, near: ModalModel) -> Correlation:
     tables = [r.poles for r in case.recordings if r.poles is not None]
     if not tables:
-        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+        raise nothing_measured(case)
     poles = tables[0]
     f = poles.of(poles.states[0]).frequency
     return Correlation((), (), None, f, near.frequency, None, pair(near.frequency, f),

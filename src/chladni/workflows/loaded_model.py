@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from ..io.nastran import Deck
 
 
+LEAST = 7  # modes; with them six rigid motions of a free structure are told from the first elastic
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """An assembly with its matrices, made when first asked for."""

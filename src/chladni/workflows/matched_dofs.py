@@ -45,17 +45,19 @@ class MatchedDof:
 
 
 def matched(
-    made: Assembly, recording: Recording, table: Sequence[Sensor] = ()
+    made: Assembly, recording: Recording | None, table: Sequence[Sensor] = ()
 ) -> tuple[list[MatchedDof], list[str]]:
     """Every dof of a recording's FRFs on the deck, and sentences on what was assumed.
+
+    Without FRFs (of a test that is still to come) those of the table.
 
     Parameters
     ----------
     made : the deck in SI
     table : rows of a table of sensors (of ``chladni plan``, say), which go before all else
     """
-    if recording.frf is None:
-        return [], []
+    if recording is None or recording.frf is None:
+        return [_of_table(s) for s in table], []
     size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
     unit, scale = _scale(made, recording, size)
     notes = []

@@ -8,7 +8,7 @@ from ..case import Case
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..fem.energy import mass_properties, part_energies
 from ..progress import Progress, silent
-from .loaded_model import Model, as_model
+from .loaded_model import LEAST, Model, as_model
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +45,10 @@ def modes(source: Case | Model, count: int = 20, progress: Progress = silent) ->
     structure = model.structure
     size = len(structure.system.dofs)
     progress(f"modes of {size} degrees of freedom", 0.2)
-    modal = model.modes(count)
+    whole = model.modes(max(count, LEAST))
+    modal, still = whole.sel(slice(count)), rigid_modes(whole)
     progress("energies", 0.8)
-    phi, rigid = modal.shapes, rigid_modes(modal)
+    phi, rigid = modal.shapes, still[:count]
     mass, centre = mass_properties(model.assembly)
     return NormalModes(
         modal,
@@ -58,15 +59,14 @@ def modes(source: Case | Model, count: int = 20, progress: Progress = silent) ->
         np.where(rigid, np.nan, part_energies(structure, phi)),
         tuple((part.name, part.id) for part in model.assembly.parts),
         bool(model.unit),
-        (*model.notes, *_notes(model, modal, count, size)),
+        (*model.notes, *_notes(model, modal, count, int(still.sum()))),
     )
 
 
-def _notes(model: Model, modal: ModalModel, count: int, size: int) -> list[str]:
-    notes = []
+def _notes(model: Model, modal: ModalModel, count: int, rigid: int) -> list[str]:
+    notes, size = [], len(model.structure.system.dofs)
     if len(modal) < count:
         notes.append(f"The model has {len(modal)} modes, {count} were asked for.")
-    rigid = int(rigid_modes(modal).sum())
     notes.append(f"{size} degrees of freedom are free; {rigid} modes are rigid motions.")
     if not model.unit:
         notes.append(

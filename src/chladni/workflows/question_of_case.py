@@ -13,6 +13,16 @@ from ..updating.question import OtherRecording, Prepared, Question
 from .unit_check import refuse_other_units
 
 
+def nothing_measured(case: Case) -> FileError:
+    """The sentence on a case that holds nothing a model could be compared with."""
+    if not case.recordings:
+        return FileError(
+            f"{case.path} names no recording to compare the model with; give it as recordings = "
+            '["recording.uff"] under [test]'
+        )
+    return FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+
+
 def question(case: Case) -> Question:
     """The question of a case.
 
@@ -25,7 +35,7 @@ def question(case: Case) -> Question:
     frfs = case.frfs
     poles = [r.poles for r in case.recordings if r.poles is not None]
     if not frfs and not poles:
-        raise FileError(f"{case.path}: the recordings hold neither FRFs nor a table of poles")
+        raise nothing_measured(case)
     asked = Question(
         case.assembly,
         case.outputs,

@@ -20,6 +20,7 @@ from ..bench.bench_recording import (
 from ..bench.bench_rig import BenchRig, BenchSetup, bench_rig
 from ..bench.cords import cords_for
 from ..bench.drive_signals import Kind
+from ..bench.front_end import sampling_rate
 from ..bench.sine_schedule import SineLine, dwells_of, stages_for
 from ..bench.sine_sweep import swept
 from ..case import Case
@@ -30,6 +31,7 @@ from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.refine import refined
 from ..geometry.sampling import nearest_points
+from ..io.file_size import OVERRIDE, most_gigabytes
 from ..progress import Progress, silent, within
 from .benched_article import benched, true_places
 from .loaded_model import as_model
@@ -174,6 +176,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     rng = np.random.default_rng([settings.seed, 7])
     progress("modes", 0.0)
     band = settings.band or _band(case)
+    _refuse_long(settings, band, 1 + len(case.outputs.labels))
     setup = BenchSetup(rubber=settings.rubber, room=settings.room)
     if settings.excitation == "hammer" or case.inputs.base[0]:
         setup = replace(setup, shaker=None)
@@ -215,6 +218,22 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
         _tapped(case, settings, mass), tuple(_notes(case, settings, recordings)),
     )  # fmt: skip
+
+
+def _refuse_long(settings: BenchSettings, band: tuple[float, float], channels: int) -> None:
+    """Refuse blocks of time data that no memory holds, with the resolution that would do."""
+    if settings.excitation not in ("burst-random", "multisine"):
+        return
+    rate, limit = sampling_rate(band[1]), most_gigabytes()
+    samples = rate / settings.resolution * settings.averages * channels
+    if (gigabytes := 8e-9 * samples) > limit:
+        raise FileError(
+            f"{settings.averages} blocks of {1 / settings.resolution:g} s at {rate:g} samples a "
+            f"second on {channels} channels are {gigabytes:.3g} GB of time data, more than the "
+            f"{limit:g} GB that are kept: take lines of --resolution "
+            f"{settings.resolution * gigabytes / limit:.2g} Hz or a band below {band[1]:g} Hz; "
+            f"{OVERRIDE}={int(gigabytes) + 1} in the environment allows it"
+        )
 
 
 def _tapped(case: Case, settings: BenchSettings, mass: float) -> tuple[float, ...]:

@@ -237,15 +237,15 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         return _timed(path, read_time_npz(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
         raise FileError(f"{path.name}: no array {', '.join(missing)}; there are {named(arrays)}")
-    quantity = quantity or (str(arrays["quantity"]) if "quantity" in arrays else None)
+    quantity = quantity or (_word(path, arrays, "quantity") if "quantity" in arrays else None)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
     frf = _frf(
         path.name,
         _numbers(path, arrays, "values", "biufc").astype(complex),
         _numbers(path, arrays, "frequency_hz").astype(float),
-        [str(o) for o in np.atleast_1d(arrays["outputs"])],
-        [str(i) for i in np.atleast_1d(arrays["inputs"])],
+        _words(path, arrays, "outputs"),
+        _words(path, arrays, "inputs"),
         quantity,
         **{
             name: _numbers(path, arrays, name).astype(float)
@@ -258,7 +258,8 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         if (found := _numbers(path, arrays, "level")).size != 1:
             raise FileError(f"{path.name}: level holds {found.size} values; it is one number")
         level = float(found.reshape(-1)[0])
-    return Recording(path.name, frf, level=level, article=str(arrays.get("article", "")))
+    article = _word(path, arrays, "article") if "article" in arrays else ""
+    return Recording(path.name, frf, level=level, article=article)
 
 
 _DAMAGED = (
@@ -286,6 +287,25 @@ def _numbers(
         kind = "records" if arrays[name].dtype.names else str(arrays[name].dtype)
         raise FileError(f"{path.name}: {name} holds {kind}, not numbers")
     return arrays[name]
+
+
+def _words(path: Path, arrays: dict[str, np.ndarray], name: str) -> list[str]:
+    """An array of texts in a row; bytes are read as UTF-8, numbers as they are written."""
+    found = np.atleast_1d(arrays[name])
+    if found.ndim != 1 or found.dtype.names:
+        kind = "records" if found.dtype.names else f"an array of {found.ndim} dimensions"
+        raise FileError(f"{path.name}: {name} holds {kind}, not a row of texts")
+    if found.dtype.kind == "S":
+        found = np.char.decode(found, "utf-8", "replace")
+    return [str(text) for text in found]
+
+
+def _word(path: Path, arrays: dict[str, np.ndarray], name: str) -> str:
+    """A single text, alone or as the only one of a row."""
+    found = _words(path, arrays, name)
+    if len(found) != 1:
+        raise FileError(f"{path.name}: {name} holds {len(found)} texts; it is one")
+    return found[0]
 
 
 def read_poles(path: str | Path) -> PoleTable:

@@ -280,7 +280,8 @@ def _regular(F: np.ndarray) -> np.ndarray:
     if np.any(eigenvalues[..., 0] <= 1e-14 * eigenvalues[..., -1]):
         raise ShapeError(
             f"the candidates cannot tell the {F.shape[-1]} modes apart: the information matrix is "
-            "singular (two modes look alike at them, or one is not seen at all)"
+            "singular (two modes look alike at them, or one is not seen at all); ask for fewer "
+            "modes, or give more places"
         )
     return F
 
