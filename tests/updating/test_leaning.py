@@ -21,7 +21,7 @@ def fitted(text, away):
 def test_adhesive_that_took_more_than_it_scatters_is_told(sign):
     assert strained(fitted("adhesive", 0.9 * FAR * sign)) == []
     (said,) = strained(fitted("adhesive", 1.2 * FAR * sign))
-    assert f"{np.exp(1.2 * FAR * sign * ADHESIVE):.2g} of the deck's" in said
+    assert f"{np.exp(1.2 * FAR * sign * ADHESIVE):.2g} times the deck's" in said
     assert "3.6 standard deviations" in said
 
 

@@ -16,6 +16,7 @@ class CalibratedFamily(ModelFamily):
     claim = "joints of a kind are far stiffer or softer than the deck has them"
     kind = "ordinary"
     writable = True
+    called = "stiffness, times the deck's"
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The deck with the factor in it."""

@@ -54,7 +54,7 @@ def is_strained(effect: Effect, x: np.ndarray) -> TypeGuard[ModelFamily]:
 
 def _more(family: Effect, x: np.ndarray) -> str:
     return (
-        f"the stiffness of {family.text} as a whole ended at {np.exp(x[0]):.2g} of the deck's, "
+        f"the stiffness of {family.text} as a whole ended at {np.exp(x[0]):.2g} times the deck's, "
         f"{_away(family, x):.2g} standard deviations of what it may be by itself: it may be what "
         "is wrong"
     )
