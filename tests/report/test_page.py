@@ -10,8 +10,9 @@ from chladni.errors import FileError
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
 from chladni.report.diagnosis_json import diagnosis_json, from_json
 from chladni.report.page import write_page, write_sections
+from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
-from chladni.report.verdict import HEADING, sentence
+from chladni.report.verdict import HEADING
 from chladni.updating.result import FrequencyError
 from chladni.view import plots
 from chladni.workflows.diagnosis_result import StateResult

@@ -177,7 +177,8 @@ def diagnosed(
         After all is written, if the result is not to be trusted.
     """
     from ..report.diagnosis_folder import write_diagnosis
-    from ..report.verdict import sections, sentence
+    from ..report.sentence import sentence
+    from ..report.verdict import sections
 
     with started(command, source, out) as job:
         case = opened(source)

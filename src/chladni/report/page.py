@@ -13,7 +13,8 @@ from urllib.parse import quote
 from ..output import own_version, write_text
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Picture, Section
-from .verdict import HEADING, TONE, sections, sentence
+from .sentence import sentence
+from .verdict import HEADING, TONE, sections
 
 _TEMPLATES = Path(__file__).parent / "templates"
 

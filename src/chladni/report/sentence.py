@@ -1,0 +1,108 @@
+"""The verdict of a diagnosis in one sentence."""
+
+from collections.abc import Sequence
+
+from ..effects.registry import families
+from ..updating.result import Agreement, NamedEffect, Scores
+from ..workflows.diagnosis_result import DiagnosisResult
+from .words import number
+
+
+def sentence(result: DiagnosisResult) -> str:
+    """The verdict in words; of several states one sentence each."""
+    if not result.states:
+        return _sentence(result)
+    return " ".join(f"{s.name or 'The first state'}: {_sentence(s.result)}" for s in result.states)
+
+
+def _sentence(result: DiagnosisResult) -> str:
+    """The verdict in one sentence."""
+    verdict, gain = result.verdict, _gain(result.agreement)
+    what = _each(result.effects)
+    if verdict == "missing physics":
+        return f"{'; and '.join(_lacks(result))}{'' if result.one_of else gain}."
+    if verdict == "measurement fault" and result.one_of:
+        return f"Recording or model is at fault; the data cannot tell which: {_tied(result)}."
+    if verdict == "measurement fault":
+        return f"The recording is at fault, not the model: {what}{gain}."
+    if verdict == "nonlinear":
+        signs = ", ".join(dict.fromkeys(t.signature for t in result.levels if t.sentence))
+        why = what or signs or "no linear model fits"
+        return f"The structure does not answer in proportion to the force: {why}."
+    if not result.searched and not result.effects:
+        return f"Ordinary parameters were calibrated; missing physics was not looked for{gain}."
+    if verdict in ("calibration only", "nothing missing") and result.one_of:
+        better = " or ".join(result.one_of[0][1:])
+        return (
+            f"Nothing is named; {better} would explain the recording better than calibration "
+            f"alone, but not by enough to be sure of either{gain}."
+        )
+    if verdict in ("calibration only", "nothing missing") and result.distrust:
+        known = "Ordinary parameters explain the recording" * (verdict == "calibration only")
+        return (
+            f"{known or 'Nothing is named'}, but that no physics is missing is not to be "
+            f"trusted{gain}."
+        )
+    if verdict == "calibration only":
+        return f"Ordinary parameters explain the recording; no physics is missing{gain}."
+    if verdict == "nothing missing":
+        return f"Model and recording agree within what repeats and dispersion allow{_off(result)}."
+    if verdict == "not in catalogue" and result.one_of:
+        return f"Nothing is named; the data cannot tell apart {', '.join(result.one_of[0])}."
+    if verdict == "not in catalogue":
+        near = f": {what}" if what else ""
+        return f"Something is missing that the catalogue does not hold{near}."
+    return verdict
+
+
+def _off(result: DiagnosisResult) -> str:
+    """How far they are apart, for a mesh may be allowed much."""
+    error = result.frequency_error
+    if error is None or error.before is None:
+        return ""
+    return f", which is {number(error.before, 2)} % of the frequencies (rms)"
+
+
+def _each(effects: Sequence[NamedEffect]) -> str:
+    """Effects with what they claim and where."""
+    words = []
+    for e in effects:
+        claim, place = f" ({e.claim})" * bool(e.claim), f", {e.where.text}" * bool(e.where.text)
+        words.append(f"{e.name}{claim}{place}")
+    return "; and ".join(words)
+
+
+def _lacks(result: DiagnosisResult) -> list[str]:
+    """What the model lacks, what is one of several, and which channel is at fault beside it."""
+    tied = result.one_of[0] if result.one_of else ()
+    one = next((e for e in reversed(result.effects) if e.name in tied), None)
+    sure = [e for e in result.effects if e is not one]
+    of_test = {known.name for known in families() if known.effect.kind == "test"}
+    faults = [e for e in sure if e.name in of_test]
+    physics = [e for e in sure if e.name not in of_test]
+    words = [f"The model lacks {_each(physics)}"] if physics or not (tied or faults) else []
+    if tied:
+        begun = "one of" if physics else "The model lacks one of"
+        words.append(f"{begun} these, which the data cannot tell apart: {_tied(result)}")
+    return [*words, f"the recording is at fault as well: {_each(faults)}"] if faults else words
+
+
+def _tied(result: DiagnosisResult) -> str:
+    """What is tied, most probable first; the measurement that would settle it comes last."""
+    known = {e.name for e in result.effects} | {a.name for a in result.alternatives}
+    names = [name for name in result.one_of[0] if name in known]
+    checks = [word for word in result.one_of[0] if word not in known]
+    return ", ".join(names) + "".join(f"; to settle it, {check}" for check in checks)
+
+
+def _gain(agreement: Agreement | None) -> str:
+    held = Scores() if agreement is None else agreement.held_out
+    if not held.nominal or held.after is None:
+        return ""
+    mesh, said = held.with_mesh_error, ""
+    if mesh is not None and mesh < held.nominal < held.after:
+        said = f", and to {number(mesh, 3)} with the error of its mesh, which no deck holds"
+    return (
+        f"; on data the fit never saw the deviation Q goes from {number(held.nominal, 3)} "
+        f"to {number(held.after, 3)}{said}"
+    )
