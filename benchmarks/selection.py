@@ -40,9 +40,8 @@ def by_score(env: ParameterSelectionEnv) -> np.ndarray:
 
 def of_all_pairs(env: ParameterSelectionEnv) -> np.ndarray:
     """The best of all sets of one and two beside the ordinary parameters."""
-    own = env.p - len(env.catalogue.candidates)
-    base = np.arange(env.p) < own
-    every = [(k,) for k in range(own, env.p)] + list(combinations(range(own, env.p), 2))
+    base = np.arange(env.p) < env.own
+    every = [(k,) for k in range(env.own, env.p)] + list(combinations(range(env.own, env.p), 2))
     return _with(base, max(every, key=lambda chosen: env.score_of(_with(base, chosen))))
 
 
@@ -67,7 +66,6 @@ def rows(path: str) -> list[str]:
     """The lines of one case."""
     env = ParameterSelectionEnv(case=path, effects=True)
     env.reset()
-    own = env.p - len(env.catalogue.candidates)
     ways = {
         f"random, best of {EPISODES}": at_random,
         "largest share of the misfit": lambda env: played(env, agents.held_back()),
@@ -78,7 +76,7 @@ def rows(path: str) -> list[str]:
     for name, way in ways.items():
         seconds, kept = timed(lambda way=way: way(env), 1)
         fitting, gain = timed(lambda kept=kept: env.gain(kept), 1)
-        effects = [env.names[k] for k in np.flatnonzero(kept) if k >= own]
+        effects = [env.names[k] for k in np.flatnonzero(kept) if k >= env.own]
         said = ", ".join(effects) if len(effects) < 4 else f"{len(effects)} effects"
         out.append(f"| {name} | {said or 'none'} | {gain:.0f} | {seconds + fitting:.1f} |")
     seconds, found = timed(lambda: diagnose(env.catalogue.problem), 1)

@@ -10,6 +10,7 @@ from chladni.errors import ModelError
 from chladni.planning import Linearised
 from chladni.updating.candidates import candidates
 from chladni.updating.diagnosis import threshold, without_effects
+from chladni.updating.discrepancy import Discrepancy
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem
 from chladni.updating.likelihood import Responses
 from chladni.updating.question import Prepared
@@ -63,8 +64,11 @@ class CatalogueChoices:
         J, H = J * sd, H * sd
         steps = [self._changes(c, (fitted, unseen), x) for c in self.candidates]
         more = [np.array([s[k] for s in steps]).T for k in (0, 1)]
-        r, *columns = _without(J[:, own:], r, np.hstack([J[:, :own], more[0] - r[:, None]]))
-        return Linearised(r, columns[0], h, np.hstack([H[:, :own], more[1] - h[:, None]]))
+        free, spread, _ = np.linalg.svd(J[:, own:], full_matrices=False)
+        nuisances = Discrepancy(free, spread**2, 1.0)
+        J = nuisances.whitened(np.hstack([J[:, :own], more[0] - r[:, None]]))
+        H = np.hstack([H[:, :own], more[1] - h[:, None]])
+        return Linearised(nuisances.whitened(r), J, h, H)
 
     def _changes(
         self, candidate: Candidate, data: Iterable[Responses], x: np.ndarray
@@ -109,10 +113,3 @@ def catalogue_choices(prepared: Prepared) -> CatalogueChoices:
     """The choices of a case that was made ready for updating."""
     problem, null = without_effects(prepared.problem)
     return CatalogueChoices(problem, null, tuple(candidates(problem, null)))
-
-
-def _without(nuisance: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    """(I + J Jᵀ)^-½ times each array (n, ...): slopes J (n, k) of what is free at unit spread."""
-    U, s, _ = np.linalg.svd(nuisance, full_matrices=False)
-    less = 1 - 1 / np.sqrt(1 + s**2)
-    return tuple(a - (U * less) @ (U.T @ a) for a in arrays)

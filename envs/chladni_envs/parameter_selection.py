@@ -70,6 +70,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
             raise ShapeError("effects of the catalogue are those of a case; give case= a folder")
         self.given, self.cost, self.render_mode = problem, cost, render_mode
         self.p = len(problem) if problem is not None else p
+        self.own = self.p - (len(self.catalogue.candidates) if self.catalogue else 0)  # ordinary
         self.action_space = gym.spaces.Discrete(self.p + 1)
         self.observation_space = gym.spaces.Box(-1.0, 1.0, (4, self.p), dtype=np.float64)
 
@@ -113,8 +114,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
             raise ShapeError(
                 "nothing of the catalogue is here to be fitted; make it with effects=True"
             )
-        own = self.p - len(self.catalogue.candidates)
-        return self.catalogue.gain(np.flatnonzero(kept[own:]).tolist())
+        return self.catalogue.gain(np.flatnonzero(kept[self.own :]).tolist())
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Estimates of the parameters as bars (height, width, 3) uint8."""
