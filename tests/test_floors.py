@@ -18,7 +18,7 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_evidence": ROOT / "src",
     "chladni_envs": ROOT / "envs",
 }
-GROUND = {"errors", "arrays", "dofs", "units", "output", "progress"}
+GROUND = {"errors", "arrays", "dofs", "units", "output", "progress", "side_by_side"}
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
     "model": GROUND,
@@ -46,6 +46,7 @@ MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_sp
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},
+    "side_by_side": {"threadpoolctl"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
     "io": {"meshio", "pyyeti", "pyuff", "trimesh", "xarray"},

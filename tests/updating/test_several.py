@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni import side_by_side
 from chladni.effects import point_mass, sensor_mass
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
@@ -117,6 +118,13 @@ def found(two):
         patch.setattr(scanned, "families", lambda: FEW)
         singles = singles_of(two)
         return singles, several(two, singles, DUE, False)
+
+
+def test_candidates_side_by_side_end_where_they_end_one_after_the_other(two, found, monkeypatch):
+    monkeypatch.setattr(side_by_side, "threads", lambda: 3)
+    for one, other in zip(singles_of(two), found[0], strict=True):
+        assert one.effects[0].text == other.effects[0].text
+        np.testing.assert_allclose(one.fit.x, other.fit.x, rtol=1e-9, atol=1e-12)
 
 
 def test_two_lumps_are_two_each_at_its_place(found):

@@ -1,7 +1,6 @@
 """Samples on this process, on local processes, or on the workers of any Dask cluster."""
 
 import logging
-import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
+from ..side_by_side import cores
 from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory
 
@@ -19,13 +19,6 @@ MOST = 4  # local processes a core
 WORTH = 10.0  # seconds of one process above which it pays to start others
 _AHEAD = 2  # samples per thread that are on the cluster at a time
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
-
-
-def cores() -> int:
-    """Of this machine, as many as this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def refuse_many(workers: int) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
 from ..effects.surroundings import ElementGrids, Surroundings
 from ..errors import ModelError
+from ..side_by_side import side_by_side
 from .fastener_scan import Loosened, fastener_scores, loosened
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
@@ -39,12 +41,12 @@ def candidates(
     ----------
     most : so many of them alone, those that score best where they begin
     """
-    context, found = UpdatingContext(problem, null), [e for e, _ in problem.found]
+    context, found = UpdatingContext(problem, null).ready(), [e for e, _ in problem.found]
     free = {e.text for e in problem.base if e not in found}  # by the user: in every fit already
     every = [
         c
-        for family in families()
-        for c in family.proposed(context)
+        for proposed in side_by_side(lambda family: family.proposed(context), families())
+        for c in proposed
         if c.effect.text not in free and not repeats(problem, c.effect, c.start)
     ]
     return every if most is None else _leading(context, every, most)
@@ -152,6 +154,12 @@ class UpdatingContext:
     def loosened(self) -> tuple[Loosened, ...]:
         """Welds and fasteners with what the sheets give where they are loaded."""
         return loosened(self.problem.reduced)
+
+    def ready(self) -> Self:
+        """The same, with what most families ask for made before they ask side by side."""
+        if self.scan is not None:
+            _ = self.baselines, self.scan.flexibility, self.loosened
+        return self
 
     @property
     def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:

@@ -14,6 +14,8 @@ from ..effects.effect import Effect
 from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
+from ..side_by_side import side_by_side
+from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
@@ -42,19 +44,22 @@ def search_round(
     hypotheses: list[HypothesisFit] = []
     later = least is not None  # the bases of the first round are still there
     whole, running = (LATER, LATER) if later else (WHOLE, RUNNING)
-    for k, c in enumerate(tried):
-        progress(f"trying {c.effect.name} {c.effect.text}", 0.8 * k / len(tried))
-        fits = _tried(problem, null, c.effect, c.start, c.base)
+    progress(f"trying {len(tried)} candidates", 0.0)
+    every = side_by_side(lambda c: _tried(problem, null, c.effect, c.start, c.base), tried)
+    for k, (c, fits) in enumerate(zip(tried, every, strict=True)):
+        progress(f"tried {c.effect.name} {c.effect.text}", 0.8 * (k + 1) / len(tried))
         hypotheses = _lighter(problem, by_family([*hypotheses, *fits]), whole)
+        give_back_freed_memory()
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses, null.neg2_log_evidence)
     progress("closing in on the place", 0.8)
     ahead, rest = hypotheses[:running], hypotheses[running:]
-    finished = [_finished(problem, t, True) for t in ahead]
+    finished = list(side_by_side(lambda t: _finished(problem, t, True), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
-    closer = [t for lead in hypotheses[:running] for t in _closer(problem, null, lead)]
-    return simplest_first(by_family([*hypotheses, *closer]), null.neg2_log_evidence)
+    closer = side_by_side(lambda t: _closer(problem, null, t), hypotheses[:running])
+    best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
+    return simplest_first(best, null.neg2_log_evidence)
 
 
 def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:

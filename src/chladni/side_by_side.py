@@ -1,0 +1,78 @@
+"""Independent work on all cores of a machine, in threads: arrays are shared and nothing is copied.
+
+numpy, scipy and BLAS let other threads work while they do, and most of the time is spent there.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+A = TypeVar("A")
+B = TypeVar("B")
+
+MOST = 4  # at once: each has matrices of its own
+
+
+def cores() -> int:
+    """Of this machine, as many as this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def threads() -> int:
+    """As many as there are cores, four at most; fewer where OMP_NUM_THREADS says so.
+
+    That variable is where users and batch systems say how many cores a process may keep busy.
+    """
+    said = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
+    most = int(said) if said.isdecimal() and int(said) else MOST
+    return min(cores(), most, MOST)
+
+
+def side_by_side(
+    work: Callable[[A], B], items: Iterable[A], at_once: int | None = None
+) -> Iterator[B]:
+    """``work`` of each item, in their order; no more than one result for each thread waits.
+
+    What ``work`` raises is raised here, once what has begun is done. ``at_once`` threads, or as
+    many as :func:`threads` says; with one, the thread that asks does it all. Meanwhile BLAS has one
+    thread for each.
+
+    >>> list(side_by_side(abs, [-1, 2, -3], 2))
+    [1, 2, 3]
+    """
+    count = threads() if at_once is None else at_once
+    if count < 2:
+        yield from map(work, items)
+        return
+    pool = ThreadPoolExecutor(count)
+    begun: deque[Future[B]] = deque()
+    with threadpool_limits(1):
+        try:
+            for item in items:
+                begun.append(pool.submit(copy_context().run, work, item))
+                if len(begun) > count:
+                    yield begun.popleft().result()
+            while begun:
+                yield begun.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def together(first: Callable[[], A], second: Callable[[], B]) -> tuple[A, B]:
+    """Two pieces of work that wait for nothing of each other; if both fail, the first speaks.
+
+    >>> together(lambda: "a", lambda: 1)
+    ('a', 1)
+    """
+    if threads() < 2:
+        return first(), second()
+    with threadpool_limits(1), ThreadPoolExecutor(1) as pool:
+        beside = pool.submit(copy_context().run, second)
+        return first(), beside.result()

@@ -1,0 +1,85 @@
+"""Work in threads: the order kept, few results at once, faults said, the answer what it was."""
+
+import warnings
+from threading import Barrier, get_ident
+
+import numpy as np
+import pytest
+
+from chladni import side_by_side as module
+from chladni.errors import ModelError
+from chladni.side_by_side import cores, side_by_side, threads, together
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 3])
+def test_results_come_in_order_and_few_wait(at_once):
+    begun = []
+
+    def work(k):
+        begun.append(k)
+        return k**2
+
+    for taken, square in enumerate(side_by_side(work, range(20), at_once)):
+        assert square == taken**2
+        assert len(begun) <= taken + 1 + at_once
+    assert sorted(begun) == list(range(20))
+
+
+def test_two_are_at_work_at_the_same_time():
+    """Each waits for the other: one after the other they would never end."""
+    met = Barrier(2, timeout=30)
+    assert set(side_by_side(lambda k: met.wait(), range(2), 2)) == {0, 1}
+
+
+def test_a_fault_is_raised_where_it_is_asked_for_and_the_rest_is_not_begun():
+    begun = []
+
+    def work(k):
+        begun.append(k)
+        if k == 1:
+            raise ModelError("the second")
+        return k
+
+    done = side_by_side(work, range(50), 2)
+    assert next(done) == 0
+    with pytest.raises(ModelError, match="the second"):
+        list(done)
+    assert len(begun) < 10
+
+
+def test_what_is_said_of_rounding_holds_in_threads():
+    with warnings.catch_warnings(), np.errstate(divide="ignore"):
+        warnings.simplefilter("error")
+        assert list(side_by_side(lambda x: np.log(x), np.zeros(4), 2)) == [-np.inf] * 4
+
+
+def test_two_pieces_are_done_together(monkeypatch):
+    for count in (1, 2):
+        monkeypatch.setattr(module, "threads", lambda n=count: n)
+        (a, here), (b, there) = together(lambda: ("a", get_ident()), lambda: ("b", get_ident()))
+        assert (a, b, here != there) == ("a", "b", count == 2)
+
+
+def test_the_first_of_two_faults_speaks(monkeypatch):
+    monkeypatch.setattr(module, "threads", lambda: 2)
+
+    def fails(word):
+        raise ModelError(word)
+
+    with pytest.raises(ModelError, match="one"):
+        together(lambda: fails("one"), lambda: fails("other"))
+    with pytest.raises(ModelError, match="other"):
+        together(lambda: 1, lambda: fails("other"))
+
+
+def test_as_many_threads_as_the_user_allows(monkeypatch):
+    monkeypatch.setattr(module, "cores", lambda: 8)
+    for said, count in (("1", 1), ("3", 3), ("3,2", 3), ("64", 4), ("", 4), ("0", 4), ("many", 4)):
+        monkeypatch.setenv("OMP_NUM_THREADS", said)
+        assert threads() == count
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    assert threads() == 4
+    monkeypatch.setattr(module, "cores", lambda: 2)
+    assert threads() == 2
+    monkeypatch.undo()
+    assert cores() >= 1
