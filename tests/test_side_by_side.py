@@ -1,14 +1,14 @@
 """Work in threads: the order kept, few results at once, faults said, the answer what it was."""
 
 import warnings
-from threading import Barrier, get_ident
+from threading import Barrier
 
 import numpy as np
 import pytest
 
 from chladni import side_by_side as module
 from chladni.errors import ModelError
-from chladni.side_by_side import cores, side_by_side, threads, together
+from chladni.side_by_side import cores, side_by_side, threads
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 3])
@@ -51,25 +51,6 @@ def test_what_is_said_of_rounding_holds_in_threads():
     with warnings.catch_warnings(), np.errstate(divide="ignore"):
         warnings.simplefilter("error")
         assert list(side_by_side(lambda x: np.log(x), np.zeros(4), 2)) == [-np.inf] * 4
-
-
-def test_two_pieces_are_done_together(monkeypatch):
-    for count in (1, 2):
-        monkeypatch.setattr(module, "threads", lambda n=count: n)
-        (a, here), (b, there) = together(lambda: ("a", get_ident()), lambda: ("b", get_ident()))
-        assert (a, b, here != there) == ("a", "b", count == 2)
-
-
-def test_the_first_of_two_faults_speaks(monkeypatch):
-    monkeypatch.setattr(module, "threads", lambda: 2)
-
-    def fails(word):
-        raise ModelError(word)
-
-    with pytest.raises(ModelError, match="one"):
-        together(lambda: fails("one"), lambda: fails("other"))
-    with pytest.raises(ModelError, match="other"):
-        together(lambda: 1, lambda: fails("other"))
 
 
 def test_as_many_threads_as_the_user_allows(monkeypatch):

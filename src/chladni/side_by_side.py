@@ -1,6 +1,7 @@
 """Independent work on all cores of a machine, in threads: arrays are shared and nothing is copied.
 
-numpy, scipy and BLAS let other threads work while they do, and most of the time is spent there.
+Products of numpy let other threads work while they do; what scipy wraps of LAPACK does not, so that
+factorisations and their solves gain nothing here.
 """
 
 import os
@@ -63,16 +64,3 @@ def side_by_side(
                 yield begun.popleft().result()
         finally:
             pool.shutdown(cancel_futures=True)
-
-
-def together(first: Callable[[], A], second: Callable[[], B]) -> tuple[A, B]:
-    """Two pieces of work that wait for nothing of each other; if both fail, the first speaks.
-
-    >>> together(lambda: "a", lambda: 1)
-    ('a', 1)
-    """
-    if threads() < 2:
-        return first(), second()
-    with threadpool_limits(1), ThreadPoolExecutor(1) as pool:
-        beside = pool.submit(copy_context().run, second)
-        return first(), beside.result()

@@ -10,7 +10,6 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
-from ..side_by_side import together
 from ..sparse.dissection import Fronts, analyse, pattern
 from ..sparse.factor import Backend, Factor, factorise, inertia
 from ..sparse.lanczos import Ritz, block_lanczos
@@ -264,15 +263,12 @@ def _sparse(
     problem: _Problem, count: int | None, limit: float, shift: float | None, proof: bool
 ) -> Modes:
     """The ``count`` lowest modes, or 20, those beyond ``limit`` not cared for."""
-    sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
-    due, first = None, None
-    if count is None and sigma is not None and np.isfinite(limit):
-        due, first = _counted_beside(problem, limit, sigma)
+    due = problem.below(limit) if count is None and np.isfinite(limit) else None
     k = count or 20 if due is None else due
     if k == 0:
         return np.zeros(0), np.zeros((len(problem.dofs), 0))
-    sigma, factor, ritz = _converged(problem, k, sigma, first)
-    del first
+    sigma = -1e-3 * limit if shift is None and np.isfinite(limit) else shift
+    sigma, factor, ritz = _converged(problem, k, sigma)
     theta, error = ritz.theta, ritz.error
     k = min(k, len(theta))
     lam, phi = sigma + 1 / theta[:k], ritz.vectors(k)
@@ -288,20 +284,13 @@ def _sparse(
     return lam[:k], phi[:, :k]
 
 
-def _counted_beside(problem: _Problem, limit: float, sigma: float) -> tuple[int, Factor]:
-    """How many eigenvalues lie below a limit, counted while K - σM is factored."""
-    return together(lambda: problem.below(limit), lambda: problem.factor(sigma))
-
-
-def _converged(
-    problem: _Problem, k: int, shift: float | None, first: Factor | None
-) -> tuple[float, Factor, Ritz]:
+def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, Factor, Ritz]:
     """Lanczos from a shift that suits; a guessed one is renewed when it lies far from the modes."""
     sigma = shift
     if sigma is None:
         sigma = -_GUESS * _scale(problem.K, problem.M, problem.dofs).typical
     for _ in range(2):
-        factor = problem.factor(sigma) if first is None else first
+        factor = problem.factor(sigma)
         ritz = block_lanczos(factor.solve, problem.M_o, k)
         known = ritz.theta[ritz.error < 1e-2]
         top = sigma + 1 / known[-1] if len(known) else 0.0

@@ -6,7 +6,7 @@ relative cut.
 Craig and Kurdila (2006), Fundamentals of Structural Dynamics, ch. 17.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -22,6 +22,7 @@ from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
 MASSLESS = 1e-20  # of the heaviest dof moving as far: what rounding leaves of no mass at all
+COLUMNS = 32  # of a block that are multiplied at once
 ROWS = 4096  # of an operator that are multiplied at once, or the product is as large as a basis
 
 
@@ -48,22 +49,31 @@ def beyond(
     are taken out before and after its own vectors are made unit ones: twice is enough (Giraud et
     al. 2005, Numerische Mathematik 101, 87-100), once leaves rounding of the large.
     """
-    heavy = np.einsum("ij,ij->j", block, M @ block)
+    heavy = np.concatenate([(V * (M @ V)).sum(axis=0) for V in _some(block)])
     heaviest = float(M.diagonal().max(initial=0.0)) * (block**2).max(axis=0, initial=0.0)
     moves = heavy > MASSLESS * heaviest
     if not moves.any():
         return np.zeros((len(block), 0))
     V = block[:, moves] / np.sqrt(heavy[moves])
-    V = _without(M, known, V)
-    w, U = np.linalg.eigh(V.T @ (M @ V))
+    _take_out(M, known, V)
+    w, U = np.linalg.eigh(np.hstack([V.T @ (M @ some) for some in _some(V)]))
     keep = w > cut**2
-    return _without(M, known, V @ (U[:, keep] / np.sqrt(w[keep])))
+    V = V @ (U[:, keep] / np.sqrt(w[keep]))
+    _take_out(M, known, V)
+    return V
 
 
-def _without(M: sp.csr_array, known: Sequence[np.ndarray], V: np.ndarray) -> np.ndarray:
-    """V less what M-orthonormal blocks have of it."""
-    MV = M @ V
-    return V - sum(Q @ (Q.T @ MV) for Q in known)
+def _take_out(M: sp.csr_array, known: Sequence[np.ndarray], V: np.ndarray) -> None:
+    """Take from V, in place, what M-orthonormal blocks have of it."""
+    for some in _some(V):
+        MV = M @ some
+        for Q in known:
+            some -= Q @ (Q.T @ MV)
+
+
+def _some(V: np.ndarray) -> Iterator[np.ndarray]:
+    """A few columns at a time: products with all of them are as large as they are."""
+    yield from (V[:, k : k + COLUMNS] for k in range(0, max(V.shape[1], 1), COLUMNS))
 
 
 @dataclass(frozen=True, eq=False)

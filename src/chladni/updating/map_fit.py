@@ -186,6 +186,7 @@ def descend(
             status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED
             break
         improved, x, damping = found
+        del state  # its slopes weigh as much as those to come
         r, J, state = objective(x, True)
         cost = float(r @ r)
         if improved < tol:

@@ -25,7 +25,7 @@ def measured_on(question: Question) -> Places:
 
 
 def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -> list[MeshError]:
-    """What the mesh hides: asked early, for a mesh twice as fine takes more memory than all else.
+    """What the mesh hides: asked first, for a mesh twice as fine takes more memory than all else.
 
     Parameters
     ----------

@@ -26,7 +26,6 @@ from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
-from ..side_by_side import together
 from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
@@ -70,11 +69,8 @@ def _by_responses(question: Question) -> Prepared:
     held_band = question.held_band or _upper_part(question, low, high)
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
+    found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     f_max = reach[1]
-    found, nominal = together(
-        lambda: identify(frf, widened(frf, reach), use=counted(frf, question.exclude)),
-        lambda: modelled(question.searched(question.assembly), SOLVED * f_max),
-    )
     if question.held_band is None and not _modes_seen(found, low, fit_max):
         held_band, fit_max = (high, high), high  # all modes lie where the band was to be held out
     seen = _modes_seen(found, low, fit_max)
@@ -83,13 +79,12 @@ def _by_responses(question: Question) -> Prepared:
             f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
+    nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
-    mesh, reduced = together(
-        lambda: mesh_hidden(nominal, f_max, measured_on(question)),
-        lambda: ready_for_responses(question, nominal, f_max),
-    )
+    mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)

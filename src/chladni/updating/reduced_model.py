@@ -122,7 +122,8 @@ class Reduced:
     def extended(self, vectors: np.ndarray) -> Self:
         """The same model over a basis that holds these (n, k) as well; short ones move no clamp."""
         system, (n, r) = self.groups.structure.system, self.vectors.shape
-        vectors = np.pad(vectors, ((0, n - len(vectors)), (0, 0)))
+        if len(vectors) < n:
+            vectors = np.pad(vectors, ((0, n - len(vectors)), (0, 0)))
         new = beyond(system.M, self.vectors.blocks, vectors)
         if not new.shape[1]:
             return self

@@ -79,8 +79,12 @@ class ReducedProblem:
             loads = effect.reloads(blocks[-1], self.structure.system.M)
             blocks.append(self.factor.solve(loads))
         n = model.vectors.shape[0]
-        every = [np.pad(block, ((0, n - len(block)), (0, 0))) for block in blocks]
-        return model.extended(np.hstack(every)).split_for(effect, x)
+        for k, block in enumerate(blocks):
+            if len(block) < n:
+                blocks[k] = np.pad(block, ((0, n - len(block)), (0, 0)))
+        every = np.hstack(blocks) if len(blocks) > 1 else blocks[0]
+        del blocks
+        return model.extended(every).split_for(effect, x)
 
     @property
     def shapes(self) -> np.ndarray:

@@ -57,6 +57,7 @@ def search_round(
     finished = list(side_by_side(lambda t: _finished(problem, t, True), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
+    give_back_freed_memory()
     closer = side_by_side(lambda t: _closer(problem, null, t), hypotheses[:running])
     best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
     return simplest_first(best, null.neg2_log_evidence)
