@@ -40,13 +40,13 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
 
 def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis with what explains the data as well as the named effect, if anything does."""
-    best = diagnosis.found
+    best, over = diagnosis.found, dict(diagnosis.passed_over)
     if best is None:
         return diagnosis
     behind = {
         t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
         for t in diagnosis.hypotheses
-        if t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
+        if t.effect.name not in over and t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
     }
     names = tuple(name for name, gap in behind.items() if 2 * gap < TIED)
     if len(names) < 2:

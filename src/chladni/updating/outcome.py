@@ -13,7 +13,7 @@ from ..ema.odds import evidence_in_words
 from ..errors import ModelError
 from ..model.assembly import Assembly
 from .adequacy import FitTest
-from .diagnosis import Diagnosis, tested, verdict
+from .diagnosis import UNEXPLAINED, Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_found, as_written
 from .leaning import leaning, strained
@@ -118,8 +118,7 @@ def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     of_null = 0 if diagnosis.adequacy is None else 1  # the last is what was said of calibration
     notes = (*diagnosis.notes[: len(diagnosis.notes) - of_null], note)
-    called = "missing physics" if lead.physics else "measurement fault"
-    named = replace(diagnosis, verdict=called, notes=notes, adequacy=None)
+    named = replace(diagnosis, verdict=lead.verdict, notes=notes, adequacy=None)
     return tested(named, prepared.problem)
 
 
@@ -188,7 +187,7 @@ def _unexplained(
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; {but}"
     fits = FitTest(False, p, what, lead.effect.text)
-    note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
+    note = f"{what}, {lead.effect.text}{UNEXPLAINED}"
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
 
