@@ -21,6 +21,7 @@ from .likelihood import Poles
 from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
+from .ties import tied
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than wa
 AGAINST = "the data that no fit saw speak against it"
 WORSE = "but the deck with it is worse on the data that no fit saw"
 MORE_LEFT = "but with it in place more is left than it explains"
+BEYOND = "something that the catalogue does not hold"
 
 
 def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
@@ -131,7 +133,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     the fitted data bear the name by less than twice the gain due.  Nor is named what leaves more
     than it explains, of what was fitted and of what was not.  Data that cannot feel the effect are
     predicted alike without it and have no vote.  Where all data together, or what was fitted by
-    far, still want more than calibration, what is missing is not in the catalogue.
+    far, still want more than calibration, what is missing is not in the catalogue; or it is the
+    leader with more beside it, where no data speak against that.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -164,10 +167,13 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     notes = (*diagnosis.notes, note)
     refused = replace(diagnosis, verdict=plainly, notes=notes, written=None, refused=f"it {why}")
     if together > due and not borne:
-        return _unexplained(refused, lead, together, "all data", but)
-    if gain > CONFLICT * due:
-        return _unexplained(refused, lead, gain, "what was fitted", but)
-    return tested(refused, problem)
+        refused = _unexplained(refused, lead, together, "all data", but)
+    elif gain > CONFLICT * due:
+        refused = _unexplained(refused, lead, gain, "what was fitted", but)
+    else:
+        return tested(refused, problem)
+    one_of = (*tied(lead, diagnosis.hypotheses), BEYOND) if voted else ()
+    return replace(refused, one_of=one_of)
 
 
 def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False) -> bool:

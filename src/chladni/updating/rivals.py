@@ -69,6 +69,6 @@ def _led_by(refused: Diagnosis, whole: Renewal, over: tuple[tuple[str, str], ...
     note = f"{over[-1][0]} is not the answer, for {over[-1][1]}; {rival.name} is asked next"
     return replace(
         refused, hypotheses=(rival, *others), passed_over=over, refused="", adequacy=None,
-        heard=None, written=None, verdict=rival.verdict,
+        heard=None, written=None, one_of=(), verdict=rival.verdict,
         notes=(*(n.removesuffix(UNEXPLAINED) for n in refused.notes), note, whole.note),
     )  # fmt: skip
