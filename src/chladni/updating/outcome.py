@@ -166,14 +166,12 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
     refused = replace(diagnosis, verdict=plainly, notes=notes, written=None, refused=f"it {why}")
-    if together > due and not borne:
-        refused = _unexplained(refused, lead, together, "all data", but)
-    elif gain > CONFLICT * due:
-        refused = _unexplained(refused, lead, gain, "what was fitted", but)
-    else:
-        return tested(refused, problem)
     one_of = (*tied(lead, diagnosis.hypotheses), BEYOND) if voted else ()
-    return replace(refused, one_of=one_of)
+    if together > due and not borne:
+        return _unexplained(replace(refused, one_of=one_of), lead, together, "all data", but)
+    if gain > CONFLICT * due:
+        return _unexplained(replace(refused, one_of=one_of), lead, gain, "what was fitted", but)
+    return tested(refused, problem)
 
 
 def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False) -> bool:
@@ -189,11 +187,14 @@ def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False
 def _unexplained(
     diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str, but: str
 ) -> Diagnosis:
-    """Calibration alone is refuted by some data, and what refuted it does not stand either."""
+    """Calibration alone is refuted by some data, and what refuted it does not stand either.
+
+    Where it may stand all the same it is one of several.
+    """
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; {but}"
     fits = FitTest(False, p, what, lead.effect.text)
-    note = f"{what}, {lead.effect.text}{UNEXPLAINED}"
+    note = f"{what}, {lead.effect.text}{'' if diagnosis.one_of else UNEXPLAINED}"
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
 
