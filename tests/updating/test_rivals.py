@@ -7,35 +7,42 @@ import numpy as np
 import pytest
 
 from chladni.updating import rivals
+from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers
 from chladni.updating.diagnosis import UNEXPLAINED, Diagnosis
 from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.outcome import CONFLICT
 from chladni.updating.result_parts import why_not
-from chladni.updating.rivals import rival_named
+from chladni.updating.rivals import heard_of_rivals
 
 DUE = Diagnosis(None, SimpleNamespace(data=None), None, (None,) * 4, "").due
 GAIN = 5 * DUE  # of the leader
+FITS = FitTest(True, 0.5, "all is well", "")
 
 
 def tried(name, gain):
     effect = SimpleNamespace(name=name, becomes=lambda x: "", implausible=lambda x: "")
-    fit = SimpleNamespace(of=lambda e: np.zeros(1), effects=())
+    fit = SimpleNamespace(of=lambda e: np.zeros(1), effects=(), state=name)
     return SimpleNamespace(
         neg2_log_evidence=-gain, effect=effect, name=name, fit=fit, verdict="missing physics"
     )
 
 
-def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, too_little=""):
+def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, follows=None):
     """What is answered where mass-patch leads and is refused, and only those that are sound not.
 
     Parameters
     ----------
     news, leader : what held-out data say of a rival, and of the leader
+    follows : name of the effect that takes off the damping that follows the leader; None: none does
     """
 
     def tested(diagnosis, problem):
-        return diagnosis
+        return replace(diagnosis, adequacy=FITS)
+
+    def heard_of_damping(test, hypothesis, damping):
+        assert hypothesis.name == "mass-patch"
+        return replace(test, passes=follows is None or damping.taken == follows, what="it rubs")
 
     def judged(prepared, diagnosis):
         heard = HeldOutEvidence(news, 0.0, 0.0)
@@ -45,6 +52,7 @@ def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, too_l
 
     monkeypatch.setattr(rivals, "tested", tested)
     monkeypatch.setattr(rivals, "judged", judged)
+    monkeypatch.setattr(rivals, "heard_of_damping", heard_of_damping)
     names = ("mass-patch", "point-mass", "crack", "suspension")
     null = SimpleNamespace(neg2_log_evidence=0.0, data=None, fit=SimpleNamespace(effects=()))
     refused = Diagnosis(
@@ -52,8 +60,9 @@ def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, too_l
         notes=(f"it rubs{UNEXPLAINED}",), heard=HeldOutEvidence(leader, 0.0, 0.0),
         refused="it made the deck worse",
     )  # fmt: skip
-    prepared = SimpleNamespace(problem=None, too_little=too_little)
-    return rival_named(
+    damping = SimpleNamespace(beyond=lambda state: SimpleNamespace(taken=state))
+    prepared = SimpleNamespace(problem=SimpleNamespace(damping=damping))
+    return heard_of_rivals(
         prepared, refused, lambda t: SimpleNamespace(hypothesis=t, note="", distrust=("odd",))
     )
 
@@ -89,12 +98,24 @@ def test_the_next_is_asked_where_a_rival_is_refused_too(monkeypatch):
         ((GAIN, GAIN - 0.7 * DUE, 0.0, 0.0), {"news": -0.4 * DUE}),  # and of what no fit saw
         ((GAIN, GAIN - 0.7 * DUE, 0.0, 0.0), {"leader": 0.4 * DUE}),
         ((GAIN, GAIN - 1, 0.0, 0.0), {"sound": ()}),
-        ((GAIN, GAIN - 1, 0.0, 0.0), {"too_little": "3 modes"}),
+        ((GAIN, GAIN - 1, 0.0, 0.0), {"follows": "crack"}),  # the leader gives and dissipates
     ],
 )
 def test_else_the_refusal_stays(monkeypatch, gains, more):
     """What is refuted by the leader as calibration alone would be is not the answer either."""
-    assert asked(monkeypatch, gains, **more) == (None, ())
+    found, distrust = asked(monkeypatch, gains, **more)
+    assert (found.verdict, distrust) == ("not in catalogue", ())
+    assert found.notes[-1].endswith(UNEXPLAINED)
+    rival = found.hypotheses[1]
+    if found.two_log_bayes_factor(rival) > DUE:  # why it was passed over is told
+        reasons = ("it is no good", "far more than it does", "it rubs")
+        assert why_not(found, rival, found.null).endswith(reasons)
+
+
+def test_what_dissipates_itself_may_stand_for_what_gives_and_dissipates(monkeypatch):
+    """Beside what a viscoelastic joint takes, damping follows the leader no more."""
+    found, _ = asked(monkeypatch, (GAIN, GAIN - 1, 0.0, 0.0), follows="point-mass")
+    assert found.found.name == "point-mass"
 
 
 def test_a_rival_nearly_refuted_stands(monkeypatch):

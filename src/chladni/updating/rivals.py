@@ -12,26 +12,25 @@ from dataclasses import replace
 
 from .diagnosis import UNEXPLAINED, Diagnosis, tested
 from .held_out_evidence import HeldOutEvidence
-from .hypothesis_fit import HypothesisFit
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
+from .lossy_place import heard_of_damping
 from .outcome import CONFLICT, judged
 from .question import Prepared
 from .renewal import Renewal
 
 
-def rival_named(
+def heard_of_rivals(
     prepared: Prepared, refused: Diagnosis, renew: Callable[[HypothesisFit], Renewal]
-) -> tuple[Diagnosis | None, tuple[str, ...]]:
+) -> tuple[Diagnosis, tuple[str, ...]]:
     """The diagnosis with the first rival named that nothing refuses, and reasons not to trust it.
 
-    None where the leader is not refused, or every rival in the running is.
+    As it was, with what refused them, where every rival in the running is refused as well.
 
     Parameters
     ----------
     refused : the diagnosis, its leader refused by what it leaves or by data that no fit saw
     renew : a hypothesis on a reduced model that bears it
     """
-    if refused.found is not None or not refused.refused or prepared.too_little:
-        return None, ()
     lead, *rivals = refused.hypotheses
     over: tuple[tuple[str, str], ...] = ((lead.effect.name, refused.refused),)
     for rival in rivals:
@@ -41,10 +40,26 @@ def rival_named(
         asked = tested(_led_by(refused, whole, over), prepared.problem)
         if asked.found is not None:
             asked = judged(prepared, asked)
-        if asked.found is not None and not refuted(refused, lead, asked):
+        why = asked.refused or _against(refused, asked, prepared.problem)
+        if not why:
             return asked, whole.distrust
-        over = (*over, (rival.effect.name, asked.refused))
-    return None, ()
+        over = (*over, (rival.effect.name, why))
+    return replace(refused, passed_over=over), ()
+
+
+def _against(refused: Diagnosis, asked: Diagnosis, problem: UpdatingProblem) -> str:
+    """What refutes a rival that is refused by nothing itself, in words; nothing where nothing does.
+
+    Damping that follows what the leader changes refutes what does not dissipate itself.
+    """
+    lead, (rival, *_) = refused.hypotheses[0], asked.hypotheses
+    if refuted(refused, lead, asked):
+        return f"{lead.name}, which is refused itself, explains far more than it does"
+    damping = problem.damping
+    if asked.adequacy is None or damping is None:
+        return ""
+    test = heard_of_damping(asked.adequacy, lead, damping.beyond(rival.fit.state))
+    return "" if test.passes else test.what
 
 
 def refuted(refused: Diagnosis, lead: HypothesisFit, asked: Diagnosis) -> bool:

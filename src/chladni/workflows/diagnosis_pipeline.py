@@ -56,7 +56,7 @@ from ..updating.result_parts import (
     otherwise,
     remainder,
 )
-from ..updating.rivals import rival_named
+from ..updating.rivals import heard_of_rivals
 from ..updating.several_judged import named_together
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
@@ -170,9 +170,8 @@ def _judged(
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = judged(prepared, found), lead.distrust
-    rival, doubts = rival_named(prepared, found, partial(renewed, asked, prepared))
-    if rival is not None:
-        found, distrust = rival, doubts
+    if found.found is None and found.refused and not prepared.too_little:
+        found, distrust = heard_of_rivals(prepared, found, partial(renewed, asked, prepared))
     found = with_doubt(with_confusers(found))
     if found.found is None:
         found = prudently_calibrated(prepared, found)
