@@ -52,6 +52,7 @@ def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, follo
 
     monkeypatch.setattr(rivals, "tested", tested)
     monkeypatch.setattr(rivals, "judged", judged)
+    monkeypatch.setattr(rivals, "_on_its_own_basis", lambda problem, refused, rival: rival)
     monkeypatch.setattr(rivals, "heard_of_damping", heard_of_damping)
     names = ("mass-patch", "point-mass", "crack", "suspension")
     null = SimpleNamespace(neg2_log_evidence=0.0, data=None, fit=SimpleNamespace(effects=()))

@@ -27,7 +27,8 @@ from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, as_w
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.search_round import search_round
+from chladni.updating.rivals import _on_its_own_basis
+from chladni.updating.search_round import on_common_basis, search_round
 from chladni.updating.several import _begun_with, _More, _paying, _same, several
 from chladni.updating.several_judged import named_together
 
@@ -172,6 +173,19 @@ def test_a_set_that_is_known_is_not_searched_again(monkeypatch, reduced, two, fo
     assert _same(two, both.own, both.own)
     assert not _same(two, both.own, away)
     assert not _same(two, both.own, replace(both.own, beside=()))
+
+
+def test_a_rival_has_a_basis_of_its_own_again(two, found):
+    """A diagnosis keeps what was found of it, not the vectors that its place added to the basis."""
+    lead = found[0][0]
+    rival = on_common_basis(two, lead)
+    with pytest.raises(ValueError, match="mismatch"):
+        rival.data.scaled(rival.fit.state, False)
+    null = null_of(two)
+    again = _on_its_own_basis(two, SimpleNamespace(null=null), rival)
+    assert again.data.scaled(again.fit.state, False)[0].size
+    gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
+    assert gains[0] == pytest.approx(gains[1], rel=0.02)
 
 
 def test_one_effect_stays_one(reduced):

@@ -10,13 +10,16 @@ alone: it found what they do not explain.
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..errors import ModelError
 from .diagnosis import UNEXPLAINED, Diagnosis, tested
 from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
+from .likelihood import Poles, Responses
 from .lossy_place import heard_of_damping
 from .outcome import CONFLICT, judged
 from .question import Prepared
 from .renewal import Renewal
+from .search_round import taken
 
 
 def heard_of_rivals(
@@ -36,7 +39,11 @@ def heard_of_rivals(
     for rival in rivals:
         if refused.two_log_bayes_factor(rival) <= refused.due:
             break
-        whole = renew(rival)
+        try:
+            whole = renew(_on_its_own_basis(prepared.problem, refused, rival))
+        except ModelError as error:
+            over = (*over, (rival.effect.name, f"it could not be fitted again: {error}"))
+            continue
         asked = tested(_led_by(refused, whole, over), prepared.problem)
         if asked.found is not None:
             asked = judged(prepared, asked)
@@ -45,6 +52,17 @@ def heard_of_rivals(
             return asked, whole.distrust
         over = (*over, (rival.effect.name, why))
     return replace(refused, passed_over=over), ()
+
+
+def _on_its_own_basis(
+    problem: UpdatingProblem, refused: Diagnosis, rival: HypothesisFit
+) -> HypothesisFit:
+    """A rival fitted again from where it was: a diagnosis keeps the model of its leader alone."""
+    null = refused.null.data
+    assert isinstance(null, (Responses, Poles))
+    problem = replace(problem, data=null.over(problem.reduced.model))
+    base = taken(problem, rival, ("ordinary", "nuisance"))
+    return problem.fitted_with(rival.effect, rival.fit.of(rival.effect), base)
 
 
 def _against(refused: Diagnosis, asked: Diagnosis, problem: UpdatingProblem) -> str:
