@@ -11,7 +11,7 @@ from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers
 from chladni.updating.diagnosis import UNEXPLAINED, Diagnosis
 from chladni.updating.held_out_evidence import HeldOutEvidence
-from chladni.updating.outcome import CONFLICT
+from chladni.updating.outcome import BEYOND, CONFLICT
 from chladni.updating.result_parts import why_not
 from chladni.updating.rivals import heard_of_rivals
 
@@ -59,7 +59,7 @@ def asked(monkeypatch, gains, sound=("point-mass",), news=0.0, leader=0.0, follo
     refused = Diagnosis(
         null, null, null, tuple(map(tried, names, gains)), "not in catalogue",
         notes=(f"it rubs{UNEXPLAINED}",), heard=HeldOutEvidence(leader, 0.0, 0.0),
-        refused="it made the deck worse",
+        refused="it made the deck worse", one_of=("mass-patch", BEYOND),
     )  # fmt: skip
     damping = SimpleNamespace(beyond=lambda state: SimpleNamespace(taken=state))
     prepared = SimpleNamespace(problem=SimpleNamespace(damping=damping))
@@ -73,6 +73,7 @@ def test_a_rival_that_nothing_refuses_is_the_answer(monkeypatch):
     found, distrust = asked(monkeypatch, (GAIN, GAIN - 1, GAIN - 2, 0.0))
     assert found.found.name == "point-mass"
     assert distrust == ("odd",)
+    assert found.one_of == ()
     assert not any(note.endswith(UNEXPLAINED) for note in found.notes)
     assert any("mass-patch is not the answer" in note for note in found.notes)
     lead = found.hypotheses[1]
@@ -94,8 +95,11 @@ def test_the_next_is_asked_where_a_rival_is_refused_too(monkeypatch):
 @pytest.mark.parametrize(
     ("gains", "more"),
     [
-        ((GAIN, DUE - 1, 0.0, 0.0), {}),  # it would not be named alone
-        ((GAIN, GAIN - CONFLICT * DUE - 1, 0.0, 0.0), {}),  # the leader explains far more
+        ((1.5 * DUE, DUE - 1, 0.0, 0.0), {}),  # it would not be named alone
+        (
+            (GAIN, GAIN - CONFLICT * DUE - 1, 0.0, 0.0),
+            {"news": 1.5 * DUE},
+        ),  # the leader explains far more
         ((GAIN, GAIN - 0.7 * DUE, 0.0, 0.0), {"news": -0.4 * DUE}),  # and of what no fit saw
         ((GAIN, GAIN - 0.7 * DUE, 0.0, 0.0), {"leader": 0.4 * DUE}),
         ((GAIN, GAIN - 1, 0.0, 0.0), {"sound": ()}),
