@@ -35,9 +35,11 @@ def heard_of_rivals(
     renew : a hypothesis on a reduced model that bears it
     """
     lead, *rivals = refused.hypotheses
+    ahead = refused.two_log_bayes_factor(lead)
     over: tuple[tuple[str, str], ...] = ((lead.effect.name, refused.refused),)
     for rival in rivals:
-        if refused.two_log_bayes_factor(rival) <= refused.due:
+        gain = refused.two_log_bayes_factor(rival)
+        if gain <= refused.due or ahead - gain > CONFLICT * refused.due:
             break
         try:
             whole = renew(_on_its_own_basis(prepared.problem, refused, rival))
@@ -81,14 +83,13 @@ def _against(refused: Diagnosis, asked: Diagnosis, problem: UpdatingProblem) -> 
 
 
 def refuted(refused: Diagnosis, lead: HypothesisFit, asked: Diagnosis) -> bool:
-    """Whether a leader that was refused is so far ahead that its rival does not explain the data.
+    """Whether a leader that was refused refutes a rival, of what was fitted and what was held out.
 
-    By twice the gain due on what was fitted, or by the gain due with what was held out: as
-    calibration alone is refuted.
+    By the gain due, as calibration alone is refuted; by twice that of what was fitted it is not
+    even asked.
     """
-    ahead = asked.hypotheses[0].neg2_log_evidence - lead.neg2_log_evidence
-    together = ahead + _news(refused.heard) - _news(asked.heard)
-    return ahead > CONFLICT * refused.due or together > refused.due
+    leads, follows = (refused.two_log_bayes_factor(t) for t in (lead, asked.hypotheses[0]))
+    return leads + _news(refused.heard) - follows - _news(asked.heard) > refused.due
 
 
 def _news(heard: HeldOutEvidence | None) -> float:
