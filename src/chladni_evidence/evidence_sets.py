@@ -80,7 +80,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     outside: every kind outside the catalogue, and those that came into it late, the structures in
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
-    pairs: two effects at once on plate and panel, our fine mesh and CalculiX in turn.
+    pairs: two or three effects at once on plate and panel, our fine mesh and CalculiX in turn.
     clamps: nothing, a clamp that gives and what looks like it, on a plate in a clamp; our mesh.
     """
     made = {

@@ -1,4 +1,4 @@
-"""Articles with two effects at once, each as large as it would be alone."""
+"""Articles with two or three effects at once, each as large as it would be alone."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +19,8 @@ PAIRS = (
     "orthotropic-material + point-mass",
     "thickness-distribution + sensor-mass",
     "point-mass + point-mass",
+    "orthotropic-material + point-mass + sensor-mass",
+    "thickness-distribution + extra-support + sensor-mass",
 )
 
 Sized = Callable[[str, list[int]], tuple[Hidden, float, float]]

@@ -1,6 +1,7 @@
 """Several effects at once: each must pay, in whatever order they are found; one alone stays one."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,8 +28,9 @@ from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, as_w
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.search_round import search_round
-from chladni.updating.several import _begun_with, _More, _paying, several
+from chladni.updating.rivals import _on_its_own_basis
+from chladni.updating.search_round import on_common_basis, search_round
+from chladni.updating.several import _begun_with, _More, _paying, _same, several
 from chladni.updating.several_judged import named_together
 
 SENSORS = [1, 7, 57, 63, 25, 39]
@@ -165,6 +167,33 @@ def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
         alone = two.fitted_with(of(two.where), x, null.fit.x)
         ends.append(places(_begun_with(two, alone, DUE, lambda text, share: None).sets[-1].own))
     assert ends[0] == ends[1] == ends[2]
+
+
+def test_a_set_that_is_known_is_not_searched_again(monkeypatch, reduced, two, found):
+    """What begins elsewhere and comes upon the same two ends there; two at other places go on."""
+    of, x = lump(reduced, THERE, 1.5)
+    alone = two.fitted_with(of(two.where), x, null_of(two).fit.x)
+    begun = partial(_begun_with, two, alone, DUE, lambda text, share: None)
+    assert begun(known=found[1].sets).sets == ()
+    (both,) = found[1].sets
+    away = replace(both.own, effect=PointMass.near(two.where, at(two.reduced, 0.2, 0.05)))
+    monkeypatch.setattr(type(both.own.fit), "of", lambda fit, e: np.zeros(3))
+    assert _same(two, both.own, both.own)
+    assert not _same(two, both.own, away)
+    assert not _same(two, both.own, replace(both.own, beside=()))
+
+
+def test_a_rival_has_a_basis_of_its_own_again(two, found):
+    """A diagnosis keeps what was found of it, not the vectors that its place added to the basis."""
+    lead = found[0][0]
+    rival = on_common_basis(two, lead)
+    with pytest.raises(ValueError, match="mismatch"):
+        rival.data.scaled(rival.fit.state, False)
+    null = null_of(two)
+    again = _on_its_own_basis(two, SimpleNamespace(null=null), rival)
+    assert again.data.scaled(again.fit.state, False)[0].size
+    gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
+    assert gains[0] == pytest.approx(gains[1], rel=0.02)
 
 
 def test_one_effect_stays_one(reduced):

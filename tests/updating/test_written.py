@@ -121,6 +121,8 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     assert ("leaves more than it explains" in judged.refused) == (not against and not worse)
     if called == REST and not against:
         assert outcome.AGAINST not in judged.adequacy.what
+    open_ = called == REST and not against  # it may be the leader, with more beside it
+    assert judged.one_of == ((hypothesis.effect.name, outcome.BEYOND) if open_ else ())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .leaning import strained
-from .ties import TIED
+from .ties import TIED, tied
 
 
 def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
@@ -40,15 +40,11 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
 
 def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis with what explains the data as well as the named effect, if anything does."""
-    best = diagnosis.found
+    best, over = diagnosis.found, dict(diagnosis.passed_over)
     if best is None:
         return diagnosis
-    behind = {
-        t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
-        for t in diagnosis.hypotheses
-        if t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
-    }
-    names = tuple(name for name, gap in behind.items() if 2 * gap < TIED)
+    behind = tied(best, (t for t in diagnosis.hypotheses if t.effect.name not in over))
+    names = tuple(behind)
     if len(names) < 2:
         return diagnosis
     check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)

@@ -33,6 +33,7 @@ from .several import Several, several
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
 FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
 CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
+UNEXPLAINED = "; nothing in the catalogue explains the recording"  # ends a note that says why
 
 Progress = Callable[[str, float], None]
 
@@ -56,6 +57,7 @@ class Diagnosis:
     sets : several effects together, each of which pays, in the order in which the sets grew
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
     refused : why the leader is not named although it gains what is due
+    passed_over : names of explanations that were asked before the leader, and what refused each
     """
 
     nominal: HypothesisFit
@@ -71,6 +73,7 @@ class Diagnosis:
     sets: tuple[Several, ...] = ()
     gains: tuple[float, ...] = ()
     refused: str = ""
+    passed_over: tuple[tuple[str, str], ...] = ()
 
     @property
     def found(self) -> HypothesisFit | None:
@@ -160,7 +163,7 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
     note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
     if fits.passes:
         return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
-    note = f"{note}, {fits.where}; nothing in the catalogue explains the recording"
+    note = f"{note}, {fits.where}{UNEXPLAINED}"
     notes = (*diagnosis.notes, note)
     refused = f"what it leaves is not explained: {fits.what}" if diagnosis.found else ""
     return replace(
@@ -215,7 +218,7 @@ def verdict(
     """The public verdict."""
     best, due = hypotheses[0] if hypotheses else None, threshold(null.data, len(hypotheses))
     if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > due:
-        return "missing physics" if best.physics else "measurement fault"
+        return best.verdict
     changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
     return "calibration only" if changed else "nothing missing"
 

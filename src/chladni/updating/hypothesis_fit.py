@@ -63,6 +63,11 @@ class HypothesisFit:
         return any(e.kind != "test" for e in self.effects)
 
     @property
+    def verdict(self) -> str:
+        """The public verdict where it is named."""
+        return "missing physics" if self.physics else "measurement fault"
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """Channels that it concerns, where it concerns nothing else."""
         every = [e.channels for e in self.effects]

@@ -13,7 +13,7 @@ from ..ema.odds import evidence_in_words
 from ..errors import ModelError
 from ..model.assembly import Assembly
 from .adequacy import FitTest
-from .diagnosis import Diagnosis, tested, verdict
+from .diagnosis import UNEXPLAINED, Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
 from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_found, as_written
 from .leaning import leaning, strained
@@ -21,6 +21,7 @@ from .likelihood import Poles
 from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
+from .ties import tied
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than wa
 AGAINST = "the data that no fit saw speak against it"
 WORSE = "but the deck with it is worse on the data that no fit saw"
 MORE_LEFT = "but with it in place more is left than it explains"
+BEYOND = "something that the catalogue does not hold"
 
 
 def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
@@ -118,8 +120,7 @@ def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     )
     of_null = 0 if diagnosis.adequacy is None else 1  # the last is what was said of calibration
     notes = (*diagnosis.notes[: len(diagnosis.notes) - of_null], note)
-    called = "missing physics" if lead.physics else "measurement fault"
-    named = replace(diagnosis, verdict=called, notes=notes, adequacy=None)
+    named = replace(diagnosis, verdict=lead.verdict, notes=notes, adequacy=None)
     return tested(named, prepared.problem)
 
 
@@ -132,7 +133,8 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     the fitted data bear the name by less than twice the gain due.  Nor is named what leaves more
     than it explains, of what was fitted and of what was not.  Data that cannot feel the effect are
     predicted alike without it and have no vote.  Where all data together, or what was fitted by
-    far, still want more than calibration, what is missing is not in the catalogue.
+    far, still want more than calibration, what is missing is not in the catalogue; or it is the
+    leader with more beside it, where no data speak against that.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -164,10 +166,11 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     plainly = verdict(diagnosis.nominal, diagnosis.null, ())
     notes = (*diagnosis.notes, note)
     refused = replace(diagnosis, verdict=plainly, notes=notes, written=None, refused=f"it {why}")
+    one_of = (*tied(lead, diagnosis.hypotheses), BEYOND) if voted else ()
     if together > due and not borne:
-        return _unexplained(refused, lead, together, "all data", but)
+        return _unexplained(replace(refused, one_of=one_of), lead, together, "all data", but)
     if gain > CONFLICT * due:
-        return _unexplained(refused, lead, gain, "what was fitted", but)
+        return _unexplained(replace(refused, one_of=one_of), lead, gain, "what was fitted", but)
     return tested(refused, problem)
 
 
@@ -184,11 +187,14 @@ def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False
 def _unexplained(
     diagnosis: Diagnosis, lead: HypothesisFit, gain: float, of: str, but: str
 ) -> Diagnosis:
-    """Calibration alone is refuted by some data, and what refuted it does not stand either."""
+    """Calibration alone is refuted by some data, and what refuted it does not stand either.
+
+    Where it may stand all the same it is one of several.
+    """
     p = float(min(1.0, len(families()) * np.exp(-gain / 2)))
     what = f"{of}: {evidence_in_words(gain / 2)} for {lead.name} against calibration alone; {but}"
     fits = FitTest(False, p, what, lead.effect.text)
-    note = f"{what}: something is missing that the catalogue does not hold, {lead.effect.text}"
+    note = f"{what}, {lead.effect.text}{'' if diagnosis.one_of else UNEXPLAINED}"
     notes = (*diagnosis.notes, note)
     return replace(diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes)
 

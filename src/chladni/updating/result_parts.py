@@ -116,6 +116,8 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
 def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
     """Why a hypothesis was not named, with a number."""
     gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due
+    if refused := dict(diagnosis.passed_over).get(hypothesis.effect.name):
+        return f"gains {gain:.1f} in -2 ln evidence, but {refused}"
     if diagnosis.found is None and gain > due:
         lead = diagnosis.hypotheses[0]
         but = diagnosis.refused if hypothesis is lead else f"{lead.name}, ahead of it, is not named"

@@ -91,7 +91,7 @@ def several(
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not search.sets):
             say = within(progress, 0.4, 0.8)
-            search = _better(search, _begun_with(problem, other, due, say, lead))
+            search = _better(search, _begun_with(problem, other, due, say, lead, search.sets))
     if not search.sets and unfit:
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
@@ -121,9 +121,12 @@ def _better(one: Search, other: Search) -> Search:
 
 def _begun_with(
     problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
-    best: HypothesisFit | None = None,
+    best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
-    """The sets that grow from one hypothesis, until none more pays or they stay behind the best."""
+    """The sets that grow from one hypothesis, until none more pays or they stay behind the best.
+
+    A search that comes upon a set that is known would go on as the one that found it, and ends.
+    """
     current, out, note, seen = lead, list[Several](), "", list[set[int]]()
     for k in range(ATTEMPTS):
         progress(f"what {current.name} leaves", k / ATTEMPTS)
@@ -140,13 +143,25 @@ def _begun_with(
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
             break
-        if {id(e) for e in found.own.effects} in seen:
+        again = any(_same(problem, found.own, other.own) for other in known)
+        if again or {id(e) for e in found.own.effects} in seen:
             break
         seen.append({id(e) for e in found.own.effects})
         current = found.own
         if len(found.gains) > 1:
             out.append(found)
     return Search(tuple(out), note)
+
+
+def _same(problem: UpdatingProblem, one: HypothesisFit, other: HypothesisFit) -> bool:
+    """Whether two sets hold the same effects, each where the other has it."""
+
+    def has(effect: Effect) -> bool:
+        its = ((e, other.fit.of(e)) for e in other.effects if e.name == effect.name)
+        x = one.fit.of(effect)
+        return any(repeats(replace(problem, found=(each,)), effect, x) for each in its)
+
+    return len(one.effects) == len(other.effects) and all(map(has, one.effects))
 
 
 def _standing(

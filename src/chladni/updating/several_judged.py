@@ -40,7 +40,7 @@ def named_together(
         notes.append(f"asked of {beside}")
     found = replace(
         alone, hypotheses=(whole, *alone.hypotheses), gains=more.gains, notes=tuple(notes),
-        verdict="missing physics" if whole.physics else "measurement fault",
+        verdict=whole.verdict,
     )  # fmt: skip
     found = tested(found, prepared.problem)
     if found.found is None or not _fits_beyond(alone.adequacy, found.adequacy):

@@ -1,5 +1,7 @@
 """When two explanations are one answer, and which of the two is told."""
 
+from collections.abc import Iterable
+
 from .hypothesis_fit import HypothesisFit
 
 TIED = 10.0  # in -2 ln evidence, e^5: odds up to which two explanations are one answer
@@ -30,3 +32,16 @@ def simplest_first(hypotheses: list[HypothesisFit], null: float) -> list[Hypothe
         if near or (t.effect.name == simpler and behind < max(TIED, foot)):
             return [t, *(other for other in hypotheses if other is not t)]
     return hypotheses
+
+
+def tied(best: HypothesisFit, hypotheses: Iterable[HypothesisFit]) -> dict[str, float]:
+    """Names of what explains the data as well, its own first, and ln odds against each.
+
+    What as it was fitted is another name for the best is none of them.
+    """
+    behind = {
+        t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
+        for t in hypotheses
+        if t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
+    }
+    return {name: gap for name, gap in behind.items() if 2 * gap < TIED}

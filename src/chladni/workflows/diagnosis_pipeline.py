@@ -8,6 +8,7 @@
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -55,6 +56,7 @@ from ..updating.result_parts import (
     otherwise,
     remainder,
 )
+from ..updating.rivals import heard_of_rivals
 from ..updating.several_judged import named_together
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
@@ -167,8 +169,10 @@ def _judged(
         lead = renewed(asked, prepared, found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
-        found, distrust = with_confusers(judged(prepared, found)), lead.distrust
-    found = with_doubt(found)
+        found, distrust = judged(prepared, found), lead.distrust
+    if found.found is None and found.refused and not prepared.too_little:
+        found, distrust = heard_of_rivals(prepared, found, partial(renewed, asked, prepared))
+    found = with_doubt(with_confusers(found))
     if found.found is None:
         found = prudently_calibrated(prepared, found)
         plain = renewed(asked, prepared, found.plain, held=found.as_the_null)
