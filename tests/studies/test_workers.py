@@ -9,13 +9,14 @@ from contextlib import contextmanager
 import numpy as np
 import psutil
 import pytest
-from distributed import Client
+from distributed import Client, LocalCluster
 
 import chladni
+from chladni.cli.study import _tenths
 from chladni.errors import FileError
 from chladni.studies import StudySettings
 from chladni.studies.study_store import ROWS
-from chladni.studies.workers import _AHEAD
+from chladni.studies.workers import _AHEAD, NO_WORKER
 
 RANGES = ["t=90%:110%", "E=80%:120%"]
 SETTINGS = StudySettings(samples=40, modes=3)
@@ -170,10 +171,31 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x:1", ""])
-def test_no_scheduler_is_one_sentence(model, address, monkeypatch):
+def test_no_scheduler_is_one_sentence_and_leaves_nothing(model, address, monkeypatch, tmp_path):
     monkeypatch.setattr("chladni.studies.workers.PATIENCE", 1)
     with pytest.raises(FileError, match="no Dask scheduler answers at"):
-        chladni.study(model, RANGES, SETTINGS, scheduler=address)
+        chladni.study(model, RANGES, SETTINGS, scheduler=address, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scheduler_without_workers_is_said_and_waited_for(model, straight, monkeypatch, capsys):
+    """Once, after a few seconds; a worker that joins later does all of the study."""
+    monkeypatch.setattr("chladni.studies.workers.ALONE", 0.1)
+    here = {"processes": False, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(n_workers=0, **here) as cluster, Client(cluster) as client:
+        lines, heard = _tenths(), []
+
+        def told(what, share):
+            lines(what, share)
+            if what == NO_WORKER:
+                heard.append(share)
+                time.sleep(0.5)
+                cluster.scale(1)
+
+        found = chladni.study(model, RANGES, SETTINGS, scheduler=client, progress=told)
+    assert heard == [0.0]
+    assert capsys.readouterr().out.splitlines()[0] == NO_WORKER  # without a terminal, too
+    np.testing.assert_allclose(found.column("f1_hz"), straight.column("f1_hz"), rtol=1e-9)
 
 
 @pytest.mark.slow
