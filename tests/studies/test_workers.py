@@ -3,16 +3,16 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
 import numpy as np
 import psutil
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client
 
 import chladni
-from chladni.cli.study import _tenths
 from chladni.errors import FileError
 from chladni.studies import StudySettings
 from chladni.studies.study_store import ROWS
@@ -93,8 +93,11 @@ def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
 
 
 @contextmanager
-def clustered(port=0):
-    """(address, scheduler, workers): two workers as a user starts them, each process its own."""
+def clustered(port=0, late=False):
+    """(address, scheduler, workers, join): two workers as a user starts them, each a process.
+
+    Where they are ``late`` they start when ``join`` is called.
+    """
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
     scheduler = subprocess.Popen(
@@ -105,9 +108,15 @@ def clustered(port=0):
     )
     options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
     quiet["stderr"] = subprocess.DEVNULL
-    workers = [subprocess.Popen([*dask, "worker", address, *options], **quiet) for _ in range(2)]
+    command, workers = [*dask, "worker", address, *options], []
+
+    def join():
+        workers.extend(subprocess.Popen(command, **quiet) for _ in range(2))
+
     try:
-        yield address, scheduler, workers
+        if not late:
+            join()
+        yield address, scheduler, workers, join
     finally:
         for process in (*workers, scheduler):
             process.kill()
@@ -125,17 +134,24 @@ FOUND = """[str(t.key) for s in __import__("distributed").Scheduler._instances
             for t in s.transition_log if t.finish == "memory"]"""
 
 
-def test_a_cluster_of_others_that_loses_a_worker(deck, straight, tmp_path, cluster):
-    """It costs the samples it had not handed over, of which few are on the cluster at a time."""
-    address, _, workers = cluster
-    study = started(deck, tmp_path / "out", "--scheduler", address)
-    wait_for(tmp_path / "out", 3, study)
-    workers[0].kill()
-    said, _ = study.communicate()
-    assert study.returncode == 0, said
-    agrees(tmp_path / "out", straight)
-    with Client(address, timeout=20) as client:
-        solved = [key for key in client.run_on_scheduler(eval, FOUND) if "_on_worker" in key]
+def test_a_cluster_of_others_that_gets_workers_and_loses_one(deck, straight, tmp_path):
+    """Without any it is said once, and waited for; one that is lost costs what it had not handed
+    over, and few samples are on the cluster at a time."""
+    with clustered(late=True) as (address, _, workers, join):
+        study = started(deck, tmp_path / "out", "--scheduler", address)
+        enough = threading.Timer(120, study.kill)
+        enough.start()
+        assert f"{NO_WORKER}\n" in study.stdout  # reads up to that line
+        enough.cancel()
+        join()
+        wait_for(tmp_path / "out", 3, study)
+        workers[0].kill()
+        said, _ = study.communicate()
+        assert study.returncode == 0, said
+        assert NO_WORKER not in said.splitlines()
+        agrees(tmp_path / "out", straight)
+        with Client(address, timeout=20) as client:
+            solved = [key for key in client.run_on_scheduler(eval, FOUND) if "_on_worker" in key]
     assert 40 <= len(solved) <= 40 + _AHEAD * len(workers)
 
 
@@ -145,7 +161,7 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
     deck, straight, tmp_path, cluster, again
 ):
     """The same command goes on here, or on a scheduler that was started again at its address."""
-    address, scheduler, _ = cluster
+    address, scheduler, *_ = cluster
     out = tmp_path / "out"
     study = started(deck, out, "--scheduler", address)
     wait_for(out, 3, study)
@@ -161,7 +177,7 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
         study = started(deck, out, "--workers", "1")
         said, _ = study.communicate()
     else:
-        with clustered(address.rpartition(":")[2]) as (same, _, _):
+        with clustered(address.rpartition(":")[2]) as (same, *_):
             assert same == address
             study = started(deck, out, "--scheduler", address)
             said, _ = study.communicate()
@@ -176,26 +192,6 @@ def test_no_scheduler_is_one_sentence_and_leaves_nothing(model, address, monkeyp
     with pytest.raises(FileError, match="no Dask scheduler answers at"):
         chladni.study(model, RANGES, SETTINGS, scheduler=address, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_a_scheduler_without_workers_is_said_and_waited_for(model, straight, monkeypatch, capsys):
-    """Once, after a few seconds; a worker that joins later does all of the study."""
-    monkeypatch.setattr("chladni.studies.workers.ALONE", 0.1)
-    here = {"processes": False, "threads_per_worker": 1, "dashboard_address": None}
-    with LocalCluster(n_workers=0, **here) as cluster, Client(cluster) as client:
-        lines, heard = _tenths(), []
-
-        def told(what, share):
-            lines(what, share)
-            if what == NO_WORKER:
-                heard.append(share)
-                time.sleep(0.5)
-                cluster.scale(1)
-
-        found = chladni.study(model, RANGES, SETTINGS, scheduler=client, progress=told)
-    assert heard == [0.0]
-    assert capsys.readouterr().out.splitlines()[0] == NO_WORKER  # without a terminal, too
-    np.testing.assert_allclose(found.column("f1_hz"), straight.column("f1_hz"), rtol=1e-9)
 
 
 @pytest.mark.slow

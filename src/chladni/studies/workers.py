@@ -139,8 +139,11 @@ def _quiet(*names: str) -> Iterator[None]:
 
 def _connected(address: str) -> Any:
     from distributed import Client
+    from distributed.comm.addressing import parse_address
+    from distributed.comm.registry import get_backend
 
     try:
+        get_backend(parse_address(address)[0])  # no loop is begun for what is no address
         return Client(address, timeout=PATIENCE)
     # an assertion where the loop of an earlier client is just ending
     except (OSError, ValueError, TypeError, RuntimeError, AssertionError) as error:
