@@ -129,15 +129,15 @@ def run_folder(
 
 @contextmanager
 def _made(out: Path) -> Iterator[None]:
-    """The folder; one that was made for nothing goes again."""
-    new = not out.exists()
+    """The folder; one that was made for nothing goes again, with those above it that were."""
+    new = [p for p in (out, *out.parents) if not p.exists()]
     make_folder(out)
     try:
         yield
     finally:
         with suppress(OSError):  # it holds something, as it should
-            if new:
-                out.rmdir()
+            for folder in new:
+                folder.rmdir()
 
 
 def make_folder(out: Path) -> None:

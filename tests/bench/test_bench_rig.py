@@ -57,6 +57,17 @@ def test_the_mass_behind_the_crystal_is_not_seen_the_one_before_it_is(small):
     np.testing.assert_allclose(found, plain / (1 + 0.15 * plain[:, :1]), rtol=1e-6)
 
 
+def test_two_channels_of_one_sensor_weigh_as_one_sensor(small):
+    """As the table of sensors has it: rows of one place are one device."""
+    mounts = free(small).mounts[[0, 0, 2]]
+    setup = BenchSetup(replace(WEIGHTLESS, mass=0.05), None)
+    two = bench_rig(free(small, mounts=mounts, channels=np.array([2, 2, 1])), setup)
+    one = bench_rig(free(small, mounts=mounts, masses=np.array([0.05, 1e-12, 0.05])), setup)
+    each = bench_rig(free(small, mounts=mounts), setup)
+    np.testing.assert_allclose(two.frf(F), one.frf(F), rtol=1e-6)
+    assert np.abs(each.frf(F) / one.frf(F) - 1).max() > 0.01
+
+
 def test_sensors_lower_frequencies_as_rayleigh_says(small):
     """Δf/f = -½ Σ m |φ|² to first order: half the mass halves what is left of it by a quarter."""
     article = small(hangers=np.zeros((0, 3, 16)))

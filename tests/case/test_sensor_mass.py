@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from chladni.bench.accelerometers import AccelerometerType
+from chladni.bench.article_scatter import Scatter
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
@@ -14,12 +16,16 @@ from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
+from chladni.report.bench_page import _facts
 from chladni.units import UNITS
 from chladni.updating.preparation import prepare
+from chladni.workflows.benched_article import benched, true_places
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.case_model import model_frf
-from chladni.workflows.frf import frf
+from chladni.workflows.frf import frf, placed_layout
+from chladni.workflows.loaded_model import as_model
 from chladni.workflows.question_of_case import question
+from chladni.workflows.virtual_test import BenchSettings, virtual_test
 
 from .test_case import deck
 
@@ -79,7 +85,25 @@ def test_mass_and_centre_are_those_of_the_devices(folder: Path) -> None:
     grids = case.assembly.points[case.assembly.rows([3, 8])]
     moment = 0.02 * grids[0] + 0.04 * grids[1] + 0.03 * np.array([0.35, 0.2, 0])
     assert_allclose(after * centre - before * at, moment, atol=1e-9)
-    assert any("90 g" in note for note in case.said("calibrate"))
+    said = "The model carries sensors of 50 g in all and 40 g where it is driven (sensors.csv)"
+    assert any(note.startswith(f"{said}, at 5 grids") for note in case.said("calibrate"))
+    layout = placed_layout(as_model(case, "modes"), folder / "sensors.csv")[0]
+    assert f"{said}." in layout.notes  # frf of a deck says of the same table the same
+
+
+def test_a_bench_that_the_case_is_put_on_weighs_them_as_the_case_does(folder: Path) -> None:
+    """Rows of one device share its mass."""
+    case = load_case(folder)
+    settings = BenchSettings(band=(5.0, 60.0), resolution=1.0, averages=2, sweeps=1)
+    found = virtual_test(case, settings)
+    facts = dict(_facts(found))
+    assert facts["Sensors"] == "3, 55 g in all"  # one that was not weighed is of the usual 5 g
+    assert facts["Channels"] == "4"
+    at = case.outputs, case.inputs
+    places = true_places(case.assembly, *at, AccelerometerType(), np.random.default_rng(1))
+    none = Scatter(0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0)
+    article = benched(case.assembly, *at, (), places, 60.0, none, np.random.default_rng(1))
+    assert (article.masses / article.channels).tolist() == [0.01, 0.01, 0.03, 0.0]
 
 
 def test_they_lower_the_frequencies_the_model_is_compared_by(folder: Path) -> None:

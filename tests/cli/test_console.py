@@ -72,6 +72,50 @@ def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
     assert refused.stderr.strip() in log.read_text()  # the log goes on, and holds the sentence
 
 
+@pytest.mark.parametrize(
+    ("words", "said", "more"),
+    [
+        (["modes", "x.bdf", "--cuont", "8"], "no such option: --cuont", "modes"),
+        (["modes"], "missing argument 'DECK_or_CASE'", "modes"),
+        (["modes", "x.bdf", "--count", "many"], "invalid value for '--count': ", "modes"),
+        (["modes", "x.bdf", "y.bdf"], "got unexpected extra argument", "modes"),
+        (["xy"], "no such command 'xy'; there are diagnose, init, check, demo", ""),
+        (["blind", "make", "--out", "x"], "missing option '--set'", "blind make"),
+        (["blind", "xy"], "no such command 'xy'; there are make, run, score", "blind"),
+    ],
+)
+def test_words_that_no_command_takes_are_one_sentence(words, said, more):
+    done = call(*words)
+    assert (done.exit_code, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"chladni: {said}")
+    assert line.endswith(f"`{' '.join(['chladni', more]).strip()} --help` says more")
+
+
+@pytest.mark.parametrize("words", [[], ["blind"], ["--help"], ["modes", "--help"]])
+def test_who_asks_for_nothing_is_shown_the_help(words):
+    done = call(*words)
+    assert done.exit_code == (0 if "--help" in words else 2)
+    assert (done.stdout + done.stderr).startswith("Usage: ")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(["modes", "no.bdf"], ["frf", "no.bdf"], ["render", "no.bdf"], ["plan", "no.bdf"]),
+        *(["bench", "no.bdf"], ["test", "no.uff"], ["identify", "no.uff"], ["map", "no", "f.k"]),
+        *(["diagnose", "no"], ["calibrate", "no"], ["correlate", "no"], ["check", "no"]),
+        *(["study", "no.bdf"], ["init", "no.bdf"], ["specimen", "plate", "--set", "t=x"]),
+    ],
+)
+def test_what_is_refused_leaves_no_folder(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call(*words)
+    assert done.exit_code == 2, done.output
+    assert len(done.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
     done = call("modes", deck, "--log", tmp_path / "no" / "folder.log", "--out", tmp_path / "o")
     assert done.exit_code == 2

@@ -61,3 +61,13 @@ def test_rows_around_a_place_have_its_variance(built):
 
 def test_only_uncertain_places_have_rows_around_them(built):
     assert dofs(built, [[0.2, 0.1, 0], [0.3, 0.1, 0]]).around(built).shape[0] == 2
+
+
+def test_channels_of_one_place_are_of_one_sensor(built):
+    """Within a millimetre; the motion of the base is of none beside it."""
+    away, base = [0.2, 0.1, 2e-3], np.full(3, np.nan)
+    found = dofs(built, [[0.2, 0.1, 0], away, [0.2, 0.1, 5e-4], base, base])
+    assert found.device.tolist() == [0, 1, 0, 3, 4]
+    assert found.channels.tolist() == [2, 1, 2, 1, 1]
+    none = dofs(built, np.zeros((0, 3)))  # where only poles were given
+    assert (none.device.tolist(), none.channels.tolist()) == ([], [])

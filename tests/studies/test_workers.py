@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
@@ -15,7 +16,7 @@ import chladni
 from chladni.errors import FileError
 from chladni.studies import StudySettings
 from chladni.studies.study_store import ROWS
-from chladni.studies.workers import _AHEAD
+from chladni.studies.workers import _AHEAD, NO_WORKER
 
 RANGES = ["t=90%:110%", "E=80%:120%"]
 SETTINGS = StudySettings(samples=40, modes=3)
@@ -92,8 +93,11 @@ def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
 
 
 @contextmanager
-def clustered(port=0):
-    """(address, scheduler, workers): two workers as a user starts them, each process its own."""
+def clustered(port=0, late=False):
+    """(address, scheduler, workers, join): two workers as a user starts them, each a process.
+
+    Where they are ``late`` they start when ``join`` is called.
+    """
     dask = [sys.executable, "-m", "dask"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
     scheduler = subprocess.Popen(
@@ -104,9 +108,15 @@ def clustered(port=0):
     )
     options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
     quiet["stderr"] = subprocess.DEVNULL
-    workers = [subprocess.Popen([*dask, "worker", address, *options], **quiet) for _ in range(2)]
+    command, workers = [*dask, "worker", address, *options], []
+
+    def join():
+        workers.extend(subprocess.Popen(command, **quiet) for _ in range(2))
+
     try:
-        yield address, scheduler, workers
+        if not late:
+            join()
+        yield address, scheduler, workers, join
     finally:
         for process in (*workers, scheduler):
             process.kill()
@@ -124,17 +134,24 @@ FOUND = """[str(t.key) for s in __import__("distributed").Scheduler._instances
             for t in s.transition_log if t.finish == "memory"]"""
 
 
-def test_a_cluster_of_others_that_loses_a_worker(deck, straight, tmp_path, cluster):
-    """It costs the samples it had not handed over, of which few are on the cluster at a time."""
-    address, _, workers = cluster
-    study = started(deck, tmp_path / "out", "--scheduler", address)
-    wait_for(tmp_path / "out", 3, study)
-    workers[0].kill()
-    said, _ = study.communicate()
-    assert study.returncode == 0, said
-    agrees(tmp_path / "out", straight)
-    with Client(address, timeout=20) as client:
-        solved = [key for key in client.run_on_scheduler(eval, FOUND) if "_on_worker" in key]
+def test_a_cluster_of_others_that_gets_workers_and_loses_one(deck, straight, tmp_path):
+    """Without any it is said once, and waited for; one that is lost costs what it had not handed
+    over, and few samples are on the cluster at a time."""
+    with clustered(late=True) as (address, _, workers, join):
+        study = started(deck, tmp_path / "out", "--scheduler", address)
+        enough = threading.Timer(120, study.kill)
+        enough.start()
+        assert f"{NO_WORKER}\n" in study.stdout  # reads up to that line
+        enough.cancel()
+        join()
+        wait_for(tmp_path / "out", 3, study)
+        workers[0].kill()
+        said, _ = study.communicate()
+        assert study.returncode == 0, said
+        assert NO_WORKER not in said.splitlines()
+        agrees(tmp_path / "out", straight)
+        with Client(address, timeout=20) as client:
+            solved = [key for key in client.run_on_scheduler(eval, FOUND) if "_on_worker" in key]
     assert 40 <= len(solved) <= 40 + _AHEAD * len(workers)
 
 
@@ -144,7 +161,7 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
     deck, straight, tmp_path, cluster, again
 ):
     """The same command goes on here, or on a scheduler that was started again at its address."""
-    address, scheduler, _ = cluster
+    address, scheduler, *_ = cluster
     out = tmp_path / "out"
     study = started(deck, out, "--scheduler", address)
     wait_for(out, 3, study)
@@ -160,7 +177,7 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
         study = started(deck, out, "--workers", "1")
         said, _ = study.communicate()
     else:
-        with clustered(address.rpartition(":")[2]) as (same, _, _):
+        with clustered(address.rpartition(":")[2]) as (same, *_):
             assert same == address
             study = started(deck, out, "--scheduler", address)
             said, _ = study.communicate()
@@ -170,10 +187,11 @@ def test_a_scheduler_that_is_lost_costs_nothing_that_was_finished(
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x:1", ""])
-def test_no_scheduler_is_one_sentence(model, address, monkeypatch):
+def test_no_scheduler_is_one_sentence_and_leaves_nothing(model, address, monkeypatch, tmp_path):
     monkeypatch.setattr("chladni.studies.workers.PATIENCE", 1)
     with pytest.raises(FileError, match="no Dask scheduler answers at"):
-        chladni.study(model, RANGES, SETTINGS, scheduler=address)
+        chladni.study(model, RANGES, SETTINGS, scheduler=address, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

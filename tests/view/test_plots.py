@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -174,3 +175,14 @@ def test_a_name_is_no_formula(tmp_path):
     ax.legend()
     assert save(figure, tmp_path / "a.png").stat().st_size > 1000
     assert "mathdefault" in ax.get_xticklabels()[0].get_text()
+
+
+@pytest.mark.parametrize(("modes", "numbers"), [(5, 5), (31, 31), (90, 30)])
+def test_a_ladder_of_many_modes_can_be_read_on_a_page(tmp_path, modes, numbers):
+    """No wider than a page shows it without shrinking, and no number on another."""
+    f = np.linspace(20, 300, modes)
+    path = plots.frequency_ladder(tmp_path / "ladder.svg", f, 1.01 * f, 0.99 * f)
+    root = ElementTree.fromstring(path.read_text())
+    assert float(root.get("width").removesuffix("pt")) <= 72 * 9.3
+    ticks = [x for x in root.iter() if (x.get("id") or "").startswith("xtick_")]
+    assert len(ticks) == numbers

@@ -134,24 +134,29 @@ def test_page_and_json_hold_the_levels(run):
     )
 
 
-def test_identify_says_it_on_the_terminal_and_in_its_files(folder, tmp_path):
-    done = CliRunner().invoke(application(), ["identify", str(folder), "--out", str(tmp_path)])
+@pytest.fixture(scope="module")
+def identified(folder):
+    """The command that identifies, and where it wrote."""
+    out = folder / "identified"
+    return CliRunner().invoke(application(), ["identify", str(folder), "--out", str(out)]), out
+
+
+def test_identify_says_it_on_the_terminal_and_in_its_files(identified):
+    done, out = identified
     assert done.exit_code == 0, done.output
     assert "Levels" in done.output
     assert "friction" in done.output
-    found = json.loads((tmp_path / "identified.json").read_text())
+    found = json.loads((out / "identified.json").read_text())
     assert any(t["signature"] == "friction" for study in found["levels"] for t in study)
-    page = (tmp_path / "report.html").read_text()
+    page = (out / "report.html").read_text()
     assert "levels_1.png" in page
     assert "Every mode at every level" in page
     assert "Every mode at every level" in done.output
 
 
-def test_a_table_holds_every_mode_at_every_level(folder, tmp_path):
+def test_a_table_holds_every_mode_at_every_level(identified):
     """The file has a row where a mode was found; the page one of dashes where it was not."""
-    out = tmp_path / "out"
-    done = CliRunner().invoke(application(), ["identify", str(folder), "--out", str(out)])
-    assert done.exit_code == 0, done.output
+    _, out = identified
     (study,) = json.loads((out / "identified.json").read_text())["levels"]
     with (out / "levels.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

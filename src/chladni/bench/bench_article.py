@@ -28,6 +28,7 @@ class BenchArticle:
     sites : (s, r)              opening of every site with a local force
     laws : what acts at these sites
     masses : (n_out,)           of each sensor [kg]; 0: as its type weighs
+    channels : (n_out,)         of the sensor that each is a channel of, which weighs once
     gains : (n_out,)            factor on every channel that nobody knows of (miswired, mistyped)
     output_labels, input_label  as 412:+Z
     base : (r,)                 on a shaker table: load of a unit acceleration of the supports on
@@ -48,6 +49,7 @@ class BenchArticle:
     sites: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     laws: tuple[LocalForce, ...] = ()
     masses: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    channels: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.zeros(0))
     base: np.ndarray = field(default_factory=lambda: np.zeros(0))
     carried: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -57,12 +59,13 @@ class BenchArticle:
         r, n = len(self.frequency), len(self.output_labels)
         if not self.laws:
             object.__setattr__(self, "sites", np.zeros((0, r)))
-        for name, usual in (("gains", np.ones(n)), ("masses", np.zeros(n))):
+        one, none = np.ones(n), np.zeros(n)
+        for name, usual in (("gains", one), ("channels", one), ("masses", none)):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, usual)
         due = {"damping": (r,), "outputs": (n, r), "mounts": (n, 3, r), "drive": (6, r),
                "hangers": (len(self.hangers), 3, r), "sites": (len(self.laws), r),
-               "gains": (n,), "masses": (n,)}  # fmt: skip
+               "gains": (n,), "channels": (n,), "masses": (n,)}  # fmt: skip
         if self.on_table:
             due |= {"base": (r,), "carried": (n,), "mounts_carried": (n, 3)}
         for name, shape in due.items():

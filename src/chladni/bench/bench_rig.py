@@ -129,6 +129,7 @@ def bench_rig(article: BenchArticle, setup: BenchSetup | None = None) -> BenchRi
     m = _bare(article, n)
     mounts = over(article.mounts).reshape(-1, n)
     each = np.where(article.masses > 0, article.masses, setup.accelerometer.mass)
+    each = each / article.channels
     m.M += mounts.T @ (np.repeat(each, 3)[:, None] * mounts)
     _hang(m, over(article.hangers), cords, r)
     load, P, through = np.zeros((n, 1)), [np.zeros((1, n)) for _ in range(3)], np.ones((1, 1))

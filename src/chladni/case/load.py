@@ -30,7 +30,7 @@ from .mended_recordings import mended, with_frf
 from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
-from .sensor_places import ROLES, carried, grid_row, labels, places, unrecorded
+from .sensor_places import ROLES, carried, carried_said, grid_row, labels, places, unrecorded
 from .toml_sections import KeyFile, TomlSection, read_keys
 
 _MASS_SD = 0.002  # of the mass, where the user gives none
@@ -98,11 +98,10 @@ class Case:
         """Notes of what was read and how, and of what this command makes no use of."""
         out = [*self.notes, *unread(self.given, command)]
         if self.carried and command in key("sensors.csv", "mass").used:
-            total, n = sum(m for _, m in self.carried), len({g for g, _ in self.carried})
+            said = carried_said(self.assembly, self.outputs, self.inputs, "sensors.csv")
             out.append(
-                f"Sensors of {1e3 * total:.3g} g in all (sensors.csv) are in the model, at {n} "
-                "grids, before anything is asked; the weighed mass and the deck that is written "
-                "are without them."
+                f"{said}, at {len(self.carried)} grids, before anything is asked; the weighed mass "
+                "and the deck that is written are without them."
             )
         return out
 

@@ -17,7 +17,6 @@ from .toml_sections import TomlSection
 ROLES: tuple[Role, ...] = ("output", "input")
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
 _OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
-_ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
 
 
 def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tuple[str, ...]:
@@ -154,15 +153,19 @@ def carried(made: Assembly, *places: MeasuredDofs) -> tuple[tuple[int, float], .
     for at in places:
         heavy = np.flatnonzero((at.mass > 0) & ~at.base)
         heavy = heavy[np.argsort(-at.mass[heavy], kind="stable")]
-        one = [k for n, k in enumerate(heavy) if not _same_place(at.points, heavy[:n], int(k))]
+        one = heavy[np.unique(at.device[heavy], return_index=True)[1]]
         for k, shares in zip(one, shares_of(made, at.grids[one], at.points[one]), strict=True):
             for grid, share in shares:
                 out[grid] = out.get(grid, 0.0) + share * float(at.mass[k])
     return tuple(sorted(out.items()))
 
 
-def _same_place(points: np.ndarray, before: np.ndarray, k: int) -> bool:
-    return bool((np.linalg.norm(points[before] - points[k], axis=1) < _ONE_DEVICE).any())
+def carried_said(made: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, table: str) -> str:
+    """What the devices of known mass weigh: the sensors, and what sits where it is driven."""
+    grams = [1e3 * sum(m for _, m in carried(made, at)) for at in (outputs, inputs)]
+    named = ("sensors of {:.3g} g in all", "{:.3g} g where it is driven")
+    said = [text.format(g) for text, g in zip(named, grams, strict=True) if g]
+    return f"The model carries {' and '.join(said)} ({table})"
 
 
 def _place(

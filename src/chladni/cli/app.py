@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from ..errors import AccuracyError, ChladniError
 from .console import console, opened_console, say
@@ -49,6 +50,40 @@ _EVERY = {  # options that every command takes
         None,
     ),
 }  # fmt: skip
+_UsageError: type[Any] = typer.BadParameter.__mro__[1]  # of the click that this typer brings
+
+
+class OneSentenceGroup(TyperGroup):
+    """Commands: a line that none of them takes is one sentence and exit code 2."""
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Run what the words of a command line ask for, and end with its exit code."""
+        if not options.get("standalone_mode", True):
+            return super().main(*args, **options)
+        options["standalone_mode"] = False
+        try:
+            code = super().main(*args, **options)
+        except _UsageError as error:
+            code = _misused(error)
+        except typer.Abort:
+            code = INTERRUPTED
+        raise SystemExit(code or DONE)
+
+
+def _misused(error: Any) -> int:
+    """What is wrong with the words of a command line, and where it says what there is."""
+    text, at = error.format_message(), error.ctx
+    if at is None or text == at.get_help():  # asked for nothing: the help itself
+        error.show()
+        return AT_FAULT
+    known = at.command.list_commands(at) if isinstance(at.command, TyperGroup) else []
+    there = f"; there are {', '.join(known)}" if known else ""
+    words: list[str] = []
+    while at.parent is not None:
+        words, at = [at.info_name, *words], at.parent
+    shown = " ".join(["chladni", *words, "--help"])
+    text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you", "; did you")
+    return _said(f"{text}{there}; `{shown}` says more".replace("?;", "?"), AT_FAULT)
 
 
 def application() -> typer.Typer:
@@ -56,6 +91,7 @@ def application() -> typer.Typer:
     os.environ.pop("MPLBACKEND", None)  # pictures go to files, whatever window is asked for
     app = typer.Typer(
         name="chladni",
+        cls=OneSentenceGroup,
         help="Find, name and repair the physics a finite element model left out.",
         no_args_is_help=True,
         add_completion=False,

@@ -13,6 +13,7 @@ from ..progress import Progress
 from ..report.result_json import to_json
 from ..studies.parameter_study import ParameterStudy, study
 from ..studies.study_settings import StudySettings
+from ..studies.workers import NO_WORKER
 from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
 from .console import say, watched
 from .run import (
@@ -124,12 +125,14 @@ def _both(one: Progress, other: Progress) -> Progress:
 
 
 def _tenths() -> Progress:
-    """One line per tenth of the samples, where there is no terminal to draw a bar on."""
+    """A line per tenth of the samples, and one of a wait, where there is no terminal for a bar."""
     said = {-1}
 
     def told(what: str, share: float) -> None:
         tenth = int(10 * share)
-        if tenth not in said and 0 < share <= 1:
+        if what == NO_WORKER:
+            say(what)
+        elif tenth not in said and 0 < share <= 1:
             said.add(tenth)
             say(what)
 

@@ -11,6 +11,8 @@ from .assemble import Structure
 from .base_motion import base_motion
 from .locate import Share, rows_of, shares_of
 
+_ONE_DEVICE = 1e-3  # [m]; channels of one accelerometer share its place
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDofs:
@@ -37,6 +39,18 @@ class MeasuredDofs:
     def base(self) -> np.ndarray:
         """True where the dof is the enforced motion of the supports (k,)."""
         return np.isnan(self.points[:, 0])
+
+    @property
+    def device(self) -> np.ndarray:
+        """Of each channel the first one at its place (k,): the channels of one sensor."""
+        apart = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
+        here = (apart < _ONE_DEVICE) | np.eye(len(apart), dtype=bool)
+        return np.array([row.argmax() for row in here], dtype=np.int64)
+
+    @property
+    def channels(self) -> np.ndarray:
+        """How many channels the sensor of each has (k,)."""
+        return np.asarray(np.bincount(self.device)[self.device])
 
     @property
     def nodes(self) -> dict[int, np.ndarray]:

@@ -92,10 +92,12 @@ def lead(found: BenchResult) -> str:
 
 def _facts(found: BenchResult) -> list[tuple[str, str]]:
     s, first = found.settings, found.recordings[0]
-    grams = number(1e3 * found.setup.accelerometer.mass)
+    at, usual = found.outputs, found.setup.accelerometer.mass
+    each = np.where(at.mass > 0, at.mass, usual) / at.channels
     return [
         ("Driven at", found.inputs.labels[0]),
-        ("Sensors", f"{len(found.outputs.labels)} of {grams} g"),
+        ("Sensors", f"{len(set(at.device))}, {number(1e3 * each.sum())} g in all"),
+        ("Channels", str(len(at.labels))),
         ("Weighed", f"{number(found.mass, 5)} kg"),
         ("Lines", str(len(first.frf.frequency))),
         ("Articles", f"{s.articles}, " + ("the deck's own" if s.exact else "scattered")),

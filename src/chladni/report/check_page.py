@@ -38,7 +38,7 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
         blocks.append(_table(found.dofs))
     modes = ", ".join(number(f) for f in found.frequency)
     facts = [*found.facts, ("model's lowest elastic modes", f"{modes} Hz")]
-    told = [Section(f"For {c}", [Items(said)]) for c, said in found.unused.items() if said]
+    told = [Section(f"For {who}", [Items(said)]) for who, said in _told(found.unused)]
     sections = [
         Section("What looks wrong", [Items(looks)] if looks else []),
         Section("What will be used", [Facts(facts)]),
@@ -46,6 +46,19 @@ def check_page(folder: Path, case: Case, found: CaseCheck) -> PageParts:
         *told,
     ]
     return PageParts(_lead(found), sections, (), [(path.name, "sensors on the mesh")])
+
+
+def _told(unused: dict[str, tuple[str, ...]]) -> list[tuple[str, list[str]]]:
+    """(commands, sentences): what is said to the same commands together, and once.
+
+    >>> _told({"calibrate": ("a", "b"), "diagnose": ("a",), "study": ("b",)})
+    [('calibrate, diagnose', ['a']), ('calibrate, study', ['b'])]
+    """
+    out: dict[str, list[str]] = {}
+    for text in dict.fromkeys(text for said in unused.values() for text in said):
+        who = ", ".join(command for command, said in unused.items() if text in said)
+        out.setdefault(who, []).append(text)
+    return list(out.items())
 
 
 def _lead(found: CaseCheck) -> str:

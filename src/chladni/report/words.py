@@ -77,15 +77,16 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
 
 
 def percent(new: float | None, old: float | None) -> str:
-    """Change in per cent.
+    """Change in per cent, to a hundredth where it is small.
 
-    >>> percent(0.02, 0.2), percent(1.0, None)
-    ('-90 %', '–')
+    >>> percent(0.02, 0.2), percent(1.03, 1.0), percent(0.9997, 1.0), percent(1.0, None)
+    ('-90 %', '+3.0 %', '-0.03 %', '–')
     """
     if new is None or not old or not math.isfinite(new / old):
         return _NONE
     change = 100 * (new / old - 1)
-    return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
+    decimals = 0 if abs(change) >= 10 else 1 if abs(change) >= 1 else 2
+    return f"{change:+.{decimals}f} %"
 
 
 def direction(vector: Sequence[float]) -> str:

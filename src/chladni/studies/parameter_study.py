@@ -33,7 +33,7 @@ from .study_store import OWN, StudyStore, opened_store, row_of
 from .variation import Variation, of_case, of_parts, refuse_impossible
 from .varied_effects import of_effect
 from .vary_text import VaryText, vary_text
-from .workers import affordable, refuse_many, results
+from .workers import affordable, client_of, refuse_many, results
 
 RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
             "frf_real", "frf_imag", "channel_name")  # names in the NetCDF file  # fmt: skip
@@ -155,14 +155,15 @@ def study(
     made = _provenance(model, case, varied, settings)
     names = [v.name for v in varied]
     rows: dict[int, dict[str, Any]] = {}
-    with _store(out, asked, drawn, made, names, X) as store:
+    stored = _store(out, asked, drawn, made, names, X)
+    with client_of(scheduler) as client, stored as store:
         before = dict(store.rows) if store else {}
         todo = [k for k in range(len(X)) if k not in before]
         rows |= before
         clock = _Clock(len(X), len(before), progress)
         try:
             many = min(workers or affordable(len(todo), nominal.seconds), max(1, len(todo)))
-            for result in results(asked, X, todo, many, scheduler):
+            for result in results(asked, X, todo, many, client, clock.told_of):
                 values = dict(zip(names, X[result.number].tolist(), strict=True))
                 row = store.keep(result, values) if store else row_of(result, values)
                 rows[result.number] = row
@@ -336,13 +337,18 @@ class _Clock:
 
     def __init__(self, n: int, before: int, told: Progress) -> None:
         self.n, self.before, self.told = n, before, told
-        self.begun = 0.0
+        self.begun, self.done = 0.0, before
         told(f"{before} of {n} samples", before / n)
+
+    def told_of(self, what: str) -> None:
+        """Say what it waits for."""
+        self.told(what, self.done / self.n)
 
     def tick(self, done: int) -> None:
         """Say how far it is."""
         if not self.begun:  # the start of workers is no sample's time
             self.begun, self.before = time.monotonic(), done
+        self.done = done
         new, spent = done - self.before, time.monotonic() - self.begun
         said = f"{done} of {self.n} samples"
         if new and spent > 0:

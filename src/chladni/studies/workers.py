@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,7 +17,10 @@ PATIENCE = 15  # seconds a scheduler may take to answer
 STARTS = 3  # tries to start local workers
 MOST = 4  # local processes a core
 WORTH = 10.0  # seconds of one process above which it pays to start others
+NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
+ALONE = 3.0  # seconds without a sample after which it is looked whether there is a worker
 _AHEAD = 2  # samples per thread that are on the cluster at a time
+_GLANCE = 0.005  # seconds between two looks whether a sample is finished
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
 
 
@@ -45,14 +48,16 @@ def affordable(samples: int, seconds: float) -> int:
 
 
 def results(
-    study: StudyModel, X: np.ndarray, todo: Sequence[int], workers: int, scheduler: Any = None
-) -> Iterator[SampleResult]:
+    study: StudyModel, X: np.ndarray, todo: Sequence[int], workers: int, scheduler: Any = None,
+    told: Callable[[str], None] = lambda text: None,
+) -> Iterator[SampleResult]:  # fmt: skip
     """Samples ``todo`` of X in whatever order they are finished.
 
     Parameters
     ----------
     workers : local processes; with one, and no scheduler, samples are computed in this process
-    scheduler : address of a running Dask scheduler, or a ``distributed.Client``
+    scheduler : a ``distributed.Client``, in the place of local processes
+    told : hears of what it waits for
     """
     if not todo:
         return
@@ -60,25 +65,42 @@ def results(
         for k in todo:
             yield computed(study, k, X[k])
         return
-    with _client(workers, scheduler) as client:
-        yield from _distributed(client, study, X, todo)
+    if scheduler is not None:
+        yield from _distributed(scheduler, study, X, todo, told)
+        return
+    with _local(workers) as client:
+        yield from _distributed(client, study, X, todo, told)
 
 
 @contextmanager
-def _client(workers: int, scheduler: Any) -> Iterator[Any]:
-    """A client of the scheduler, or of processes started for this study and ended with it."""
+def client_of(scheduler: Any) -> Iterator[Any]:
+    """A client of the scheduler at an address; a ``distributed.Client`` or None as it is.
+
+    Raises
+    ------
+    FileError
+        If no scheduler answers there.
+    """
+    if scheduler is None:
+        yield None
+        return
     from distributed import Client
 
     if isinstance(scheduler, Client):
         yield scheduler
         return
-    with _quiet("distributed", "distributed.client"):
-        if scheduler is not None:
-            with _connected(str(scheduler)) as client:
-                yield client
-            return
-        with _local_cluster(workers) as cluster, Client(cluster) as client:
-            yield client
+    with _quiet("distributed", "distributed.client"), _connected(str(scheduler)) as client:
+        yield client
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    """A client of processes started for this study and ended with it."""
+    from distributed import Client
+
+    quiet = _quiet("distributed", "distributed.client")
+    with quiet, _local_cluster(workers) as cluster, Client(cluster) as client:
+        yield client
 
 
 def _local_cluster(workers: int) -> Any:
@@ -117,8 +139,11 @@ def _quiet(*names: str) -> Iterator[None]:
 
 def _connected(address: str) -> Any:
     from distributed import Client
+    from distributed.comm.addressing import parse_address
+    from distributed.comm.registry import get_backend
 
     try:
+        get_backend(parse_address(address)[0])  # no loop is begun for what is no address
         return Client(address, timeout=PATIENCE)
     # an assertion where the loop of an earlier client is just ending
     except (OSError, ValueError, TypeError, RuntimeError, AssertionError) as error:
@@ -130,8 +155,9 @@ def _connected(address: str) -> Any:
 
 
 def _distributed(
-    client: Any, study: StudyModel, X: np.ndarray, todo: Sequence[int]
-) -> Iterator[SampleResult]:
+    client: Any, study: StudyModel, X: np.ndarray, todo: Sequence[int],
+    told: Callable[[str], None],
+) -> Iterator[SampleResult]:  # fmt: skip
     """Few samples at a time, so that a cluster that shrinks or a kill costs no more than these.
 
     The model is a task of its own: the scheduler makes it again where the worker that held it dies.
@@ -151,14 +177,31 @@ def _distributed(
             future = client.submit(_on_worker, held, k, X[k], pure=False)
             asked[future] = k
             ready.add(future)
+        _wait(ready, client, told)
         future = next(ready)
         yield _result(future, asked.pop(future))
 
 
+def _wait(ready: Any, client: Any, told: Callable[[str], None]) -> None:
+    """Until a sample is finished; once it is said that a cluster has nobody to do it."""
+    looked, said = time.monotonic(), False
+    while not ready.has_ready():
+        time.sleep(_GLANCE)
+        if not said and time.monotonic() - looked > ALONE:
+            looked, said = time.monotonic(), not _workers_of(client)
+            if said:
+                told(NO_WORKER)
+
+
 def _threads(client: Any) -> int:
     """Threads of the cluster now, one while none has come yet."""
+    return max(1, sum(_workers_of(client).values()))
+
+
+def _workers_of(client: Any) -> dict[str, int]:
+    """{address: threads} of the cluster now."""
     try:
-        return max(1, sum(client.nthreads().values()))
+        return dict(client.nthreads())
     except OSError as error:
         raise FileError("the connection to the scheduler was lost") from error
 

@@ -26,6 +26,8 @@ _STYLES: dict[str, dict[str, Any]] = {
     "identified": {"color": AFTER, "lw": 1.1, "zorder": 4},
     "model": {"color": AFTER, "lw": 1.3, "zorder": 4},
 }
+_WIDEST = 9.0  # inches of a row of bars: wider, a page shrinks it until no number can be read
+_TOLD = 40  # bars that have their numbers; of more every second one, or third
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
 
@@ -113,7 +115,8 @@ def frequency_ladder(
     test, before, after : (r,)   paired frequencies [Hz]; not-a-number where there is no partner
     """
     test = np.asarray(test, dtype=float)
-    figure = Figure(figsize=(max(5.0, 0.55 * len(test) + 1.6), 3.4), layout="constrained")
+    width = min(max(5.0, 0.55 * len(test) + 1.6), _WIDEST)
+    figure = Figure(figsize=(width, 3.4), layout="constrained")
     ax, at = figure.subplots(), np.arange(len(test))
     series = [("before" if after is not None else "model", before, BEFORE)]
     series += [("after", after, AFTER)] if after is not None else []
@@ -124,7 +127,8 @@ def frequency_ladder(
             at + offset, 100 * (np.asarray(model, float) / test - 1), wide, color=colour, label=name
         )
     ax.axhline(0, color=TEST, lw=0.9)
-    ax.set_xticks(at, [f"{f:.4g}" for f in test], rotation=60, fontsize=8)
+    told = at[:: 1 + len(test) // _TOLD]
+    ax.set_xticks(told, [f"{f:.4g}" for f in test[told]], rotation=60, fontsize=8)
     ax.set(xlabel="frequency of the test [Hz]", ylabel="model - test [%]")
     ax.grid(axis="y", lw=0.3, alpha=0.6)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, **LEGEND)

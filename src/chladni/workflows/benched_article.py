@@ -100,7 +100,8 @@ def benched(
         name="A", weight=mass_properties(assembly)[0], frequency=whole.frequency, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
         hangers=(hung @ phi).reshape(-1, 3, r), output_labels=outputs.labels,
-        input_label=inputs.labels[0], masses=outputs.mass, base=(base @ phi).ravel(),
+        input_label=inputs.labels[0], masses=outputs.mass, channels=outputs.channels,
+        base=(base @ phi).ravel(),
         carried=places.directions @ inputs.directions[0],
         mounts_carried=np.tile(inputs.directions[0], (n, 1)),
     )  # fmt: skip

@@ -28,6 +28,7 @@ from .screening_of_case import screened_by_model
 from .unit_check import refuse_other_units
 
 BANDS = 6
+LONG = 100_000  # values of a recording: 210 000 took 190 s on a busy machine
 RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid motions
 
 
@@ -92,8 +93,7 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
         return replace(_by_poles(case, near), numbers=numbers)
-    many = len(test.outputs) * len(test.inputs)
-    progress(f"modes of the test, {many} channels of {len(test.frequency)} lines", 0.4)
+    progress(_identifying(len(test.outputs) * len(test.inputs), len(test.frequency)), 0.4)
     found = identified(test, case.band, use=case.lines(test.frequency))
     screening = screened_by_model(case, found, model)
     found = found.sel(firm(found) & found.inside)
@@ -113,6 +113,18 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
         _paired_shapes(case, model, near, (phi, psi), pairs, found.frequency, numbers),
         () if M is None else _likeness(found, phi, near.frequency, pairs),
     )  # fmt: skip
+
+
+def _identifying(channels: int, lines: int) -> str:
+    """What is done, and how long it takes where it is long.
+
+    >>> _identifying(6, 900)
+    'modes of the test, 6 channels of 900 lines'
+    >>> _identifying(30, 6988)
+    'modes of the test, 30 channels of 6988 lines, which takes a minute or more'
+    """
+    more = ", which takes a minute or more" if channels * lines > LONG else ""
+    return f"modes of the test, {channels} channels of {lines} lines{more}"
 
 
 def _likeness(

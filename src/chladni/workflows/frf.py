@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case import Case
-from ..case.sensor_places import ROLES, carried, placed
+from ..case.sensor_places import ROLES, carried, carried_said, placed
 from ..dofs import label, parse
 from ..dynamics.coupled import coupled_receptance
 from ..dynamics.frf import FRF, residual_flexibility, residual_shift, transfer
@@ -99,7 +99,7 @@ def placed_layout(
     if not (masses := carried(model.assembly, outputs, inputs)):
         return model, outputs, inputs
     grids, m = zip(*masses, strict=True)
-    said = f"Sensors of {1e3 * sum(m):.3g} g in all ({path.name}) are on the model."
+    said = f"{carried_said(model.assembly, outputs, inputs, path.name)}."
     loaded = with_masses(model.assembly, grids, np.array(m))
     return replace(model, assembly=loaded, notes=(*model.notes, said)), outputs, inputs
 
