@@ -1,4 +1,4 @@
-"""Folds are found by the angle of facets alone; a factor on their bending is one on nothing else."""
+"""Folds are found by the angle of facets alone; a factor on their bending moves nothing else."""
 
 import numpy as np
 import pytest
