@@ -47,6 +47,14 @@ def test_a_fault_is_raised_where_it_is_asked_for_and_the_rest_is_not_begun():
     assert len(begun) < 10
 
 
+def test_who_stops_asking_ends_the_rest():
+    begun = []
+    done = side_by_side(lambda k: begun.append(k) or k, range(50), 2)
+    assert next(done) == 0
+    done.close()
+    assert len(begun) < 10
+
+
 def test_what_is_said_of_rounding_holds_in_threads():
     with warnings.catch_warnings(), np.errstate(divide="ignore"):
         warnings.simplefilter("error")

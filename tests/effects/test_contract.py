@@ -13,9 +13,10 @@ from chladni.effects import discretisation as mesh
 from chladni.effects import registry
 from chladni.effects import sensor_fault as sensors
 from chladni.effects.crack import LineFinder, crack
-from chladni.effects.effect import Effect
+from chladni.effects.effect import Effect, Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.fold_bending import FoldBending
 from chladni.effects.freed import freed
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
@@ -46,7 +47,7 @@ NAMES = ("family",
     "sensor-mass", "suspension", "thickness-distribution", "sensor-fault", "mesh-error", "jitter",
     "joint-footprint",
     "freed", "local-resonator", "stiffness-patch", "mass-patch", "crack",
-    "membrane-prestress",
+    "membrane-prestress", "fold-bending",
 )  # fmt: skip
 
 
@@ -112,6 +113,12 @@ def cases(reduced):
         ),
         "jitter": (own, 0.01 * np.sin(np.arange(len(own.lam)) + 1), np.zeros(len(own.lam))),
     }  # fmt: skip
+    ones = (Parameter("k", "-", 0.0, 0.4),)
+    found["fold-bending"] = (
+        FoldBending(ones, "folds", share=np.full(len(groups), 0.5)),
+        [0.3],
+        [0],
+    )
     found["family"] = (model_families(reduced.structure)[0], [0.3], [0])
     number = FreeParameter("E", "E", ("sheet",), 0.1, 0.8, 1.3, positions=(0,))
     found["freed"] = (freed(groups, number), [0.2], [0])
@@ -203,7 +210,10 @@ def full(assembly: Assembly) -> np.ndarray:
 
 
 # no deck holds them
-IDLE = {"scatter", "gain", "mesh-error", "joint-footprint", "jitter", "family", "sensor-fault"}
+IDLE = {
+    "scatter", "gain", "mesh-error", "joint-footprint", "jitter", "family", "sensor-fault",
+    "fold-bending",
+}  # fmt: skip
 WRITTEN = [n for n in NAMES if n not in IDLE]
 
 

@@ -30,7 +30,7 @@ from .estimate import Estimate, Location
 if TYPE_CHECKING:
     from .surroundings import Surroundings
 
-FIELDS = ("t", "E", "rho", "Q11", "Q22", "Q12", "Q66")
+FIELDS = ("t", "E", "rho", "bending", "Q11", "Q22", "Q12", "Q66")
 
 
 WIDER = 2.0  # over the learned error: so that 95 % of 160 intervals held the truth on tuning seeds

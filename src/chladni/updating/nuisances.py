@@ -1,9 +1,10 @@
-"""What no calibration removes and every fit has to allow for: scatter, mesh, joints, shear."""
+"""What no calibration removes and every fit allows for: scatter, mesh, joints, shear, folds."""
 
 import scipy.sparse as sp
 
 from ..effects.discretisation import MeshError, Places, mesh_errors, modal_discrepancy
 from ..effects.effect import Effect
+from ..effects.fold_bending import fold_bending
 from ..effects.model_families import model_families
 from ..effects.ordinary import random_field
 from ..fem.assemble import Structure
@@ -40,11 +41,11 @@ def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -
 def nuisances(
     reduced: ReducedProblem, model: Modelled, mesh: list[MeshError], poles_to: float | None = None
 ) -> list[Effect]:
-    """Scatter within parts, mesh error, joints and shear: what calibration cannot remove.
+    """Scatter within parts, mesh error, joints, shear and folds: what calibration cannot remove.
 
     Responses need no modal discrepancy: their likelihood allows any small error of modal stiffness
-    and mass. What is structured in that error stands beside it, joints and shear of the shells by
-    families.
+    and mass. What is structured in that error stands beside it: joints and the shells' shear by
+    families, their bending at folds by parts.
 
     Parameters
     ----------
@@ -56,4 +57,4 @@ def nuisances(
     ]  # fmt: skip
     if poles_to is not None:
         return [*out, modal_discrepancy(model, poles_to, mesh[0] if mesh else None)]
-    return [*out, *model_families(model.structure)]
+    return [*out, *model_families(model.structure), *fold_bending(reduced.groups)]

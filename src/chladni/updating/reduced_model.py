@@ -332,7 +332,7 @@ def log_fields(
         If a component of the plane stiffness is to change in a model that is not split by them.
     """
     n, n_p = len(model.groups), count(effects)
-    logs = {name: np.zeros(n) for name in ("t", "E", "rho", *COMPONENTS)}
+    logs = {name: np.zeros(n) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
     slopes = {name: np.zeros((n, n_p)) for name in logs}
     for effect, at in slices(effects):
         for change in effect.fields(x[at]):

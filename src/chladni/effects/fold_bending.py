@@ -1,0 +1,53 @@
+"""Bending stiffness of shells at folds: what no two meshes, codes or tools make alike.
+
+A radius of 5 mm is a sharp edge between shells of 20 mm; a solver that makes solids of shells ties
+their ends at an edge rigidly, another lets them turn; a bead smaller than a shell is not in the
+deck at all. Membrane and mass are the same in all of them.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry.facets import cell_areas
+from ..geometry.folds import share_at_folds
+from .effect import Effect, FieldChange, Parameter
+from .element_groups import ElementGroups
+
+SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
+LEAST = 0.02  # share of a part's shells at folds below which it has no factor of its own
+
+
+@dataclass(frozen=True, eq=False)
+class FoldBending(Effect):
+    """A factor e^(x s) on the bending stiffness of one part, s the share of a group at folds."""
+
+    name = "fold-bending"
+    claim = "a fold is stiffer or softer in bending than shells that meet at an angle"
+    kind = "nuisance"
+    writable = False
+
+    share: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n_groups,) 0 of other parts
+
+    def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
+        """ln of the factor on bending stiffness."""
+        return (FieldChange("bending", x[0] * self.share, self.share[:, None]),)
+
+
+def fold_bending(groups: ElementGroups) -> list[FoldBending]:
+    """One factor for every part of shells that is folded anywhere."""
+    assembly = groups.structure.assembly
+    cells, points = assembly.shells.nodes, assembly.points
+    if not len(cells):
+        return []
+    area, of = cell_areas(points, cells), groups.group[: len(cells)]
+    folded = np.bincount(of, area * share_at_folds(points, cells), len(groups))
+    share = folded / np.maximum(np.bincount(of, area, len(groups)), np.finfo(float).tiny)
+    out = []
+    for k in np.unique(groups.part[groups.sheet]):
+        own = np.where((groups.part == k) & groups.sheet, share, 0.0)
+        if own @ groups.area > LEAST * groups.area[own > 0].sum():
+            name = assembly.parts[k].name
+            unknown = Parameter("k", "-", 0.0, SPREAD, step=0.3)
+            out.append(FoldBending((unknown,), f"bending at folds of {name}", share=own))
+    return out

@@ -1,0 +1,30 @@
+"""Where the facets of a mesh bend: folds, beads, flanges and what is drawn too coarsely."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from .facets import cell_normals
+
+FOLDED = np.cos(np.radians(20.0))  # normals of shells at one grid that differ by more make a fold
+
+
+def share_at_folds(points: np.ndarray, cells: np.ndarray, folded: float = FOLDED) -> np.ndarray:
+    """Share of the corners of each shell where it meets a shell that faces elsewhere (m,), 0 to 1.
+
+    Which of its sides a shell shows makes no difference.
+
+    Parameters
+    ----------
+    points : (n, 3)      [m]
+    cells : (m, 4) int   rows of points; a triangle repeats its third
+    folded : cosine between two normals below which there is a fold
+    """
+    normal, m = cell_normals(points, cells), len(cells)
+    ones = np.ones(cells.size)
+    holds = sp.csr_array((ones, (cells.ravel(), np.repeat(np.arange(m), 4))), (len(points), m))
+    meet = sp.triu(holds.T @ holds, 1).tocoo()
+    cosine = np.abs(np.einsum("ij,ij->i", normal[meet.row], normal[meet.col]))
+    at = cosine < folded
+    both = holds[:, meet.row[at]].multiply(holds[:, meet.col[at]])
+    fold = np.asarray(both.sum(axis=1)).ravel() > 0
+    return np.asarray(fold[cells].mean(axis=1))
