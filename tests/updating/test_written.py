@@ -23,6 +23,7 @@ from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
+from chladni.updating.result_parts import calibrated
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +50,24 @@ def test_is_the_best_without_scatter(hypothesis):
     left = evaluate(hypothesis.model, deck.fit.effects, x, False)
     r, _ = hypothesis.data.residual(left, False)
     assert deck.fit.misfit <= r @ r + 1e-6
+
+
+def test_what_was_found_is_told_beside_what_the_written_deck_has(hypothesis):
+    """E is estimated beside the scatter; the deck without it has the E that serves it."""
+    deck = as_written(hypothesis, None)
+    null = replace(hypothesis, effect=Effect())
+    named = Diagnosis(null, null, null, (hypothesis,), NAMED, written=deck)
+    (E,) = calibrated(named)
+    whole, own = hypothesis.fit, hypothesis.fit.effects[0]
+    nominal, (x,), (other,) = own.parameters[0].value(0.0), whole.of(own), deck.fit.of(own)
+    assert E.estimate.value == pytest.approx(nominal * np.exp(x))
+    assert E.written_value == pytest.approx(nominal * np.exp(other))
+    assert abs(E.estimate.value / E.written_value - 1) > 1e-6
+    assert E.estimate.low < E.estimate.value < E.estimate.high
+    (of_states,) = calibrated(replace(named, shared=True))
+    assert of_states.estimate.value == of_states.written_value == E.written_value
+    (untouched,) = calibrated(replace(named, verdict=LITTLE))
+    assert untouched.written_value == untouched.deck_value == nominal
 
 
 DUE = threshold(object.__new__(Responses), 1)  # of one family

@@ -72,7 +72,8 @@ def diagnosis_json(result: DiagnosisResult) -> dict[str, Any]:
 
 
 def _calibrated(c: CalibratedParameter) -> dict[str, Any]:
-    return {"where": c.where, **_estimate(c.estimate), "deck_value": c.deck_value}
+    values = {"deck_value": c.deck_value, "written_value": c.written_value}
+    return {"where": c.where, **_estimate(c.estimate), **values}
 
 
 def _effect(e: NamedEffect) -> dict[str, Any]:
@@ -169,7 +170,9 @@ def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
 
 def _read_calibrated(rows: Sequence[Mapping[str, Any]] | None) -> tuple[CalibratedParameter, ...]:
     return tuple(
-        CalibratedParameter(c.get("where", ""), _read_estimate(c), c.get("deck_value"))
+        CalibratedParameter(
+            c.get("where", ""), _read_estimate(c), c.get("deck_value"), c.get("written_value")
+        )
         for c in rows or ()
     )
 

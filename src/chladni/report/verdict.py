@@ -219,14 +219,19 @@ def _calibrated(result: DiagnosisResult) -> list[Block]:
             quantity(c.deck_value, c.estimate.unit),
             _interval(c.estimate),
             percent(c.estimate.value, c.deck_value),
+            quantity(c.written_value, c.estimate.unit),
         )
         for c in result.calibrated
     ]
-    heads = ("parameter", "deck", "updated deck (95 % interval)", "change")
+    heads = ("parameter", "deck", "found (95 % interval)", "change", "updated deck")
     return [Table(heads, rows, ("parameter",), _REACHED)]
 
 
-_REACHED = "What this brings is under Scores and Frequencies: before, and after."
+_REACHED = (
+    "Found beside scatter, joints, mesh and folds, which err as well. The updated deck has none of "
+    "these and may need other values to respond alike; what that brings is under Scores and "
+    "Frequencies: before, and after."
+)
 
 
 def _scores(result: DiagnosisResult) -> list[Block]:

@@ -57,6 +57,7 @@ class Diagnosis:
     sets : several effects together, each of which pays, in the order in which the sets grew
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
     refused : why the leader is not named although it gains what is due
+    shared : whether the deck's numbers are those of several states of one object
     passed_over : names of explanations that were asked before the leader, and what refused each
     """
 
@@ -73,6 +74,7 @@ class Diagnosis:
     sets: tuple[Several, ...] = ()
     gains: tuple[float, ...] = ()
     refused: str = ""
+    shared: bool = False
     passed_over: tuple[tuple[str, str], ...] = ()
 
     @property

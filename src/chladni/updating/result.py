@@ -104,11 +104,19 @@ class Agreement:
 
 @dataclass(frozen=True)
 class CalibratedParameter:
-    """An ordinary parameter that was fitted, beside the value of the deck."""
+    """An ordinary parameter that was fitted, beside the values of the decks.
+
+    Attributes
+    ----------
+    estimate : beside all that is known to err
+    deck_value, written_value : of the deck that was given and of the one that is written, which
+        has no scatter, joints and folds of its own to stand for and may need another value
+    """
 
     where: str
     estimate: Estimate
     deck_value: float | None = None
+    written_value: float | None = None
 
 
 @dataclass(frozen=True)

@@ -157,21 +157,25 @@ def agreement(
 
 
 def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
-    """Ordinary parameters of the deck that is written, beside the values of the deck given.
+    """Ordinary parameters as they were found beside scatter, joints and folds, and in the decks.
 
-    Their intervals are of the fit that had scatter and joints beside them.
+    The deck that is written has none of these to stand for and may need other values to respond
+    alike: those that serve it are no estimates. Of several states the shared ones are both.
     """
-    deck = diagnosis.written or diagnosis.found or diagnosis.plain
+    deck = (diagnosis.written or diagnosis.found or diagnosis.plain).fit
     whole = (diagnosis.found or diagnosis.null).fit
+    changed = diagnosis.verdict != "nothing missing"
     out = []
-    for effect in (e for e in deck.fit.effects if e.kind == "ordinary"):
-        fit = whole if effect in whole.effects else deck.fit
-        rows = effect.reported(deck.fit.of(effect), fit.sd(effect))
-        for parameter, row in zip(effect.parameters, rows, strict=True):
+    for effect in (e for e in deck.effects if e.kind == "ordinary"):
+        fit = whole if effect in whole.effects else deck
+        found = deck if diagnosis.shared else fit
+        rows = effect.reported(found.of(effect), fit.sd(effect))
+        written = effect.reported(deck.of(effect), fit.sd(effect))
+        for parameter, row, other in zip(effect.parameters, rows, written, strict=True):
             given = parameter.value(parameter.nominal)
             called = getattr(effect, "called", "")  # by the user
             where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
-            out.append(CalibratedParameter(where, row, given))
+            out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
 
 

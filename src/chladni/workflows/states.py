@@ -93,7 +93,7 @@ def _with(one: Explained, fit: HypothesisFit, changed: bool) -> Explained:
 
     A state that asks for no other values than the deck's has them too where another state does.
     """
-    found = one.found
+    found = replace(one.found, shared=True)
     if found.found is not None:
         return replace(one, found=replace(found, written=fit))
     if changed and found.verdict == "nothing missing":
