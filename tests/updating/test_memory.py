@@ -1,5 +1,7 @@
 """A search keeps many hypotheses: what each of them holds for itself is little."""
 
+import gc
+import weakref
 from dataclasses import fields, is_dataclass
 
 import numpy as np
@@ -64,3 +66,13 @@ def test_a_fit_that_is_kept_has_let_go_of_slopes(reduced, responses):
     of_parameters = [a for a in own(found, data) if a.shape[-2:] == (m, m) and a.ndim == 3]
     assert not of_parameters
     assert evaluate(reduced.model, effects, found.x).dK.shape == (2, m, m)
+
+
+def test_a_model_is_split_once_while_it_is_held(reduced):
+    """Components weigh four times as much: hypotheses share them, and none stays without one."""
+    split = reduced.model.with_components()
+    assert reduced.model.with_components() is split
+    known = weakref.ref(split)
+    del split
+    gc.collect()
+    assert known() is None

@@ -1,13 +1,16 @@
 """The reduced model in which every hypothesis is tried.
 
-K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
-likewise; E, t, ρ are the sums of the log fields of all effects at x.  One evaluation is a small
-dense eigenproblem; derivatives are exact, because K and M are known functions of the fields.
+K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t+b} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
+likewise; E, t, ρ and b (bending alone) are the sums of the log fields of all effects at x.  One
+evaluation is a small dense eigenproblem; derivatives are exact, because K and M are known functions
+of the fields.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
+from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.sparse as sp
@@ -160,12 +163,22 @@ class Reduced:
         return self.with_components() if split and "" in self.linear else self
 
     def with_components(self) -> Self:
-        """The same model with the plane stiffness split into its four components."""
+        """The same model with the plane stiffness split into its four components.
+
+        It weighs four times as much, so that it is the same one while any hypothesis holds it.
+        """
+        if (known := self._split.get("")) is not None:
+            return known
         linear: dict[str, MatrixStack] = {}
         cubic: dict[str, MatrixStack] = {}
         for name, pair in self.groups.components():
             linear[name], cubic[name] = map(Whole, self.groups.project(pair, self.vectors))
-        return replace(self, linear=linear, cubic=cubic)
+        made = self._split[""] = replace(self, linear=linear, cubic=cubic)
+        return made
+
+    @cached_property
+    def _split(self) -> WeakValueDictionary[str, Self]:
+        return WeakValueDictionary()
 
 
 def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
