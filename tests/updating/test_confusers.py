@@ -18,11 +18,13 @@ from chladni.updating.ties import TIED, simplest_first
 ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 
 
-def tried(name, S, becomes="", implausible="", ln_k=0.0):
+def tried(name, S, becomes="", implausible="", ln_k=0.0, nearly=""):
     effect = SimpleNamespace(
-        name=name, becomes=lambda x: becomes, implausible=lambda x: implausible
-    )
-    fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: np.array([ln_k]))
+        name=name, becomes=lambda x: becomes, implausible=lambda x: implausible,
+        nearly=lambda x, sd: nearly,
+    )  # fmt: skip
+    at = np.array([ln_k])
+    fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: at, sd=lambda e: 0.1 + 0 * at)
     return SimpleNamespace(neg2_log_evidence=S, effect=effect, name=name, fit=fit)
 
 
@@ -89,6 +91,25 @@ def test_what_has_become_the_named_effect_is_no_rival():
     hypotheses = tried("point-mass", 0.0), tried("local-resonator", 2.0, "point-mass")
     answer = with_confusers(Diagnosis(None, None, None, hypotheses, "missing physics"))
     assert answer.one_of == ()
+
+
+@pytest.mark.parametrize(("nearly", "one_of"), [("point-mass", True), ("", False)])
+def test_what_the_named_effect_may_be_is_told_whatever_the_odds(nearly, one_of):
+    lump = tried("local-resonator", 0.0, nearly=nearly)
+    hypotheses = (lump, tried("point-mass", 5 * TIED), tried("suspension", 4 * TIED))
+    answer = with_confusers(Diagnosis(None, None, None, hypotheses, "missing physics"))
+    assert answer.one_of[:2] == (("local-resonator", "point-mass") if one_of else ())
+
+
+@pytest.mark.parametrize(("sd", "name"), [(0.05, ""), (0.5, "point-mass")])
+def test_a_lump_whose_spring_may_be_stiff_may_be_a_point_mass(sd, name):
+    """Half of the highest line, known to a tenth or to no better than a factor of two."""
+    f = Parameter("f", "Hz", 0.0, 0.6, 100.0)
+    other = tuple(Parameter(q, "-", 0.0, 1.0) for q in "mab")
+    resonator = LocalResonator((*other, f))
+    x = np.array([0.0, 0.0, 0.0, np.log(1.5)])
+    assert resonator.becomes(x) == ""
+    assert resonator.nearly(x, np.array([0.1, 0.1, 0.1, sd])) == name
 
 
 def test_what_has_become_the_named_effect_is_told_as_that():

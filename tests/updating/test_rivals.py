@@ -21,8 +21,12 @@ FITS = FitTest(True, 0.5, "all is well", "")
 
 
 def tried(name, gain):
-    effect = SimpleNamespace(name=name, becomes=lambda x: "", implausible=lambda x: "")
-    fit = SimpleNamespace(of=lambda e: np.zeros(1), effects=(), state=name)
+    effect = SimpleNamespace(
+        name=name, becomes=lambda x: "", implausible=lambda x: "", nearly=lambda x, sd: ""
+    )
+    fit = SimpleNamespace(
+        of=lambda e: np.zeros(1), sd=lambda e: np.zeros(1), effects=(), state=name
+    )
     return SimpleNamespace(
         neg2_log_evidence=-gain, effect=effect, name=name, fit=fit, verdict="missing physics"
     )

@@ -304,6 +304,10 @@ class Effect:
         """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
         return ""
 
+    def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
+        """The simpler effect that it is somewhere in its intervals about x, or ""."""
+        return ""
+
     def implausible(self, x: np.ndarray) -> str:
         """Why its value at x is none such a thing can have; "" where it may."""
         return ""

@@ -18,7 +18,7 @@ from ..fem.assemble import structure
 from ..geometry.facets import point_normals, tangents
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Bushes, Masses
-from .effect import Effect, Parameter, PointTerm
+from .effect import WIDER, Effect, Parameter, PointTerm
 from .estimate import Estimate
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, around, moved, patch, there
@@ -92,6 +92,10 @@ class LocalResonator(MovableAttachment):
         """Tuned above the highest line it is a lump that is carried along."""
         f = self.parameters[3]
         return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
+
+    def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
+        """A lump, where data do not say that its spring is softer than the sheet under it."""
+        return self.becomes(x + 1.96 * WIDER * sd)
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The lump itself."""

@@ -1,9 +1,8 @@
 """The reduced model in which every hypothesis is tried.
 
 K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t+b} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
-likewise; E, t, ρ and b (bending alone) are the sums of the log fields of all effects at x.  One
-evaluation is a small dense eigenproblem; derivatives are exact, because K and M are known functions
-of the fields.
+likewise; E, t, ρ, b (bending alone) are the sums of the log fields of all effects at x.  It costs a
+small dense eigenproblem; derivatives are exact, K and M being known functions of the fields.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -163,10 +162,7 @@ class Reduced:
         return self.with_components() if split and "" in self.linear else self
 
     def with_components(self) -> Self:
-        """The same model with the plane stiffness split into its four components.
-
-        It weighs four times as much, so that it is the same one while any hypothesis holds it.
-        """
+        """The same model, the plane stiffness in four components; one for all who hold it."""
         if (known := self._split.get("")) is not None:
             return known
         linear: dict[str, MatrixStack] = {}
