@@ -15,7 +15,7 @@ from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 
 SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
-LEAST = 0.02  # share of a part's shells at folds below which it has no factor of its own
+LEAST = 0.02  # share at folds of those groups that have any, below which a part has no factor
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,7 +94,7 @@ class LocalResonator(MovableAttachment):
         return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
 
     def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
-        """A lump, where data do not say that its spring is softer than the sheet under it."""
+        """A lump, where the frequency of its spring may lie above the highest line."""
         return self.becomes(x + 1.96 * WIDER * sd)
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
