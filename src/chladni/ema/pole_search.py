@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .outer_poles import with_outer_poles
 from .pole_fitting import PoleData, PoleFit, PoleSystem, noise_left, polish, solve
 from .pole_selection import (
     ORDERS,
@@ -61,13 +62,20 @@ def searched(
 def selected(
     data: PoleData, orders: tuple[int, ...], rule: Rule, tries: int
 ) -> tuple[PoleFit, PoleSystem]:
-    """A sweep over orders, then the poles that pay, polished."""
+    """A sweep over orders, then the poles that pay, polished; those beside the band as well."""
     sweep = swept(data, orders, rule.largest)
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = with_neighbours(data, fit, slope, rule)
     fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    return polish(data, fit.p, rule.largest, tol=0.05)
+    fit, slope = polish(data, fit.p, rule.largest, tol=0.05)
+    return min((fit, slope), with_outer_poles(data, fit.p, rule), key=lambda one: _cost(one, rule))
+
+
+def _cost(solution: tuple[PoleFit, PoleSystem], rule: Rule) -> float:
+    """χ² and the price of its poles."""
+    fit, _ = solution
+    return fit.chi2 + rule.price * len(fit.p)
 
 
 def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int) -> Solution:

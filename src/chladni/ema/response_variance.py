@@ -6,6 +6,7 @@ from scipy.ndimage import uniform_filter1d
 from ..dynamics.frf import FRF
 
 SHARE, LEAST = 0.01, 1e-3  # of |H|, of its rms: assumed where nothing is stated
+RESOLVED = 1e-5  # of its rms: what accelerometers and converters resolve, whatever scatters less
 _SMOOTH = 9  # lines over which the coherence is smoothed
 _POINTS, _DEGREE = 5, 3  # a cubic through five lines is the local smooth course
 _WEAK = 0.25  # share of the lines, the faintest, that show the additive noise
@@ -19,7 +20,9 @@ def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
 
     In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
     Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
-    1 % of |H| and, by channel, the scatter of its faint lines, 0.1 % of its rms at least.
+    1 % of |H| and, by channel, the scatter of its faint lines, 0.001 % of its rms at least; 0.1 %
+    where lines are too few to show it. More would hide what is faint and known: springs to ground
+    act where accelerances are a thousandth of their peaks.
     """
     H = np.abs(frf.values)
     rms = np.sqrt((H**2).mean(axis=0))
@@ -29,7 +32,8 @@ def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
         gamma = np.clip(frf.coherence, 1e-3, 1.0)
         ratio = moving_mean((1 - gamma) / gamma, _SMOOTH) / averages
         return (ratio + SHARE**2) * H**2 + (1e-4 * rms) ** 2
-    return (SHARE * H) ** 2 + np.maximum(faint_scatter(frf), LEAST * np.nan_to_num(rms)) ** 2
+    least = RESOLVED if len(H) >= _FEW else LEAST
+    return (SHARE * H) ** 2 + np.maximum(faint_scatter(frf), least * np.nan_to_num(rms)) ** 2
 
 
 def noise_source(frf: FRF, averages: int = 1) -> str:
@@ -39,8 +43,8 @@ def noise_source(frf: FRF, averages: int = 1) -> str:
     if frf.coherence is not None:
         return f"the coherence, {averages} averages being assumed, and 1 % of |H|"
     return (
-        "1 % of |H| and the scatter of each channel's faint lines about their neighbours (0.1 % of "
-        "its rms at least) are assumed, for the recording states nothing"
+        "1 % of |H| and the scatter of each channel's faint lines about their neighbours are "
+        "assumed, for the recording states nothing"
     )
 
 

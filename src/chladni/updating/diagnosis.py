@@ -28,7 +28,7 @@ from .likelihood import Responses
 from .lossy_place import heard_of_damping
 from .reduced_model import evaluate
 from .search_round import on_common_basis, search_round, taken
-from .several import Several, several
+from .several import PAIRED, Several, several
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
 FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
@@ -127,22 +127,35 @@ def diagnose(
     progress("verdict", 0.95)
     called = verdict(nominal, null, hypotheses)
     found = Diagnosis(nominal, null, plain, tuple(hypotheses), called, unasked(problem))
+    found = _tested_alone(problem, found)
+    del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
+    give_back_freed_memory()
     found = _searched_beside(problem, found, within(progress, 0.8, 1.0))
-    behind = (on_common_basis(problem, t) for t in found.hypotheses[1:])  # their names are told
-    return replace(found, hypotheses=(*found.hypotheses[:1], *behind))
+    return _names_alone(problem, found, 1)
 
 
-def _searched_beside(problem: UpdatingProblem, found: Diagnosis, progress: Progress) -> Diagnosis:
-    """The diagnosis tested, with the sets of several effects that explain more than its leader.
+def _tested_alone(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
+    """The diagnosis tested; whole are those alone from which a search for several begins."""
+    alone = tested(found, problem)
+    return _names_alone(problem, alone, PAIRED if alone.verdict == "not in catalogue" else 2)
+
+
+def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
+    """The diagnosis with all but the first of its hypotheses on the common basis."""
+    behind = (on_common_basis(problem, t) for t in found.hypotheses[whole:])
+    return replace(found, hypotheses=(*found.hypotheses[:whole], *behind))
+
+
+def _searched_beside(problem: UpdatingProblem, alone: Diagnosis, progress: Progress) -> Diagnosis:
+    """The tested diagnosis with the sets of several effects that explain more than its leader.
 
     Natural frequencies alone are too few numbers to bear two names.
     """
-    alone, data = tested(found, problem), found.null.data
-    unfit = alone.verdict == "not in catalogue"
+    data, unfit = alone.null.data, alone.verdict == "not in catalogue"
     many = isinstance(data, Responses) and data.error is not None
-    if not (many and found.hypotheses) or (found.found is None and not unfit):
+    if not (many and alone.hypotheses) or (alone.found is None and not unfit):
         return alone
-    search = several(problem, found.hypotheses, found.due, unfit, progress)
+    search = several(problem, alone.hypotheses, alone.due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
 
