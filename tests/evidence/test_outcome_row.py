@@ -36,6 +36,10 @@ def several(*names):
     )
 
 
+GLUED = several("sensor-mass", "adhesive-stiffness")
+GLUED.result["one_of"] = [["adhesive-stiffness", "hem-contact", "cut through the hem"]]
+
+
 def told(effect="point-mass", **more):
     return {**TRUTH, "effect": effect, **more}
 
@@ -72,6 +76,10 @@ def told(effect="point-mass", **more):
         (answer(), told("point-mass + point-mass"), "part"),
         (several("point-mass", "crack"), told("point-mass + sensor-mass"), "wrong"),
         (several("point-mass", "crack"), told(), "wrong"),
+        (answer("hem-contact"), told("hem-stretch"), "right"),
+        (several("sensor-mass", "hem-contact"), told("hem-stretch + sensor-mass"), "right"),
+        (GLUED, told("hem-stretch + sensor-mass"), "among"),
+        (GLUED, told("suspension + sensor-mass"), "wrong"),
         (answer(code=2), told(), "refused"),
         (answer(code=1), told(), "crash"),
         (Answer(0, 1.0, 0.1, ""), told(), "crash"),
