@@ -235,10 +235,9 @@ def _figures(d: Row, truth: Row) -> Row:
 
 
 def _mass_off(d: Row, truth: Row) -> float | None:
-    """Of the deck's mass; one with the sensors' masses in it weighs what hangs on the bench."""
+    """Of what the deck weighs without its sensors."""
     model = (d.get("mass") or {}).get("model_kg")
-    on_bench = max(0.0, truth["unweighed_kg"]) if "sensor-mass" in members(_called(d)) else 0.0
-    return None if model is None else float(abs(np.log(model / (truth["mass_kg"] + on_bench))))
+    return None if model is None else float(abs(np.log(model / truth["mass_kg"])))
 
 
 def _times(truth: Row) -> float | None:

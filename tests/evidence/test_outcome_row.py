@@ -202,14 +202,6 @@ def test_plain_calibration_stands_beside():
     assert "not asked" in beside([row(said(0.0), truth)])
 
 
-def test_a_deck_with_the_sensors_in_it_weighs_what_hangs_on_the_bench():
-    given = answer("sensor-mass", mass={"model_kg": 2.1})
-    assert row(given, told("sensor-mass", unweighed_kg=0.1))["beside"]["diagnosis"][
-        "mass"
-    ] == pytest.approx(0.0)
-    assert row(answer(mass={"model_kg": 2.1}), told())["beside"]["diagnosis"]["mass"] > 0.04
-
-
 def test_what_an_answer_leaves_open_is_no_crash():
     """A null stands where a diagnosis has nothing to say."""
     empty = dict.fromkeys(("adequate", "one_of", "notes", "calibrated", "fit"))

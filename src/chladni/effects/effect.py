@@ -258,6 +258,10 @@ class Effect:
         """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
 
+    def off_the_scales(self, x: np.ndarray) -> float:
+        """Mass [kg] it puts on the structure that is taken off before this is weighed."""
+        return 0.0
+
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array | None:
         """Rows b (k, n) whose static response the reduced basis must hold, or None.
 
