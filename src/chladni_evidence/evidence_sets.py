@@ -20,9 +20,9 @@ from .benched_recording import PLAIN, Recorder
 from .hidden_kinds import CATALOGUED
 from .made_case import KINDS
 from .package_kinds import package_kinds
-from .pair_kinds import PAIRS
+from .pair_kinds import HEMS, PAIRS
 
-SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs", "clamps")
+SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs", "hems", "clamps")
 Purpose = Literal["tune", "report"]
 PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
 REPORTING = 600  # seeds below tune scales and code, those from here on report
@@ -45,6 +45,7 @@ JOINED = {  # structures of the set joints, by what is put into them
     "weld-missing": ("lidded box", "bolted bracket"),
     "adhesive-stiffness": ("bonded plates", "tailgate"),
     "hem-contact": ("tailgate",),
+    "hem-stretch": ("tailgate",),
     "viscoelastic-joint": ("bonded plates",),
 }
 IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support", "point-mass")
@@ -81,6 +82,8 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     turn.
     joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
     pairs: two or three effects at once on plate and panel, our fine mesh and CalculiX in turn.
+    hems: a tailgate whose hem cannot slide, all round or along a stretch, with a thinner sheet and
+    sensors that weigh something; our mesh.
     clamps: nothing, a clamp that gives and what looks like it, on a plate in a clamp; our mesh.
     """
     made = {
@@ -91,6 +94,7 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
         "outside": _outside,
         "joints": _joints,
         "pairs": _pairs,
+        "hems": _hems,
         "clamps": _clamps,
     }
     if name not in made:
@@ -167,6 +171,10 @@ def _pairs(seed: int) -> Iterator[Order]:
     for s, structure in enumerate(SPECIMENS):
         for k, kind in enumerate(PAIRS):
             yield Order(structure, kind, seed, MESHES[(seed + k + s) % 2])
+
+
+def _hems(seed: int) -> Iterator[Order]:
+    yield from (Order("tailgate", kind, seed, "16 mm") for kind in HEMS)
 
 
 def _clamps(seed: int) -> Iterator[Order]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.effects.hem_line import hem_lines
+from chladni.effects.hem_line import HemLine, hem_lines
 from chladni.errors import ModelError
 from chladni.model.assembly import Assembly, Solids
 from chladni.model.properties import Isotropic, SolidSection
@@ -110,26 +110,44 @@ def viscoelastic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def hem(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The sheets of a string do not slide, 1e9 to 1e10 N/m² at size 1: all along, or on half."""
-    a = site.article
-    lines = hem_lines(a)
+    """The sheets of a string do not slide anywhere along it, 1e9 to 1e10 N/m² at size 1."""
+    line, k = _line(site), _grip(rng) * size
+    made = _gripped(site.article, line, np.ones(len(line), bool), k)
+    return Hidden(made, {"value": k, "K": k})
+
+
+def hem_stretch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
+    """The same on a fifth to a half of the string; its place is the middle of the stretch."""
+    line, k = _line(site), _grip(rng) * size
+    middle, L = rng.uniform(0, line.length), line.length * float(rng.uniform(0.2, 0.5))
+    d = np.abs(line.from_place(float(middle)))
+    made = _gripped(site.article, line, d <= L / 2, k)
+    point = line.middle[int(d.argmin())].tolist()
+    return Hidden(made, {"value": k, "K": k, "L": L, "point_m": point})
+
+
+def _line(site: Site) -> HemLine:
+    """The longest string of the article."""
+    lines = hem_lines(site.article)
     if not lines:
         raise ModelError("the article has no string of adhesive between two sheets")
-    line = max(lines, key=lambda one: one.length)
-    k = float(np.exp(rng.uniform(np.log(1e9), np.log(1e10)))) * size
-    middle, whole = float(rng.uniform(0, line.length)), bool(rng.integers(2))
-    d = line.from_place(middle)
-    held = np.ones(len(line), bool) if whole else np.abs(d) <= line.length / 4
+    return max(lines, key=lambda one: one.length)
+
+
+def _grip(rng: np.random.Generator) -> float:
+    """Stiffness against sliding [N/m²]."""
+    return float(np.exp(rng.uniform(np.log(1e9), np.log(1e10))))
+
+
+def _gripped(a: Assembly, line: HemLine, held: np.ndarray, k: float) -> Assembly:
+    """The article with springs against sliding wherever a line is held (k,) bool."""
     names = np.array([[_part_at(a, rows) for rows in side] for side in line.sides])
     for pair in {(str(one), str(two)) for one, two in names}:
         on = held & (names == pair).all(axis=1)
         if on.any():
             places, along, share = line.middle[on], line.along[on], line.share[on]
             a = grip(a, places, along, k * share, pair, reach=0.02)[0]
-    truth = {"value": k, "whole": whole}
-    if not whole:
-        truth["point_m"] = line.middle[int(np.abs(d).argmin())].tolist()
-    return Hidden(a, truth)
+    return a
 
 
 def _part_at(a: Assembly, rows: np.ndarray) -> str:
@@ -143,4 +161,5 @@ JOINTS: dict[str, Kind] = {
     "adhesive-stiffness": adhesive,
     "viscoelastic-joint": viscoelastic,
     "hem-contact": hem,
+    "hem-stretch": hem_stretch,
 }

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .blind_diagnosis import Answer
-from .pair_kinds import AND, members
+from .pair_kinds import AND, catalogued, members
 
 Row = dict[str, Any]
 NULLS = ("nothing", "calibration")
@@ -48,14 +48,15 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     had the held-out data no veto. ``plain`` is what calibration alone answers, whose figures stand
     beside those of the diagnosis.
     """
-    d = answer.result
+    d, kind = answer.result, truth["effect"]
+    truth = {**truth, "effect": catalogued(kind)}
     called, vetoed, place = _called(d), _vetoed(d), _place(d, truth)
     reach = NEAR.get(truth["structure"], CLOSE)
     return {
         "structure": truth["structure"],
         "seed": truth["seed"],
         "mesh": truth["mesh"],
-        "effect": truth["effect"],
+        "effect": kind,
         "called": called,
         "outcome": _outcome(answer, called, truth),
         "by_evidence": _outcome(answer, vetoed or called, truth),
@@ -103,9 +104,11 @@ def _outcome(answer: Answer, called: str, truth: Row) -> str:
         return "right" if truth["effect"] in NULLS else "none"
     if _is(called, truth):
         return "right" if _channel(answer.result, truth) else "wrong"
-    if not Counter(members(called)) - Counter(members(truth["effect"])):
+    given, hidden = (Counter(members(names)) for names in (called, truth["effect"]))
+    if not given - hidden:
         return "part"
-    return "among" if any({called, truth["effect"]} <= names for names in among) else "wrong"
+    apart = set((given - hidden) + (hidden - given))
+    return "among" if any(apart <= names for names in among) else "wrong"
 
 
 def _is(called: str, truth: Row) -> bool:
@@ -232,10 +235,9 @@ def _figures(d: Row, truth: Row) -> Row:
 
 
 def _mass_off(d: Row, truth: Row) -> float | None:
-    """Of the deck's mass; one with the sensors' masses in it weighs what hangs on the bench."""
+    """Of what the deck weighs without its sensors."""
     model = (d.get("mass") or {}).get("model_kg")
-    on_bench = max(0.0, truth["unweighed_kg"]) if _called(d) == "sensor-mass" else 0.0
-    return None if model is None else float(abs(np.log(model / (truth["mass_kg"] + on_bench))))
+    return None if model is None else float(abs(np.log(model / truth["mass_kg"])))
 
 
 def _times(truth: Row) -> float | None:

@@ -10,6 +10,7 @@ from chladni.errors import ModelError
 
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED
+from .joint_kinds import JOINTS
 
 AND = " + "  # between the names of what is hidden
 APART = 0.25  # of the structure's size lie between two places, at least
@@ -22,7 +23,13 @@ PAIRS = (
     "orthotropic-material + point-mass + sensor-mass",
     "thickness-distribution + extra-support + sensor-mass",
 )
+HEMS = (
+    "hem-contact + thickness-distribution + sensor-mass",
+    "hem-stretch + thickness-distribution + sensor-mass",
+)
+CALLED = {"hem-stretch": "hem-contact"}  # kinds that are a form of an effect of the catalogue
 
+HIDDEN = {**CATALOGUED, **JOINTS}
 Sized = Callable[[str, list[int]], tuple[Hidden, float, float]]
 
 
@@ -33,6 +40,15 @@ def members(kind: str) -> list[str]:
     ['sensor-mass', 'extra-support']
     """
     return kind.split(AND)
+
+
+def catalogued(kind: str) -> str:
+    """A kind by the names that the catalogue has for what it hides.
+
+    >>> catalogued("hem-stretch + sensor-mass")
+    'hem-contact + sensor-mass'
+    """
+    return AND.join(CALLED.get(name, name) for name in members(kind))
 
 
 def together(
@@ -59,8 +75,10 @@ def together(
         else:
             raise ModelError(f"no place for {name} apart from the others of {kind}")
         there = replace(site, article=made.article)
-        made = _both(made, CATALOGUED[name](there, np.random.default_rng(own), size))
-        told.append({"effect": name, **alone.truth, "size": size, "moved_decades": moved})
+        made = _both(made, HIDDEN[name](there, np.random.default_rng(own), size))
+        told.append(
+            {"effect": catalogued(name), **alone.truth, "size": size, "moved_decades": moved}
+        )
         least = min(least, moved)
     return made, told, least
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.calibrated_family import calibrated_family
 from chladni.effects.element_groups import element_groups
-from chladni.effects.model_families import joint_nuisances, model_families
+from chladni.effects.model_families import ADHESIVE, FAR, joint_nuisances, model_families
 from chladni.fem.assemble import structure
 from chladni.model.assembly import Bushes
 from chladni.updating.reduced_model import evaluate, reduce
@@ -59,9 +59,25 @@ def test_idle_at_nought_and_positive_far_away(jointed):
         assert evaluate(model, found, np.full(len(found), x), False).lam.min() > -1e-3 * zero.lam[9]
 
 
+@pytest.mark.parametrize("far", [1.0, 30.0])
+def test_no_glue_is_stiffer_than_its_coupons(deck, jointed, far):
+    """However far its number goes, adhesive ends at FAR; small changes are as they are."""
+    (glue,) = (f for f in joint_nuisances(structure(deck)) if f.text == "adhesive")
+    (p,) = glue.parameters
+    most = np.exp(FAR * ADHESIVE)
+    for sign in (-1, 1):
+        assert abs(np.log(p.value(sign * far))) < min(far, np.log(most) * (1 + 1e-12))
+        assert p.value(sign * 0.02) == pytest.approx(np.exp(sign * 0.02), rel=1e-5)
+        h, x = 1e-5, 0.6 * sign
+        assert p.slope(x) == pytest.approx((p.value(x + h) - p.value(x - h)) / (2 * h), rel=1e-8)
+    assert p.value(100.0) == pytest.approx(most)
+    (bushes,) = (f for f in joint_nuisances(structure(jointed)) if f.text == "bushes")
+    assert bushes.parameters[0].value(3.0) == pytest.approx(np.exp(3.0))
+
+
 @pytest.mark.parametrize("name", ["adhesive", "welds", "bushes"])
 def test_a_family_in_the_deck_is_what_the_fit_had(deck, jointed, name):
-    """The deck that is written has K + (e^x - 1) K_family, and no more mass."""
+    """The deck that is written has the factor on K_family, and no more mass."""
     assembly = jointed if name == "bushes" else deck
     built, x = structure(assembly), np.array([np.log(6.0)])
     family = next(f for f in joint_nuisances(built) if f.text == name)

@@ -132,3 +132,11 @@ def test_a_support_elsewhere_is_none_of_its_doing(problem, restraint):
     gain = [plain.neg2_log_evidence - t.neg2_log_evidence for t in (right, other)]
     assert gain[0] > 0
     assert gain[1] < 0.5 * gain[0]
+
+
+def test_a_gauge_is_not_on_the_scales(problem, restraint):
+    """All that it adds to the deck is off when the structure is weighed."""
+    x, deck = np.array([0.5, -0.4, 0.8]), problem.structure.assembly
+    added = mass_properties(restraint.apply(deck, x))[0] - mass_properties(deck)[0]
+    assert_allclose(restraint.off_the_scales(x), added)
+    assert restraint.weight(x)[0] == 0.0

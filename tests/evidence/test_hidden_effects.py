@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.effects.hem_line import hem_lines
 from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
@@ -23,13 +24,15 @@ from chladni_evidence.hidden_kinds import (
     stiffness_patch,
     thinning,
 )
-from chladni_evidence.joint_kinds import viscoelastic
+from chladni_evidence.joint_kinds import hem, hem_stretch, viscoelastic
 from chladni_evidence.outside_kinds import duplicated, foam, friction, rotor
-from chladni_evidence.pair_kinds import APART, PAIRS, together
+from chladni_evidence.pair_kinds import APART, HEMS, HIDDEN, PAIRS, catalogued, together
 from chladni_evidence.part_scatter import WELDS, scattered
 from chladni_evidence.response_of_article import Coupling, accelerance, decades_apart, seen
 from chladni_specimens.forms import FORMS
 from chladni_specimens.plates import folded_panel
+from chladni_specimens.tailgate.design import TailgateDesign
+from chladni_specimens.tailgate.tailgate import tailgate
 
 TOP = 200.0
 LINES = np.linspace(20.0, TOP, 120)
@@ -58,6 +61,22 @@ def site():
         material_axis,
         names,
     )
+
+
+@pytest.fixture(scope="module")
+def hemmed(site):
+    """A coarse tailgate, measured at two grids of its outer lower panel."""
+    a = tailgate(TailgateDesign(size=0.030))
+    at = np.unique(a.shells.nodes[a.shells.part == a.part("outer lower")])[[40, 300]]
+    spots = Spots(
+        tuple(f"{i}:+Z" for i in a.ids[at]), a.ids[at], a.points[at],
+        np.tile([0.0, 0, 1], (2, 1)), ("outer lower",) * 2,
+    )  # fmt: skip
+    mass, sheets = mass_properties(a)[0], ("inner", "outer lower")
+    return replace(
+        site, article=a, outputs=spots, hangers=a.points[at], drive=spots, mass=mass, sheets=sheets,
+        rolled=sheets,
+    )  # fmt: skip
 
 
 def response(site, hidden, damping=0.01):
@@ -281,13 +300,38 @@ def test_modes_another_code_was_not_asked_for_are_ours(monkeypatch):
     np.testing.assert_array_equal(both.shapes, ours.shapes)
 
 
-@pytest.mark.parametrize("kind", PAIRS)
-def test_effects_at_once_are_each_what_it_is_alone(site, kind):
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_hem_holds_where_its_truth_says(hemmed, seed):
+    """All springs along it together are k times the length that is held, and lie on the line."""
+    a, rng = hemmed.article, np.random.default_rng
+    line = max(hem_lines(a), key=lambda one: one.length)
+    old = len(a.bushes)
+    for kind in (hem, hem_stretch):
+        hidden = kind(hemmed, rng(seed), 2.0)
+        truth, bushes = hidden.truth, hidden.article.bushes
+        length = truth.get("L", line.length)
+        held = bushes.stiffness[old:].max(axis=1).sum()
+        assert held == pytest.approx(truth["K"] * length, rel=0.1)
+        assert 2e9 <= truth["value"] <= 2e10
+        if "point_m" in truth:
+            away = np.linalg.norm(bushes.place[old:] - truth["point_m"], axis=1)
+            assert away.max() <= length / 2 + 0.01  # as the crow flies, no farther than along it
+            assert away.min() < 0.02
+            assert 0.2 <= length / line.length <= 0.5
+
+
+def test_a_kind_is_called_as_the_catalogue_calls_it():
+    assert [catalogued(kind) for kind in PAIRS] == list(PAIRS)
+    assert len({catalogued(kind) for kind in HEMS}) == 1
+
+
+@pytest.mark.parametrize("kind", [*PAIRS, *HEMS])
+def test_effects_at_once_are_each_what_it_is_alone(site, hemmed, kind):
     """What they weigh adds up, on the balance and off it; two places lie apart."""
-    alone = {}
+    alone, site = {}, hemmed if kind in HEMS else site
 
     def sized(name, seed):
-        hidden = CATALOGUED[name](site, np.random.default_rng(seed), 1.0)
+        hidden = HIDDEN[name](site, np.random.default_rng(seed), 1.0)
         _, which, *_ = seed
         alone[which] = hidden  # the last that was drawn stays
         return hidden, 0.1 * (1 + which), 1.0
@@ -295,7 +339,7 @@ def test_effects_at_once_are_each_what_it_is_alone(site, kind):
     made, told, least = together(site, kind, 7, sized)
     used = alone.values()
     assert least == pytest.approx(0.1)
-    assert [t["effect"] for t in told] == kind.split(" + ")
+    assert [t["effect"] for t in told] == catalogued(kind).split(" + ")
     assert made.unweighed == pytest.approx(sum(h.unweighed for h in used))
     added = [mass_properties(h.article)[0] - site.mass for h in used]
     assert mass_properties(made.article)[0] - site.mass == pytest.approx(sum(added))

@@ -36,6 +36,10 @@ def several(*names):
     )
 
 
+GLUED = several("sensor-mass", "adhesive-stiffness")
+GLUED.result["one_of"] = [["adhesive-stiffness", "hem-contact", "cut through the hem"]]
+
+
 def told(effect="point-mass", **more):
     return {**TRUTH, "effect": effect, **more}
 
@@ -72,6 +76,10 @@ def told(effect="point-mass", **more):
         (answer(), told("point-mass + point-mass"), "part"),
         (several("point-mass", "crack"), told("point-mass + sensor-mass"), "wrong"),
         (several("point-mass", "crack"), told(), "wrong"),
+        (answer("hem-contact"), told("hem-stretch"), "right"),
+        (several("sensor-mass", "hem-contact"), told("hem-stretch + sensor-mass"), "right"),
+        (GLUED, told("hem-stretch + sensor-mass"), "among"),
+        (GLUED, told("suspension + sensor-mass"), "wrong"),
         (answer(code=2), told(), "refused"),
         (answer(code=1), told(), "crash"),
         (Answer(0, 1.0, 0.1, ""), told(), "crash"),
@@ -192,14 +200,6 @@ def test_plain_calibration_stands_beside():
     assert lines["held-out Q"] == ["0.5", "0.2", "2"]
     assert "t off, %" not in lines
     assert "not asked" in beside([row(said(0.0), truth)])
-
-
-def test_a_deck_with_the_sensors_in_it_weighs_what_hangs_on_the_bench():
-    given = answer("sensor-mass", mass={"model_kg": 2.1})
-    assert row(given, told("sensor-mass", unweighed_kg=0.1))["beside"]["diagnosis"][
-        "mass"
-    ] == pytest.approx(0.0)
-    assert row(answer(mass={"model_kg": 2.1}), told())["beside"]["diagnosis"]["mass"] > 0.04
 
 
 def test_what_an_answer_leaves_open_is_no_crash():

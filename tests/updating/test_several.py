@@ -30,7 +30,7 @@ from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.rivals import _on_its_own_basis
 from chladni.updating.search_round import on_common_basis, search_round
-from chladni.updating.several import _begun_with, _More, _paying, _same, several
+from chladni.updating.several import Rival, _begun_with, _More, _paying, _same, several
 from chladni.updating.several_judged import named_together
 
 SENSORS = [1, 7, 57, 63, 25, 39]
@@ -340,3 +340,20 @@ def test_a_renewed_fit_that_lost_the_gain_is_not_named(monkeypatch, found):
     prepared = SimpleNamespace(problem=None, unseen=None)
     renewed = replace(both.hypothesis, fit=worse)
     assert named_together(prepared, alone, both, renewed)[0] is None
+
+
+def test_what_would_do_in_the_place_of_one_is_told_with_what_physics_says_of_it(monkeypatch, found):
+    both = found[1].sets[-1]
+    rival = Rival("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant")
+    both = replace(both, rivals=((), (rival,)))
+    for name in ("tested", "judged"):
+        monkeypatch.setattr(several_judged, name, lambda *given: next(d for d in given if d.notes))
+    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
+    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
+    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics", ("it fits",))
+    prepared = SimpleNamespace(problem=SimpleNamespace(notes=()), unseen=None, notes=())
+    answer, _ = named_together(prepared, alone, both, both.hypothesis)
+    assert answer is not None
+    assert answer.one_of[:2] == (both.own.effects[1].name, "adhesive-stiffness")
+    assert "pull a coupon" in answer.one_of[2]
+    assert "cannot have: E of 300 MPa" in answer.notes[-1]

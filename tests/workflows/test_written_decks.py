@@ -10,11 +10,15 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 import chladni
+from chladni.fem.energy import mass_properties
+from chladni.model.point_masses import with_masses
 from chladni.report.diagnosis_folder import write_diagnosis
 from chladni.updating.accuracy import LIMIT
 from chladni.updating.preparation import ZETA_Q, prepare
 from chladni.updating.written_scores import noise_Q, seen, written_Q
+from chladni.workflows.diagnosis_pipeline import _article_mass
 from chladni.workflows.question_of_case import question
+from chladni_specimens.plates import plate
 
 LN10 = np.log(10.0)
 
@@ -92,3 +96,19 @@ def test_noise_as_large_as_the_response_leaves_no_floor_that_is_told(variance, t
     prepared = SimpleNamespace(score=None, noise=np.full((4, 2, 1), variance))
     Q = noise_Q(prepared, np.ones((4, 2, 1), bool))
     assert Q == (None if told is None else pytest.approx(told))
+
+
+def test_an_updated_deck_is_weighed_without_the_sensors_that_were_found():
+    """As the article was: what hangs on it in the test alone is in the deck, not on the scales."""
+    deck = plate(0.3, 0.2, 6, 4, 1e-3)
+    heavier = with_masses(deck, (1, 7), 0.05)
+    effects = (
+        SimpleNamespace(writable=True, off_the_scales=lambda x: 0.1 * float(x[0])),
+        SimpleNamespace(writable=False, off_the_scales=lambda x: 1 / 0),
+    )
+    given, made = (SimpleNamespace(assembly=a) for a in (deck, heavier))
+    found = SimpleNamespace(fit=SimpleNamespace(effects=effects, of=lambda e: np.ones(1)))
+    asked, kg = SimpleNamespace(carried=()), mass_properties(deck)[0]
+    for final in (given, made):
+        stages = SimpleNamespace(nominal=given, final=SimpleNamespace(model=final))
+        assert _article_mass(asked, stages, found) == pytest.approx(kg)

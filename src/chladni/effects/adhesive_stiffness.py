@@ -18,7 +18,7 @@ from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .joints import Connection, beads, stiffness, with_factor_on, with_solids
-from .model_families import joint_families
+from .model_families import joint_families, shared_factor
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor
@@ -42,8 +42,11 @@ class AdhesiveStiffness(Effect):
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
         """The bead's own and that of the others."""
-        each = zip((self.operator, self.others), x, np.eye(len(x)), strict=False)
-        return tuple(MatrixTerm("K", A, float(np.expm1(v)), np.exp(v) * e) for A, v, e in each)
+        each = zip((self.operator, self.others), self.parameters, x, np.eye(len(x)), strict=False)
+        return tuple(
+            MatrixTerm("K", A, p.value(v) / p.scale - 1, p.slope(v) / p.scale * e)
+            for A, p, v, e in each
+        )
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """A φ of the bead; the basis carries all adhesive together already."""
@@ -56,7 +59,7 @@ class AdhesiveStiffness(Effect):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """E of the bead, that of the others as it was fitted beside it."""
         assert self.joint is not None
-        beside = float(np.exp(x[1])) if len(x) > 1 else 1.0
+        beside = self.parameters[1].value(x[1]) if len(x) > 1 else 1.0
         made = with_solids(assembly, beside, soft=True)
         return with_factor_on(made, self.joint, float(np.exp(x[0])) / beside)
 
@@ -98,7 +101,7 @@ def _of_one(
         Parameter("E", unit, 0.0, SD, scale, step=1.0, starts=STARTS),
     )
     if abs(others).max() > 1e-9 * abs(K).max():
-        unknown = (*unknown, Parameter("E of other beads", "-", 0.0, sd, step=0.5))
+        unknown = (*unknown, shared_factor("E of other beads", "adhesive", sd))
     x, y, z = bead.point.tolist()
     names = sorted({p.name for p in _parts(built.assembly, bead)})
     text = f"{' and '.join(names)}, {len(bead.elements)} solids {bead.where}"

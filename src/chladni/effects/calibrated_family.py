@@ -11,7 +11,7 @@ from .model_families import ModelFamily
 
 @dataclass(frozen=True, eq=False)
 class CalibratedFamily(ModelFamily):
-    """The same factor e^x, written into the deck: on E of such solids, on K of the bushes."""
+    """The same factor, written into the deck: on E of such solids, on K of the bushes."""
 
     claim = "joints of a kind are far stiffer or softer than the deck has them"
     kind = "ordinary"
@@ -20,7 +20,7 @@ class CalibratedFamily(ModelFamily):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """The deck with the factor in it."""
-        factor = float(np.exp(x[0]))
+        factor = self.parameters[0].value(x[0])
         if self.text != "bushes":
             return with_solids(assembly, factor, soft=self.text == "adhesive")
         bushes = assembly.bushes

@@ -40,7 +40,8 @@ WIDER = 2.0  # over the learned error: so that 95 % of 160 intervals held the tr
 class Parameter:
     """One unknown x with prior N(mean, sd²).
 
-    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``.
+    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``; where
+    nothing can go beyond ``reach`` L it is ``scale · exp(L tanh(x/L))``, x as long as x is small.
     ``step`` is the longest step a fit may take at once, ``starts`` where a search begins. With all
     parameters at ``nominal`` an effect does nothing.
     """
@@ -54,10 +55,22 @@ class Parameter:
     step: float = 0.7
     starts: tuple[float, ...] = ()
     nominal: float = 0.0
+    reach: float = np.inf
 
     def value(self, x: float) -> float:
         """Physical value."""
-        return float(self.scale * (np.exp(x) if self.kind == "log" else x))
+        return float(self.scale * (np.exp(self._drawn_in(x)[0]) if self.kind == "log" else x))
+
+    def slope(self, x: float) -> float:
+        """Its derivative by x."""
+        return self.value(x) * self._drawn_in(x)[1] if self.kind == "log" else self.scale
+
+    def _drawn_in(self, x: float) -> tuple[float, float]:
+        """L tanh(x/L) and its derivative."""
+        if np.isinf(self.reach):
+            return x, 1.0
+        t = float(np.tanh(x / self.reach))
+        return self.reach * t, 1 - t**2
 
     def interval(self, x: float, sd: float, width: float = 1.96) -> tuple[float, float]:
         """Values at x -+ width sd, in increasing order."""
@@ -244,6 +257,10 @@ class Effect:
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
+
+    def off_the_scales(self, x: np.ndarray) -> float:
+        """Mass [kg] it puts on the structure that is taken off before this is weighed."""
+        return 0.0
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array | None:
         """Rows b (k, n) whose static response the reduced basis must hold, or None.

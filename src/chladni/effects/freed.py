@@ -92,6 +92,10 @@ class Freed(Effect):
         each = [m.weight(y) for m in self.members]
         return sum(w for w, _ in each), slope * np.sum([g for _, g in each], axis=0)
 
+    def off_the_scales(self, x: np.ndarray) -> float:
+        """What all members put there."""
+        return sum(m.off_the_scales(self.y(x)[0]) for m in self.members)
+
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """All members written."""
         y, _ = self.y(x)

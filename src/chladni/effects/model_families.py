@@ -19,12 +19,13 @@ from ..fem.energy import only
 from ..fem.shell_section import section_arrays
 from ..fem.sparse_assembly import blocks, congruence
 from ..model.properties import Isotropic, ShellSection, SolidSection
-from .effect import Parameter
+from .effect import MatrixTerm, Parameter
 from .linear_parameter import LinearScale
 
 SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
 JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
+FAR = 3.0  # prior sd of scatter: what is farther off than that is no scatter
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
 
@@ -37,6 +38,22 @@ class ModelFamily(LinearScale):
     claim = "joints and elements are never quite as stiff as a deck says"
     kind = "nuisance"
     writable = False
+
+    def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
+        """What the family has, times the change of the factor."""
+        assert self.slope is not None
+        (factor,), (v,) = self.parameters, x
+        return (MatrixTerm("K", self.slope.K, factor.value(v) - 1, np.array([factor.slope(v)])),)
+
+
+def shared_factor(name: str, family: str, sd: float) -> Parameter:
+    """The unknown factor on all that a family has, or on all of it but one.
+
+    Coupons of an adhesive scatter, and a bead is higher here and wider there. What is stiffer than
+    any coupon is no scatter: another adhesive, or a hem that does not slide.
+    """
+    reach = FAR * sd if family == "adhesive" else np.inf
+    return Parameter(name, "-", 0.0, sd, step=0.5, reach=reach)
 
 
 def model_families(built: Structure) -> list[ModelFamily]:
@@ -51,7 +68,7 @@ def joint_nuisances(built: Structure) -> list[ModelFamily]:
 
 def _families(found: Iterable[tuple[str, sp.csr_array, float]]) -> list[ModelFamily]:
     return [
-        ModelFamily((Parameter("k", "-", 0.0, sd, step=0.5),), text, slope=_slope(K))
+        ModelFamily((shared_factor("k", text, sd),), text, slope=_slope(K))
         for text, K, sd in found
         if K.nnz
     ]

@@ -35,6 +35,10 @@ class SensorMass(MassEffect):
         """Nothing: the article is weighed without its sensors."""
         return 0.0, np.zeros(1)
 
+    def off_the_scales(self, x: np.ndarray) -> float:
+        """All sensors."""
+        return len(self.shares) * self.parameters[0].value(x[0])
+
 
 def sensor_mass(where: Surroundings) -> list[SensorMass]:
     """One mass for all sensors; median 0.4 % of the structure's mass each, at least 2 g."""

@@ -59,6 +59,10 @@ class ShakerRestraint(Effect):
             if (n := rows.shape[0])
         )
 
+    def off_the_scales(self, x: np.ndarray) -> float:
+        """The gauge."""
+        return float(self.values(x)[2])
+
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CBUSH to ground in a frame of the drive, CONM2."""
         return restrained(assembly, self.shares, self.direction, *self.values(x))

@@ -25,7 +25,7 @@ from .estimate import Estimate, Location
 from .family import Article, Family
 from .identified_damping import LEVEL_SD, IdentifiedDamping, paired_with
 from .joints import Connection, stiffness, with_factor_on, with_solids
-from .model_families import joint_families
+from .model_families import joint_families, shared_factor
 from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor on E, as of any bead
@@ -85,7 +85,8 @@ class ViscoelasticJoint(Effect):
         )
         if len(x) < 4:
             return out
-        return (*out, MatrixTerm("K", self.others, float(np.expm1(x[3])), np.exp(x[3]) * e[3]))
+        p = self.parameters[3]
+        return (*out, MatrixTerm("K", self.others, p.value(x[3]) - 1, p.slope(x[3]) * e[3]))
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
         """A φ of the joint; the basis carries all of a kind together already."""
@@ -117,7 +118,7 @@ class ViscoelasticJoint(Effect):
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """E and loss factor at the reference; that of the others as it was fitted beside it."""
         assert self.joint is not None
-        others = float(np.exp(x[3])) if len(x) > 3 else 1.0
+        others = self.parameters[3].value(x[3]) if len(x) > 3 else 1.0
         made = _with_all(assembly, self.joint, others)
         return with_factor_on(made, self.joint, float(np.exp(x[0])) / others, self.exponent(x)[0])
 
@@ -204,7 +205,7 @@ def _of_one(
         Parameter("damping beside it", "-", 0.0, LEVEL_SD, damping.usual),
     )
     if abs(others).max() > 1e-9 * abs(K).max():
-        unknown = (*unknown, Parameter(f"{name} of others", "-", 0.0, sd, step=0.5))
+        unknown = (*unknown, shared_factor(f"{name} of others", one.family, sd))
     x, y, z = one.joint.point.tolist()
     what = "solids" if one.family == "adhesive" else "bushes"
     return ViscoelasticJoint(

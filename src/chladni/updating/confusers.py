@@ -6,7 +6,7 @@ from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .leaning import strained
-from .ties import TIED, tied
+from .ties import TIED, needs_impossible, tied
 
 
 def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
@@ -51,7 +51,7 @@ def with_confusers(diagnosis: Diagnosis) -> Diagnosis:
     odds = "; ".join(f"{evidence_in_words(behind[name])} against {name}" for name in names[1:])
     note = f"{best.effect.name} is not told apart by these data: {odds}"
     odd = [
-        f"{t.effect.name} would need a value it cannot have: {why}"
+        needs_impossible(t.effect.name, why)
         for t in diagnosis.hypotheses
         if t.effect.name in names and (why := t.effect.implausible(t.fit.of(t.effect)))
     ]

@@ -8,10 +8,8 @@ from scipy.stats import chi2
 
 from ..effects.effect import Effect
 from ..effects.freed import Freed
-from ..effects.model_families import JOINTS, ModelFamily
+from ..effects.model_families import FAR, JOINTS, ModelFamily
 from .map_fit import Fit
-
-FAR = 3.0  # prior standard deviations from the deck's value
 
 
 def leaning(fit: Fit) -> list[str]:
@@ -53,8 +51,9 @@ def is_strained(effect: Effect, x: np.ndarray) -> TypeGuard[ModelFamily]:
 
 
 def _more(family: Effect, x: np.ndarray) -> str:
+    times = family.parameters[0].value(x[0])
     return (
-        f"the stiffness of {family.text} as a whole ended at {np.exp(x[0]):.2g} times the deck's, "
+        f"the stiffness of {family.text} as a whole ended at {times:.2g} times the deck's, "
         f"{_away(family, x):.2g} standard deviations of what it may be by itself: it may be what "
         "is wrong"
     )

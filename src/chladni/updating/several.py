@@ -41,6 +41,22 @@ ATTEMPTS = 4  # rounds that may change the set
 Say = Callable[[str, float], None]
 
 
+@dataclass(frozen=True)
+class Rival:
+    """Another family that would do in the place of a member of a set.
+
+    Attributes
+    ----------
+    name : of the family
+    behind : how far it stays behind, in -2 ln evidence
+    implausible : why its value is none such a thing can have; "" where it may
+    """
+
+    name: str
+    behind: float
+    implausible: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Several:
     """Effects that explain the recording together, each of which pays; most gain first.
@@ -51,7 +67,7 @@ class Several:
     own : the same with errors of the model's form as they spread from its own state
     gains : in -2 ln evidence, what ``own`` loses without each, the others fitted again
     without : comparable with ``own``, the best without each
-    rivals : of each, names of other families that would do in its place and how far behind
+    rivals : of each, other families that would do in its place
     due : gain that each had to bring
     about : the model whose state errors of form spread from in ``own``
     """
@@ -60,7 +76,7 @@ class Several:
     own: HypothesisFit
     gains: tuple[float, ...]
     without: tuple[HypothesisFit, ...]
-    rivals: tuple[tuple[tuple[str, float], ...], ...]
+    rivals: tuple[tuple[Rival, ...], ...]
     due: float
     about: Reduced
 
@@ -327,10 +343,13 @@ def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
     return replace(own, fit=fit)
 
 
-def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[tuple[str, float], ...]:
-    """Other families that do as well as a member in its place, and how far they stay behind."""
-    behind = [(t.effect.name, _gain(t, lead)) for t in rivals]
-    return tuple((name, gap) for name, gap in behind if gap < TIED)
+def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[Rival, ...]:
+    """Other families that do as well as a member in its place."""
+    every = [
+        Rival(t.effect.name, _gain(t, lead), t.effect.implausible(t.fit.of(t.effect)))
+        for t in rivals
+    ]
+    return tuple(rival for rival in every if rival.behind < TIED)
 
 
 def _in_pairs(

@@ -15,7 +15,8 @@ from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
 from .outcome import carried, judged, said
 from .question import Prepared
-from .several import Several
+from .several import Rival, Several
+from .ties import needs_impossible
 
 PLAINLY = 0.05  # p of a set where one effect alone did not fit
 
@@ -80,14 +81,16 @@ def _with_rivals(found: Diagnosis, more: Several) -> Diagnosis:
     return found
 
 
-def _tied(found: Diagnosis, effect: Effect, rivals: tuple[tuple[str, float], ...]) -> Diagnosis:
-    names = (effect.name, *(name for name, _ in rivals))
+def _tied(found: Diagnosis, effect: Effect, rivals: tuple[Rival, ...]) -> Diagnosis:
+    names = (effect.name, *(rival.name for rival in rivals))
     check = "; or ".join(c for c in (family(name).settled_by for name in names) if c)
-    behind = ", ".join(f"{name} by {gap:.0f}" for name, gap in rivals)
+    behind = ", ".join(f"{rival.name} by {rival.behind:.0f}" for rival in rivals)
     note = (
         f"beside the others {effect.name} is not told apart by these data; behind it in -2 ln "
         f"evidence: {behind}"
     )
+    odd = [needs_impossible(r.name, r.implausible) for r in rivals if r.implausible]
+    note = "; ".join([note, *odd])
     note = f"{note}; what would settle it: {check}" if check else note
     one_of = (*names, check) if check else names
     return replace(found, one_of=one_of, notes=(*found.notes, note))

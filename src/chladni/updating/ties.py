@@ -34,6 +34,11 @@ def simplest_first(hypotheses: list[HypothesisFit], null: float) -> list[Hypothe
     return hypotheses
 
 
+def needs_impossible(name: str, why: str) -> str:
+    """That an explanation is told apart by physics, where data do not."""
+    return f"{name} would need a value it cannot have: {why}"
+
+
 def tied(best: HypothesisFit, hypotheses: Iterable[HypothesisFit]) -> dict[str, float]:
     """Names of what explains the data as well, its own first, and ln odds against each.
 

@@ -279,7 +279,7 @@ def _result(
         alternatives=alternatives(found),
         agreement=agreement(prepared, found, fitted, held),
         calibrated=calibrated(found),
-        mass=MassComparison(weighed, _article_mass(asked, stages)),
+        mass=MassComparison(weighed, _article_mass(asked, stages, deck)),
         frequencies=rows,
         frequency_error=frequency_error(rows),
         structured=left,
@@ -312,9 +312,15 @@ def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
     return Adequacy(test.passes, test.p, test.what, where, test.statistics)
 
 
-def _article_mass(asked: Question, stages: UpdatedModels) -> float:
-    """What the updated deck weighs: the structure as tested less its sensors [kg]."""
+def _article_mass(asked: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:
+    """What the updated deck weighs: the structure as tested less its sensors [kg].
+
+    Less those that were found as well: they were not on the scales either.
+    """
     sensors = sum(m for _, m in asked.carried)
+    if stages.final.model is not stages.nominal:
+        fit = deck.fit
+        sensors += sum(e.off_the_scales(fit.of(e)) for e in fit.effects if e.writable)
     return mass_properties(stages.final.model.assembly)[0] - sensors
 
 
