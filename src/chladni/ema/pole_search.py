@@ -10,6 +10,7 @@ from .pole_selection import (
     Rule,
     extended,
     merge_duplicate_poles,
+    paid,
     settled,
     start,
     swept,
@@ -66,8 +67,8 @@ def selected(
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = with_neighbours(data, fit, slope, rule)
-    fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    return polish(data, fit.p, rule.largest, tol=0.05)
+    fit, _ = merge_duplicate_poles(data, fit, slope, rule)
+    return paid(data, fit.p, rule)
 
 
 def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int) -> Solution:
