@@ -175,8 +175,8 @@ def settled(
 def paid(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit, PoleSystem]:
     """Poles polished to the end, without those that then pay no more, the poorest first.
 
-    :func:`settled` rests earlier: a pole may pay for itself a hair's breadth away from where it fits
-    best, and a neighbour of its own for what it had been paid for.
+    :func:`settled` rests earlier: a pole may pay for itself a hair's breadth away from where it
+    fits best, and a neighbour of its own for what it had been paid for.
     """
     fit, slope = polish(data, p, rule.largest, tol=0.05)
     while len(fit.p) and fit.delta_chi2.min() < rule.after(data, fit).price:
