@@ -17,6 +17,7 @@ from .fuzz import DUE, fuzz, until
 from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
+from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
 from .thesis import regenerate
 
@@ -47,7 +48,7 @@ def _run(asked: argparse.Namespace) -> int:
 def _screened(asked: argparse.Namespace) -> int:
     """The table of the screening: outcomes by fault."""
     kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
-    for name, count in tally(_seeds(asked), kinds, _say).items():
+    for name, count in tally(_seeds(asked), kinds, _say, asked.long).items():
         _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
     return 0
 
@@ -92,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     screen = commands.add_parser("screen", help="how often faults are named, sound recordings not")
     screen.add_argument("--seeds", required=True, help="first and last, as 600-649")
     screen.add_argument("--faults", default="", help="only these, with commas")
+    screen.add_argument("--long", action="store_true", help=f"{TIMES} times as many lines")
     fuzzed = commands.add_parser("fuzz", help="injured inputs: a sentence or a result, always")
     fuzzed.add_argument("--inputs", type=int, default=10_000)
     fuzzed.add_argument("--minutes", type=float, default=math.inf, help="no longer than this")

@@ -15,6 +15,7 @@ from chladni.dynamics.frf import FRF
 from chladni.ema.finding import Screening
 from chladni.ema.identification import identify
 from chladni.ema.recording_screening import screened
+from chladni.ema.screening_lines import screening_lines
 from chladni.ema.setup import Recording
 from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.fem.modelled import Modelled, modelled
@@ -30,6 +31,7 @@ from .response_of_article import accelerance, seen
 STRUCTURES = ("plate", "panel", "ribbed plate", "curved shell", "lidded box", "bonded plates")
 DAMPING, NOISE = (0.002, 0.03), (0.005, 0.03)
 PER_HALF_BANDWIDTH = 2.0
+TIMES = 20  # the lines, of a long recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +68,14 @@ class Sound:
 Fault = Callable[[Sound, np.random.Generator], tuple[FRF, tuple[str, ...]]]
 
 
-def sound(structure: str, seed: int) -> Sound:
-    """A recording of this seed."""
+def sound(structure: str, seed: int, long: bool = False) -> Sound:
+    """A recording of this seed, ``long`` of ``TIMES`` the lines."""
     bench, model, article = _article(structure, seed)
     rng = np.random.default_rng([seed, 11, *structure.encode()])
     zeta0, noise = (np.exp(rng.uniform(*np.log(span))) for span in (DAMPING, NOISE))
     zeta = zeta0 * np.exp(0.3 * rng.normal(size=2000))
     low, high = 0.7 * bench.first, bench.held[1]
-    lines = even_lines(low, high, max(zeta0, 0.004), PER_HALF_BANDWIDTH)
+    lines = even_lines(low, high, max(zeta0, 0.004), PER_HALF_BANDWIDTH * (TIMES if long else 1))
     spots = bench.outputs
     if rng.integers(2):  # the drive point is measured, too
         spots = _joined(bench.outputs, bench.drive)
@@ -133,9 +135,10 @@ def measured_at(spots: Spots) -> MeasuredDofs:
 
 
 def screening_of(made: Sound, frf: FRF) -> Screening:
-    """What the screening says of a recording, with the model."""
-    found = identify(frf)
+    """What the screening says of a recording, with the model: as ``chladni check`` has it."""
+    use = screening_lines(frf)
+    found = identify(frf, use=use)
     outputs, inputs = measured_at(made.outputs), measured_at(made.bench.drive)
     places = dict(zip(outputs.labels, outputs.points, strict=True))
-    alone = screened(Recording("recording", frf), found, (), places)
+    alone = screened(Recording("recording", frf), found, (), places, use)
     return against_model(alone, found, made.model, outputs, inputs)

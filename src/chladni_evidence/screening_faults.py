@@ -183,13 +183,18 @@ def outcome(screening: Screening, kind: FaultKind, channels: Sequence[str]) -> s
 
 
 def tally(
-    seeds: Sequence[int], kinds: Sequence[str], say: Callable[[str], None]
+    seeds: Sequence[int], kinds: Sequence[str], say: Callable[[str], None], long: bool = False
 ) -> dict[str, Counter[str]]:
-    """Outcomes of every fault over seeds, the structures in turn; findings of sound recordings."""
+    """Outcomes of every fault over seeds, the structures in turn; findings of sound recordings.
+
+    Parameters
+    ----------
+    long : recordings of so many lines that screening leaves out most of them
+    """
     counts: dict[str, Counter[str]] = {k: Counter() for k in ("sound", *kinds)}
     for seed in seeds:
         for name in (STRUCTURES[seed % 6], STRUCTURES[(seed + 3) % 6]):  # two sound ones a seed
-            made = sound(name, seed)
+            made = sound(name, seed, long)
             found = screening_of(made, made.frf)
             counts["sound"]["clean" if not found.findings else "alarm"] += 1
             if found.findings:

@@ -9,6 +9,7 @@ from chladni.dynamics.frf import FRF
 from chladni.ema import pole_fitting as fitting
 from chladni.ema.identification import DERIVATIVES, Identified, equalised, evaluate, identify
 from chladni.errors import FileError
+from chladni_evidence.identification_evidence import recording, structure
 
 EVEN, LOG = np.linspace(20.0, 200.0, 500), np.geomspace(20.0, 200.0, 500)
 
@@ -251,3 +252,11 @@ def test_modes_crowded_beyond_the_band_do_not_spoil_it(seed: int) -> None:
     assert (found.inside).sum() == len(inside)
     assert found.chi == pytest.approx(1.0, abs=0.05)
     assert np.sqrt((np.abs(delta) ** 2).mean(axis=(1, 2))).max() < 0.02
+
+
+def test_what_had_paid_for_itself_once_is_asked_again_at_the_end() -> None:
+    """Of tuning structure 590 a pole near 30.8 Hz paid until all poles were where they fit best."""
+    known = structure(590)
+    found = identify(recording(known, "share, unsaid", 590)[0])
+    inside = np.sort(found.frequency[found.inside])
+    np.testing.assert_allclose(inside, np.sort(np.abs(known.inside)) / (2 * np.pi), rtol=1e-4)

@@ -126,6 +126,28 @@ def test_a_cubic_spring_has_its_size_from_forces_too():
     assert_allclose(fit.values[0] / fit.largest**2, 3e-2 / (16 * A1) ** 2, rtol=0.05)
 
 
+def test_where_a_slider_gives_way_is_found_from_forces_too():
+    """Its curve bends among the lines that are averaged: 4 % off by their mean amplitude alone."""
+    k, slip = 0.05, 0.29 * 16 * A1
+    study = level_study([at(x, lambda A: slider(A, k, slip), seed=550 + n, noise=3e-3)
+                         for n, x in enumerate(LEVELS)])  # fmt: skip
+    fit = study.modes[0].explained
+    assert fit.element.name == "slider"
+    assert_allclose(fit.values * [1, fit.largest], [k, slip], rtol=0.02)
+
+
+def test_two_poles_of_one_peak_that_leans_are_one_mode():
+    """Of tuning draw 504: the lowest level has two of one shape about 40 Hz; all five follow it."""
+    b, n = 9.1e-3, 0.6074
+    runs = [at(x, lambda A: drag(A, b / (16 * A1) ** n, n), seed=50400 + k, noise=1.2e-3)
+            for k, x in enumerate(LEVELS)]  # fmt: skip
+    poles = runs[0].modes.frequency
+    assert ((poles > 39) & (poles < 41)).sum() > 1
+    first, second = modes_over_levels(runs)
+    assert first.level.tolist() == second.level.tolist() == list(LEVELS)
+    assert_allclose(second.damping, ZETA, rtol=0.02)
+
+
 @pytest.mark.parametrize("count", [4, pytest.param(100, marks=pytest.mark.slow)])
 def test_linear_recordings_never_fire(count):
     for draw in range(count):
@@ -275,16 +297,23 @@ def test_a_neighbour_that_is_rung_into_is_no_sign():
     assert [_overlapped(m, every) for m in every] == [False, True, False]
 
 
-@pytest.mark.parametrize("control", ["force", "response"])
-def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control):
-    """95 of 100 of the table's rows, three standard deviations of such a share granted."""
-    held = []
-    for seed in (588, 589):
+@pytest.mark.parametrize(
+    ("control", "kind"),
+    [("force", "share"), ("response", "share"), ("force", "floor"), ("force", "share, unsaid")],
+)
+def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kind):
+    """95 of 100 of the table's rows, three standard deviations of such a share granted.
+
+    What the lowest level is not sure of is in every level's: of a constant noise, without it,
+    errors are 1.2 times what is stated.
+    """
+    held, scores = [], []
+    for seed in range(585, 590):
         known = structure(seed, 6, 5)
         levels = [
             AtLevel(x, frf, identify(frf), control)
             for k, x in enumerate((1.0, 2.0, 4.0, 8.0))
-            for frf in [recording(known, "share", 10 * seed + k, lines=300)[0]]
+            for frf in [recording(known, kind, 10 * seed + k, lines=300)[0]]
         ]
         size, zeta = np.abs(known.poles), -known.poles.real / np.abs(known.poles)
         for table in level_tables(level_study(levels)):
@@ -295,6 +324,9 @@ def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control):
                     row.frequency_low_hz < f < row.frequency_high_hz,
                     row.damping_low < zeta[k] < row.damping_high,
                 ]
+                scores += [(row.frequency_hz - f) / row.frequency_sd_hz,
+                           (row.damping - zeta[k]) / row.damping_sd]  # fmt: skip
                 assert 0 < row.damping_low < row.damping < row.damping_high
-    assert len(held) > 80
+    assert len(held) > 200
     assert np.mean(held) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / len(held))
+    assert np.sqrt(np.mean(np.square(scores))) < 1 + 3 / np.sqrt(2 * len(scores))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
+from chladni.ema.finding import Finding, Screening
 from chladni.ema.screening import homogeneity, levels_checked, roughness, runs, screen
 from chladni.ema.setup import Recording
 from chladni.errors import ShapeError
@@ -125,3 +126,10 @@ def test_levels_on_other_lines_are_interpolated() -> None:
 
 def test_runs_of_lines() -> None:
     assert runs(F[:5], np.array([True, False, True, True, True])) == ((3.0, 5.0),)
+
+
+def test_what_is_found_several_times_is_said_once():
+    """As levels do that all differ from the lowest."""
+    one = Finding("not linear", "levels differ.", "warning", ("2:+Z",))
+    said = Screening("a", (one, replace(one, kind="delay"), one)).sentence
+    assert said == "a is to be looked at: 2 times not linear (2:+Z), delay (2:+Z)"

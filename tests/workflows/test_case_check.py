@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -207,3 +208,20 @@ def test_a_case_without_a_recording_is_told_what_that_means(copied):
     (copied / "case.toml").write_text(text[: text.index("[test]")])
     facts = dict(chladni.check(chladni.load_case(copied)).facts)
     assert "all other commands do" in facts["recording"]
+
+
+def test_of_a_long_recording_few_lines_are_identified(case, monkeypatch):
+    """What is said stays; any other command has all lines."""
+    correlation, lines = import_module("chladni.workflows.correlate"), []
+    plainly = correlation.identified
+
+    def counted(*words, use, **more):
+        lines.append(int(use.sum()))
+        return plainly(*words, use=use, **more)
+
+    monkeypatch.setattr(correlation, "identified", counted)
+    chladni.correlate(case)
+    monkeypatch.setattr("chladni.ema.screening_lines.LONG", 0)
+    assert not chladni.check(case).findings
+    chladni.correlate(case)
+    assert lines[0] == lines[2] > lines[1] > 0

@@ -152,6 +152,7 @@ def test_identify_says_it_on_the_terminal_and_in_its_files(identified):
     assert "levels_1.png" in page
     assert "Every mode at every level" in page
     assert "Every mode at every level" in done.output
+    assert "<h1>4 recordings of " in page
 
 
 def test_a_table_holds_every_mode_at_every_level(identified):

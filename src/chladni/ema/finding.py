@@ -1,5 +1,6 @@
 """What the screening of a recording finds: sentences with their channels, size and repair."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -57,7 +58,8 @@ class Screening:
         done = [c for c in self.checks if c.passed is not None]
         if not self.findings:
             return f"{self.name}: nothing found in {len(done)} checks"
-        kinds = ", ".join(f.kind + _of(f.channels) for f in self.findings)
+        count = Counter(f.kind + _of(f.channels) for f in self.findings)
+        kinds = ", ".join(f"{n} times {what}" if n > 1 else what for what, n in count.items())
         word = "at fault" if self.faults else "to be looked at"
         return f"{self.name} is {word}: {kinds}"
 

@@ -59,17 +59,26 @@ class ElementFit:
         free = self.data - self.count
         return float(chi2.sf(self.chi2, free)) if free > 0 else float("nan")
 
-    def at(self, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Natural frequency [Hz] and damping at amplitudes (k,) [m]."""
-        kappa = self.element.kappa(amplitude / self.largest, self.values)
-        f, zeta = _with(kappa, self.damping)
+    def at(
+        self, amplitude: np.ndarray, amplitude_sd: np.ndarray | float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Natural frequency [Hz] and damping at amplitudes (k,) [m], or about them on average."""
+        a, s = amplitude / self.largest, amplitude_sd / self.largest
+        f, zeta = _with(self.element, a, s, self.values, self.damping)
         return self.frequency * f, zeta
 
 
-def _with(kappa: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """f/f_0 = √(1 + κ') and ζ = ζ_0 f_0/f + κ''/2 (f_0/f)²; the viscous part stays as it is."""
+def _with(
+    element: Element, a: np.ndarray, s: np.ndarray | float, values: np.ndarray, damping: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """f/f_0 = √(1 + κ') and ζ = ζ_0 f_0/f + κ''/2 (f_0/f)²; the viscous part stays as it is.
+
+    The mean over relative amplitudes of mean a and standard deviation s, by the two points a ± s:
+    what lines of one peak show on average, where a slider gives way or a gap closes among them.
+    """
+    kappa = element.kappa(np.maximum([a - s, a + s], 1e-9), values)
     f = np.sqrt(np.maximum(1 + kappa.real, 1e-6))
-    return f, damping / f + kappa.imag / (2 * f**2)
+    return f.mean(axis=0), (damping / f + kappa.imag / (2 * f**2)).mean(axis=0)
 
 
 def weights(mode: ModeLevels) -> tuple[np.ndarray, np.ndarray]:
@@ -97,14 +106,15 @@ def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
     """The best of fits from the best starts."""
     largest = float(mode.amplitude.max())
     s_f, s_z = weights(mode)
-    a, f, z = mode.amplitude / largest, mode.frequency, mode.damping
+    a, s = mode.amplitude / largest, mode.amplitude_sd / largest
+    f, z = mode.frequency, mode.damping
     signed = np.array([n.signed for n in element.numbers], bool)
 
     def values(theta: np.ndarray) -> np.ndarray:
         return np.where(signed, theta, np.exp(np.where(signed, 0.0, theta)))
 
     def residual(x: np.ndarray) -> np.ndarray:
-        ratio, zeta = _with(element.kappa(a, values(x[2:])), np.exp(x[1]))
+        ratio, zeta = _with(element, a, s, values(x[2:]), np.exp(x[1]))
         return np.concatenate(
             [(x[0] + np.log(ratio / f)) / s_f, np.log(np.maximum(zeta, 1e-9) / z) / s_z]
         )
@@ -181,7 +191,7 @@ def foretold(mode: ModeLevels, held: Sequence[int] | None = None) -> HeldOutLeve
     fits = fitted_elements(mode.sel(seen)) if len(rows) else ()
     if not fits:
         return None
-    f, zeta = fits[0].at(mode.amplitude[rows])
+    f, zeta = fits[0].at(mode.amplitude[rows], mode.amplitude_sd[rows])
     s_f, s_z = (1 / s[seen] ** 2 for s in weights(mode))
     mean = (
         float(np.exp(np.average(np.log(mode.frequency[seen]), weights=s_f))),

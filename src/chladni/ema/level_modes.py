@@ -11,11 +11,13 @@ from scipy.stats import chi2
 from ..dynamics.frf import FRF
 from .correlation import mac
 from .identification import DERIVATIVES, Identified, evaluate
-from .response_variance import frf_variance
+from .pole_search import STEADY
+from .response_variance import frf_variance, left_scatter
 from .setup import Control
 
 PARTNER = 0.05  # of a frequency: farther away is another mode
 SAME_SHAPE = 0.8  # MAC of the residues over three channels or more: less is another mode
+TWIN = 1.5  # half-bandwidths: poles of one shape nearer than that are one mode
 STANDS_OUT = 3.0  # of χ² a pole must bring, over what it pays, to be followed
 KNOWN = 0.5  # standard deviation over its damping: a mode of which less is known is not followed
 NEAR = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
@@ -47,6 +49,23 @@ class AtLevel:
         """Of every sample of the FRF (n_f, n_out, n_in), once for all modes that are followed."""
         return frf_variance(self.frf, self.averages)
 
+    @property
+    def stated(self) -> bool:
+        """Whether the recording itself says how large its noise is."""
+        return self.frf.variance is not None or self.frf.coherence is not None
+
+    @cached_property
+    def left(self) -> tuple[np.ndarray, np.ndarray]:
+        """a², b² (n_out, n_in) of noise a²|H|² + b²: what its modes leave, where nobody says it."""
+        low, high = self.modes.band
+        f, H = self.frf.frequency, self.frf.values
+        near = (low <= f) & (f <= high)
+        model = evaluate(self.modes, 2j * np.pi * f[near])
+        flat = (int(near.sum()), -1)
+        rest, fit = (H[near] - model).reshape(flat), model.reshape(flat)
+        a2, b2 = left_scatter(rest, fit, np.isfinite(rest))
+        return a2.reshape(H.shape[1:]), b2.reshape(H.shape[1:])
+
 
 @dataclass(frozen=True, eq=False)
 class ModeLevels:
@@ -59,6 +78,9 @@ class ModeLevels:
     amplitude : (k,)                   at which the mode was seen [m]
     frequency, frequency_sd : (k,)     [Hz]
     damping, damping_sd : (k,)         of critical
+    frequency_own, damping_own : (k,)  of these the part that is a level's own: the rest moves all
+        levels alike, for one level is the reference of all
+    amplitude_sd : (k,)                of the lines that were averaged [m]; 0 where all have one
     """
 
     output: str
@@ -68,6 +90,9 @@ class ModeLevels:
     frequency_sd: np.ndarray
     damping: np.ndarray
     damping_sd: np.ndarray
+    frequency_own: np.ndarray
+    damping_own: np.ndarray
+    amplitude_sd: np.ndarray
 
     def sel(self, rows: np.ndarray) -> Self:
         """Some of the levels."""
@@ -77,12 +102,12 @@ class ModeLevels:
     @property
     def p_frequency(self) -> float:
         """Chance of frequencies so far apart, were they the same."""
-        return _p(self.frequency, self.frequency_sd)
+        return _p(self.frequency, self.frequency_own)
 
     @property
     def p_damping(self) -> float:
         """Chance of dampings so far apart, were they the same."""
-        return _p(self.damping, self.damping_sd)
+        return _p(self.damping, self.damping_own)
 
     @property
     def frequency_moves(self) -> bool:
@@ -121,8 +146,27 @@ def modes_over_levels(recordings: Sequence[AtLevel]) -> tuple[ModeLevels, ...]:
     if len({r.level for r in known}) < 2:
         return ()
     first = known[0]
-    tracks = [_track(first, int(k), known) for k in np.flatnonzero(_clear(first.modes))]
+    lowest = _twins_joined(first.modes)
+    noise = [_noise(first, one) for one in known]
+    tracks = [_track(lowest, int(k), known, noise) for k in np.flatnonzero(_clear(lowest))]
     return tuple(t for t in tracks if t is not None and len(set(t.level)) > 1)
+
+
+def _twins_joined(found: Identified) -> Identified:
+    """Poles of one shape within a bandwidth made one mode, of the residues of all.
+
+    A peak that leans is fitted better by two poles than by one; neither has its residue.
+    """
+    half, strength = np.abs(found.poles.real), found.relative_delta_chi2
+    near = np.abs(found.poles[:, None] - found.poles)
+    close = (near < TWIN * np.maximum(half[:, None], half)) & _alike(found, found)
+    residues, kept = found.residues.copy(), np.ones(found.order, bool)
+    for k in np.argsort(-strength):
+        twins = close[k] & kept & (np.arange(found.order) != k)
+        if kept[k] and twins.any():
+            residues[k] += residues[twins].sum(axis=0)
+            kept &= ~twins
+    return replace(found, residues=residues).sel(kept)
 
 
 def _clear(found: Identified) -> np.ndarray:
@@ -131,20 +175,22 @@ def _clear(found: Identified) -> np.ndarray:
     return found.inside & (found.relative_delta_chi2 > STANDS_OUT) & sure
 
 
-def _track(first: AtLevel, mode: int, known: Sequence[AtLevel]) -> ModeLevels | None:
+def _track(
+    first: Identified, mode: int, known: Sequence[AtLevel], noise: Sequence[np.ndarray]
+) -> ModeLevels | None:
     """A mode of the lowest level at every level where it has a partner."""
-    R = np.abs(first.modes.residues[mode])
+    R = np.abs(first.residues[mode])
     i, j = np.unravel_index(int(R.argmax()), R.shape)
-    output = first.modes.outputs[i]
+    output = first.outputs[i]
     rows = []
-    for one in known:
-        alike = (one.frf.outputs, one.frf.inputs) == (first.frf.outputs, first.frf.inputs)
-        if not alike or (k := _partner(first.modes, mode, one.modes)) is None:
+    for one, variance in zip(known, noise, strict=True):
+        alike = (one.frf.outputs, one.frf.inputs) == (first.outputs, first.inputs)
+        if not alike or (k := _partner(first, mode, one.modes)) is None:
             continue
         if one.control == "response":
             row = _pole(one, k, int(i), int(j))
         else:
-            row = _lines(first.modes, mode, one, one.modes.poles[k], int(i), int(j))
+            row = _lines(first, mode, one, variance, one.modes.poles[k], int(i), int(j))
         if row[4] < KNOWN * row[3]:
             rows.append((one.level, *row))
     return ModeLevels(output, *np.array(rows, dtype=float).T) if len(rows) > 1 else None
@@ -152,8 +198,6 @@ def _track(first: AtLevel, mode: int, known: Sequence[AtLevel]) -> ModeLevels | 
 
 def _partner(first: Identified, mode: int, other: Identified) -> int | None:
     """The mode of another level that is this one: the nearest of its shape, and it of that."""
-    if first is other:
-        return mode
     alike = _alike(first, other) & _clear(first)[:, None] & _clear(other)[None, :]
     far = np.abs(np.log(other.frequency[None, :] / first.frequency[:, None]))
     far = np.where(alike & (far < PARTNER), far, np.inf)
@@ -169,7 +213,7 @@ def _alike(a: Identified, b: Identified) -> np.ndarray:
     return mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE
 
 
-Seen = tuple[float, float, float, float, float]
+Seen = tuple[float, float, float, float, float, float, float, float]  # as `ModeLevels` has them
 
 
 def _pole(one: AtLevel, k: int, i: int, j: int) -> Seen:
@@ -181,20 +225,24 @@ def _pole(one: AtLevel, k: int, i: int, j: int) -> Seen:
     held = m.outputs.index(drive) if drive in m.outputs else 0
     share = np.abs(m.residues[k, i, j] / m.residues[k, held, j])
     A = (one.level or 0.0) * share / np.abs(m.poles[k]) ** DERIVATIVES[m.quantity]
-    rows = (A, m.frequency[k], m.frequency_sd[k], m.damping[k], m.damping_sd[k])
-    return float(rows[0]), float(rows[1]), float(rows[2]), float(rows[3]), float(rows[4])
+    f, sd_f = float(m.frequency[k]), float(m.frequency_sd[k])
+    zeta, sd_z = float(m.damping[k]), float(m.damping_sd[k])
+    return float(A), f, sd_f, zeta, sd_z, sd_f, sd_z, 0.0
 
 
-def _lines(first: Identified, mode: int, one: AtLevel, pole: complex, i: int, j: int) -> Seen:
-    """Amplitude of output i [m], frequency [Hz], its sd, damping and its sd of a mode at a level.
+def _lines(
+    first: Identified, mode: int, one: AtLevel, noise: np.ndarray, pole: complex, i: int, j: int
+) -> Seen:
+    """A mode at a level by the lines about its peak, the amplitude that of output i.
 
     Under a constant force every line has an amplitude of its own, a peak leans, and one pole would
     call that damping. So lines are asked, not the pole: with the residue R and all else as the
     lowest level has them, y = Rᴴ (H - rest) of input j gives D = 2i ω_d RᴴR / y, which is
     ω_r² (1 + κ') - ω² + i (2 ζ ω_r ω + ω_r² κ'') at that line's amplitude (inverse of the FRF:
     Worden and Tomlinson 2001, section 2.2). Lines about the peak are averaged, amplitudes too.
+    What the lowest level is not sure of is in the spread of every level.
     """
-    omega, y, variance = _modal_lines(first, mode, one, pole, j)
+    omega, y, variance = _modal_lines(first, mode, one, noise, pole, j)
     top = _about_peak(np.abs(y))
     omega, y, variance = omega[top], y[top], variance[top]
     R = first.residues[mode, :, j]
@@ -207,17 +255,53 @@ def _lines(first: Identified, mode: int, one: AtLevel, pole: complex, i: int, j:
     A = (one.level or 0.0) * np.abs(y) * np.abs(R[i]) / power
     w = 1 / sd[1] ** 2
     (f, z), spread = (each * w).sum(axis=1) / w.sum(), _scatter(A, each, sd)
-    sd_f, sd_z = spread / np.sqrt((1 / sd**2).sum(axis=1))
-    return float((A * w).sum() / w.sum()), float(f), float(sd_f), float(z), float(sd_z)
+    own = spread / np.sqrt((1 / sd**2).sum(axis=1))
+    turned = np.array([[D.real, -D.imag], [D.imag, D.real]]) / (2 * omega_r)  # D δ ln D, as ω_r
+    slopes = np.array([turned[0] / (2 * np.pi), turned[1] / omega - each[1] * turned[0] / omega_r])
+    by = (slopes * w).sum(axis=2) / w.sum()
+    shared = np.sqrt(np.einsum("ia,ab,ib->i", by, _spread_of_reference(first, mode, j), by))
+    sd_f, sd_z = np.hypot(own, shared)
+    mean = float((A * w).sum() / w.sum())
+    apart = float(np.sqrt(((A - mean) ** 2 * w).sum() / w.sum()))
+    return mean, float(f), float(sd_f), float(z), float(sd_z), float(own[0]), float(own[1]), apart
+
+
+def _spread_of_reference(first: Identified, mode: int, j: int) -> np.ndarray:
+    """Covariance (2, 2) of real and imaginary part of δ ln D = Rᴴ δR / RᴴR + δω_d / ω_d.
+
+    That is what the pole and the residues R of the lowest level leave in D = 2i ω_d RᴴR / y, y = Rᴴ
+    (H - rest), at any level; zero of modes without a covariance. What they leave in ``rest`` is
+    small beside the peak.
+    """
+    if first.covariance is None:
+        return np.zeros((2, 2))
+    n_in = len(first.inputs)
+    R, known = first.by_channel[mode][j::n_in], first.covariance
+    turn = np.array([[R.real, R.imag], [-R.imag, R.real]]) / float((np.abs(R) ** 2).sum())
+    root = np.einsum("abc,cbm->am", turn, known.shared[mode][j::n_in])
+    root[0] += known.pole[mode][1] / first.poles[mode].imag
+    local = np.einsum("abc,cbd,edc->ae", turn, known.local[mode][j::n_in], turn)
+    return np.asarray(root @ root.T + local)
+
+
+def _noise(lowest: AtLevel, one: AtLevel) -> np.ndarray:
+    """Variance of every sample of a level (n_f, n_out, n_in).
+
+    It is no less than what the lowest level leaves, where the object is nearest to linear; where
+    the recordings state none it is that.
+    """
+    if one.stated and lowest.stated:
+        return max(1.0, lowest.modes.chi) ** 2 * one.variance
+    a2, b2 = lowest.left
+    alike = a2.shape == one.variance.shape[1:]
+    left = a2 * np.abs(one.frf.values) ** 2 + b2 if alike else one.variance
+    return np.maximum(left, STEADY**2 * one.variance)
 
 
 def _modal_lines(
-    first: Identified, mode: int, one: AtLevel, pole: complex, j: int
+    first: Identified, mode: int, one: AtLevel, noise: np.ndarray, pole: complex, j: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each.
-
-    Noise is no less than what the lowest level leaves, where the object is nearest to linear.
-    """
+    """ω, y and the variance of y at the lines near a pole, all but the mode taken off (n,) each."""
     away = np.abs(2 * np.pi * one.frf.frequency - np.abs(pole))
     near = away <= max(-NEAR * pole.real, np.sort(away)[2])
     frf, s = one.frf, 2j * np.pi * one.frf.frequency[near]
@@ -225,8 +309,7 @@ def _modal_lines(
     q = np.abs(s[:, None] ** DERIVATIVES[first.quantity]) ** 2
     H = (frf.values[near] - evaluate(rest, s))[:, :, j] / s[:, None] ** DERIVATIVES[first.quantity]
     R = first.residues[mode, :, j]
-    variance = max(1.0, first.chi) ** 2 * one.variance[near][:, :, j] / q
-    return s.imag, H @ R.conj(), variance @ np.abs(R) ** 2
+    return s.imag, H @ R.conj(), (noise[near][:, :, j] / q) @ np.abs(R) ** 2
 
 
 def _about_peak(size: np.ndarray) -> np.ndarray:

@@ -160,7 +160,8 @@ def _falling(decay: RingDown, quantity: Quantity) -> ModeLevels:
     rise = np.argsort(decay.amplitude)
     f, zeta = decay.frequency_at[rise], decay.damping_at[rise]
     A = decay.amplitude[rise] / (2 * np.pi * decay.frequency) ** DERIVATIVES[quantity]
-    return ModeLevels(decay.output, A, A, f, FLOOR_FREQUENCY * f, zeta, FLOOR_DAMPING * zeta)
+    own = FLOOR_FREQUENCY * f, FLOOR_DAMPING * zeta
+    return ModeLevels(decay.output, A, A, f, own[0], zeta, own[1], *own, 0 * A)
 
 
 def _studied(mode: ModeLevels) -> ModeStudy:

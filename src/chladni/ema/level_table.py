@@ -123,7 +123,7 @@ def _rows(one: ModeStudy) -> tuple[LevelRow, ...]:
     if one.fits:
         best = one.fits[0]
         kappa = best.element.kappa(m.amplitude / best.largest, best.values)
-        fitted[:2] = [x.tolist() for x in best.at(m.amplitude)]
+        fitted[:2] = [x.tolist() for x in best.at(m.amplitude, m.amplitude_sd)]
         fitted[4:] = [kappa.real.tolist(), kappa.imag.tolist()]
     if held is not None:
         for k, f, zeta in zip(held.rows, held.frequency, held.damping, strict=True):

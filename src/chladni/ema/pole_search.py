@@ -11,6 +11,7 @@ from .pole_selection import (
     Rule,
     extended,
     merge_duplicate_poles,
+    paid,
     settled,
     start,
     swept,
@@ -67,9 +68,10 @@ def selected(
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = with_neighbours(data, fit, slope, rule)
-    fit, slope = merge_duplicate_poles(data, fit, slope, rule)
-    fit, slope = polish(data, fit.p, rule.largest, tol=0.05)
-    return min((fit, slope), with_outer_poles(data, fit.p, rule), key=lambda one: _cost(one, rule))
+    fit, _ = merge_duplicate_poles(data, fit, slope, rule)
+    alone = paid(data, fit.p, rule)
+    beside, _ = with_outer_poles(data, alone[0].p, rule)
+    return min(alone, paid(data, beside.p, rule), key=lambda one: _cost(one, rule))
 
 
 def _cost(solution: tuple[PoleFit, PoleSystem], rule: Rule) -> float:

@@ -172,6 +172,18 @@ def settled(
     return fit, slope
 
 
+def paid(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit, PoleSystem]:
+    """Poles polished to the end, without those that then pay no more, the poorest first.
+
+    :func:`settled` rests earlier: a pole may pay for itself a hair's breadth away from where it
+    fits best, and a neighbour of its own for what it had been paid for.
+    """
+    fit, slope = polish(data, p, rule.largest, tol=0.05)
+    while len(fit.p) and fit.delta_chi2.min() < rule.after(data, fit).price:
+        fit, slope = polish(data, np.delete(fit.p, fit.delta_chi2.argmin()), rule.largest, tol=0.05)
+    return fit, slope
+
+
 def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.ndarray:
     """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
     low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())

@@ -26,6 +26,7 @@ def screened(
     found: Identified | None = None,
     others: Sequence[Recording] = (),
     places: dict[str, np.ndarray] | None = None,
+    use: np.ndarray | None = None,
 ) -> Screening:
     """What a recording says of itself.
 
@@ -34,6 +35,7 @@ def screened(
     found : what was identified from it, where that is known
     others : recordings of the same test, at the same level or others
     places : {output: (3,)} [m]
+    use : (n_f,) bool, lines it was identified from, default all; to be identified from once more
     """
     frf = recording.frf
     if frf is None:
@@ -53,20 +55,22 @@ def screened(
     checks += check
     if found is not None:
         strong = strong_modes(found)
-        more, one = _phases(frf, strong)
+        more, one = _phases(frf, strong, use)
         findings += more
         checks.append(one)
         checks.append(_lines(strong, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
 
 
-def _phases(frf: FRF, strong: Identified) -> tuple[list[Finding], Check]:
+def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:
     """Delay and quantity; where either is in doubt the recording is identified once more."""
     if strong.order < LEAST_MODES and frf.quantity in QUANTITIES and strong.chi > POOR:
         others = {
             q: replace(frf, quantity=cast(Quantity, q)) for q in QUANTITIES if q != frf.quantity
         }
-        read = {q: strong_modes(identify(other, strong.band)) for q, other in others.items()}
+        read = {
+            q: strong_modes(identify(other, strong.band, use=use)) for q, other in others.items()
+        }
         findings = other_quantity(strong, read)
         if findings:
             return findings, Check("phase of the modes", "hardly a mode stands out", False)
@@ -74,7 +78,7 @@ def _phases(frf: FRF, strong: Identified) -> tuple[list[Finding], Check]:
     if not delay:
         return phase_checks(strong)
     advance = np.exp(2j * np.pi * frf.frequency * delay)[:, None, None]
-    again = identify(replace(frf, values=frf.values * advance), strong.band)
+    again = identify(replace(frf, values=frf.values * advance), strong.band, use=use)
     return phase_checks(strong, strong_modes(again), delay)
 
 

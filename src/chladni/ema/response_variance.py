@@ -70,17 +70,26 @@ def faint_scatter(frf: FRF) -> np.ndarray:
 
 
 def left_variance(rest: np.ndarray, H: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """a²|H|² + b² by channel from what a fit H leaves over (n_f, n_c).
+    """a²|H|² + b² by channel from what a fit H leaves over (n_f, n_c), see `left_scatter`.
+
+    H is the fit, not the sample: weights that know the noise bias what they weigh.
+    """
+    a2, b2 = left_scatter(rest, H, used)
+    return a2 * np.abs(H) ** 2 + b2
+
+
+def left_scatter(
+    rest: np.ndarray, H: np.ndarray, used: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """a² and b² (n_c,): noise as a share of the response H and additive, by what a fit leaves over.
 
     b from the faintest lines, a from the rest of the strongest; ``used`` marks samples that count.
-    H is the fit, not the sample: weights that know the noise bias what they weigh.
     """
     size = np.where(used, np.abs(H), np.nan)
     square = np.where(used, np.abs(rest) ** 2, np.nan)
     b2 = _median_square(square, size, faint=True)
     over = np.maximum(square - _MEDIAN * b2, 0) / np.maximum(size, 1e-300) ** 2
-    a2 = np.maximum(_median_square(over, size, faint=False), _PRECISE**2)
-    return a2 * np.abs(H) ** 2 + b2
+    return np.maximum(_median_square(over, size, faint=False), _PRECISE**2), b2
 
 
 def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Identified modes as a page: the table, the stabilisation diagram, indicators, shapes, the fit."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from .screening_blocks import screening_section
 from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
+_TOLD = 2  # recordings a headline tells one by one
 _CIRCLES = 30  # modes drawn
 _MATRIX = 40  # modes of an AutoMAC that can still be read
 _FILES = {
@@ -50,8 +52,7 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         drawn = draw_levels(folder, tables, stem)
         sections.insert(k, level_section(tables, drawn))
         files += [(path.name, "a mode over levels") for path in drawn.values()]
-    lead = "; ".join(_sentence(r) for r in found.recordings)
-    return PageParts(lead, sections, found.notes, files)
+    return PageParts(_lead(found.recordings), sections, found.notes, files)
 
 
 def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, str]]:
@@ -163,9 +164,27 @@ def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return found
 
 
+def _lead(recordings: Sequence[RecordingModes]) -> str:
+    """One recording in full, of several how many modes they show and which are to be looked at."""
+    if len(recordings) <= _TOLD:
+        return "; ".join(_sentence(r) for r in recordings)
+    counts = sorted({len(r.poles.frequency) for r in recordings})
+    span = _span(np.sort(np.concatenate([r.poles.frequency for r in recordings])))
+    many = " to ".join(str(n) for n in dict.fromkeys((counts[0], counts[-1])))
+    said = f"{len(recordings)} recordings of {many} {'mode' if many == '1' else 'modes'} each{span}"
+    bad = [r.screening.sentence for r in recordings if r.screening.findings]
+    return "; ".join([said, *bad])
+
+
 def _sentence(r: RecordingModes) -> str:
     f, (low, high) = r.poles.frequency, r.whole.band
-    span = f" from {number(f[0])} to {number(f[-1])} Hz" if len(f) else ""
-    name = r.recording.name
-    said = f"{name}: {len(f)} modes{span} in the band {number(low)} to {number(high)} Hz"
+    modes = f"{len(f)} {'mode' if len(f) == 1 else 'modes'}{_span(f)}"
+    said = f"{r.recording.name}: {modes} in the band {number(low)} to {number(high)} Hz"
     return said + (f" ({r.screening.sentence})" if r.screening.findings else "")
+
+
+def _span(f: np.ndarray) -> str:
+    """Where rising frequencies lie; "" of none."""
+    if len(f) < 2:
+        return "".join(f" at {number(one)} Hz" for one in f)
+    return f" from {number(f[0])} to {number(f[-1])} Hz"

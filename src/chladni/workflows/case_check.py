@@ -208,7 +208,7 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
     if not case.frfs:
         return []
     try:
-        screening = correlate(case, progress).screening
+        screening = correlate(case, progress, every_line=False).screening
     except ChladniError as error:
         said = str(error).removeprefix(f"{case.path}: ")
         return [CaseFinding(said, "nothing can be fitted before", True)]

@@ -14,6 +14,7 @@ from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.mac_significance import CLOSE, Likeness, likeness
 from ..ema.mode_pairing import ModePairs, pair
+from ..ema.screening_lines import screening_lines
 from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
@@ -69,8 +70,13 @@ class Correlation:
     likeness: tuple[Likeness, ...] = ()
 
 
-def correlate(case: Case, progress: Progress = silent) -> Correlation:
+def correlate(case: Case, progress: Progress = silent, every_line: bool = True) -> Correlation:
     """Identify the first recording, pair its modes with the model's, score the responses.
+
+    Parameters
+    ----------
+    every_line : False where its screening alone is asked for: of a long recording the modes are
+        then told from the lines that screening needs
 
     Raises
     ------
@@ -79,10 +85,10 @@ def correlate(case: Case, progress: Progress = silent) -> Correlation:
     """
     refuse_other_units(case)
     with threadpool_limits(1):
-        return _correlated(with_natural_frequencies(case), progress)
+        return _correlated(with_natural_frequencies(case), progress, every_line)
 
 
-def _correlated(case: Case, progress: Progress) -> Correlation:
+def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation:
     test = case.frfs[0] if case.frfs else None
     f_max = _f_max(case, test)
     progress("modes of the model", 0.1)
@@ -93,9 +99,11 @@ def _correlated(case: Case, progress: Progress) -> Correlation:
     numbers = tuple((np.flatnonzero(inside) + 1).tolist())
     if test is None:
         return replace(_by_poles(case, near), numbers=numbers)
-    progress(_identifying(len(test.outputs) * len(test.inputs), len(test.frequency)), 0.4)
-    found = identified(test, case.band, use=case.lines(test.frequency))
-    screening = screened_by_model(case, found, model)
+    use = case.lines(test.frequency)
+    use &= True if every_line else screening_lines(test)
+    progress(_identifying(len(test.outputs) * len(test.inputs), int(use.sum())), 0.4)
+    found = identified(test, case.band, use=use)
+    screening = screened_by_model(case, found, model, use)
     found = found.sel(firm(found) & found.inside)
     refuse_turned_axes(case, found, model)
     phi, psi = case.outputs.rows(model.structure) @ near.shapes, driven_shapes(found)

@@ -25,15 +25,18 @@ class RecordingAtFault(ChladniError):
         self.screening = screening
 
 
-def screened_by_model(case: Case, found: Identified, model: Modelled) -> Screening:
+def screened_by_model(
+    case: Case, found: Identified, model: Modelled, use: np.ndarray | None = None
+) -> Screening:
     """All checks of the first recording.
 
     Parameters
     ----------
     found : identified from its FRFs
     model : of the deck as it was tested
+    use : (n_f,) bool, lines it was identified from, default all
     """
-    alone = screened(case.recordings[0], found, case.recordings[1:], _places(case))
+    alone = screened(case.recordings[0], found, case.recordings[1:], _places(case), use)
     return against_model(alone, found, model, case.outputs, case.inputs, case.gain_known)
 
 
