@@ -456,6 +456,9 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["render", "--modes", "0-3"], "from 1"),
         (["render", "--gif", "100000"], "100000"),
         (["plan", "--sensors", "3", "--modes", "9"], "3 sensors"),
+        (["plan", "--drawn", "99999999"], "--drawn"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--lines", "99999999"], "--lines"),
+        (["study", "--vary", "E=90%:110%", "--lines", "99999999"], "--lines"),
     ],
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):

@@ -36,7 +36,8 @@ def run(
     ] = 0.15,
     mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
     drawn: Annotated[
-        int, typer.Option(help="Models with drawn thickness the layout must serve.", min=0)
+        int,
+        typer.Option(help="Models with drawn thickness the layout must serve.", min=0, max=1000),
     ] = 20,
     detect: Annotated[
         bool,

@@ -114,13 +114,17 @@ def _facts(case: Case) -> list[tuple[str, str]]:
         ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
         *(("recording", said_of(r)) for r in case.recordings),
         *([] if case.recordings else [("recording", _NO_RECORDING)]),
-        ("sensors", f"{len(case.outputs.labels)} outputs, {len(case.inputs.labels)} inputs"),
+        ("sensors", f"{_several(case.outputs, 'output')}, {_several(case.inputs, 'input')}"),
     ]
     band = "all the recording holds" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
     without = "".join(f", without {a:g} to {b:g} Hz" for a, b in case.exclude)
     out.append(("band", band + without))
     free = ", ".join(p.name for p in case.parameters) or "the usual ones: E, t, rho"
     return [*out, ("free", free)]
+
+
+def _several(at: MeasuredDofs, what: str) -> str:
+    return f"{len(at.labels)} {what}" + "s" * (len(at.labels) != 1)
 
 
 def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:

@@ -216,7 +216,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
-        _tapped(case, settings, mass), tuple(_notes(case, settings, recordings)),
+        _tapped(case, settings, mass), tuple(_notes(case, nominal, settings, recordings)),
     )  # fmt: skip
 
 
@@ -322,12 +322,17 @@ def level_unit(inputs: MeasuredDofs) -> str:
     return "m/s²" if inputs.base[0] else "N"
 
 
-def _notes(case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]) -> list[str]:
+def _notes(
+    case: Case,
+    article: BenchArticle,
+    settings: BenchSettings,
+    recordings: Sequence[BenchRecording],
+) -> list[str]:
     out = [*case.said("bench")]
     table, unit = bool(case.inputs.base[0]), level_unit(case.inputs)
     if table and case.setup.hangers:
         out.append("A table moves the supports: the article stands on it, cords are not used.")
-    if not table and not case.setup.hangers:
+    if not table and not case.setup.hangers and not article.elastic.all():
         out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
     for r in recordings:
         out += [f"{r.article}, level {r.test.level:.3g} {unit}: {said}" for said in r.notes]
