@@ -126,6 +126,16 @@ def test_what_is_refused_leaves_no_folder(words, tmp_path, monkeypatch):
     assert done.exit_code == 2, done.output
     assert len(done.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+    assert " runs" not in done.stderr  # nor is what went again recommended
+
+
+def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch):
+    """Files and cases; no folder of results, though it has the nearest name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pane").mkdir()
+    (tmp_path / "panel").mkdir()
+    (tmp_path / "panel" / "case.toml").write_text("")
+    assert call("modes", "pan").stderr.strip().endswith("beside it there is panel")
 
 
 def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
