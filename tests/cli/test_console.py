@@ -51,7 +51,7 @@ def test_tables_are_said_with_all_their_numbers():
     assert table_lines(table) == ["part     Hz", "a       1.5", "longer   22"]
     rows = [(str(k), "1") for k in range(60)]
     why = Table(("what", "why"), [("x" * 60, "because " + "y" * 90)], words=("what", "why"))
-    assert table_lines(why)[1] == f"{'x' * 45}...  because {'y' * 90}"  # the sentence is whole
+    assert table_lines(why)[1] == f"{'x' * 53}...  because {'y' * 90}"  # the sentence is whole
     lines = table_lines(Table(("mode", "Hz"), rows), most=10)
     assert len(lines) == 12
     assert lines[-1] == "... 50 more rows in report.html"

@@ -3,13 +3,14 @@
 import numpy as np
 
 from ....model.assembly import Bushes, Masses, Scalars
+from ....units import Units
 from ..text.table import Cards
-from .context import Context, Scale
+from .context import Context
 
 Values = dict[int, tuple[float, float]]
 
 
-def _work(scale: Scale, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
+def _work(scale: Units, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
     """Unit of length per unit of each dof: the scale of a translation, 1 for a rotation."""
     return np.where((component > 3) & ~scalar, 1.0, scale.length)
 
