@@ -202,6 +202,14 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, sai
     assert not (tmp_path / "o").exists()
 
 
+def test_a_folder_that_is_no_case_is_not_called_one(tmp_path):
+    (tmp_path / "plan").mkdir()
+    words = ["bench", str(tmp_path / "plan"), "--units", "SI", "--out", str(tmp_path / "o")]
+    done = CliRunner().invoke(application(), words)
+    assert done.exit_code == 2
+    assert "no case.toml in the folder" in done.output
+
+
 def test_a_table_that_is_no_text_is_told(demo, tmp_path):
     (tmp_path / "x.csv").write_bytes(bytes(range(128, 200)))
     words = ["--units", "mm-t-s", "--sensors", tmp_path / "x.csv", "--out", tmp_path / "o"]

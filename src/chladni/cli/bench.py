@@ -144,12 +144,13 @@ def _case(
 ) -> Case:
     """The case itself; of a bare deck one that is drafted in a scratch folder."""
     if source.exists() and is_case(source):
+        case = load_case(source)
         if sensors is not None or units is not None or allow or driven:
             raise FileError(
                 f"{source} is a case, which names its sensors, what drives it, its units and the "
                 "cards it allows itself"
             )
-        return load_case(source)
+        return case
     bare = load_deck(source, units, allow)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")

@@ -149,7 +149,8 @@ def _known(settings: BenchSettings) -> None:
     if not 1 <= settings.articles <= len(NAMES):
         raise LabelError(f"{settings.articles} articles; there may be 1 to {len(NAMES)}")
     if not settings.levels or min(settings.levels) <= 0:
-        raise LabelError(f"levels {settings.levels} must be factors above zero")
+        given = ", ".join(f"{x:g}" for x in settings.levels)
+        raise LabelError(f"levels {given} are to be factors above zero")
 
 
 def _places_known(case: Case, settings: BenchSettings) -> None:
