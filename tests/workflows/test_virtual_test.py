@@ -239,6 +239,7 @@ def test_a_bare_deck_is_tested_where_a_table_says(demo, folder, tmp_path):
     assert done.exit_code == 0, done.output
     assert chladni.load_case(tmp_path / "o" / "case").frfs[0].values.shape[1] == 20
     assert "swing at 0.7 Hz" in done.output
+    assert "deck's own mesh" in done.output
 
 
 def test_a_deck_on_the_bench_is_named_as_the_user_names_it(demo, folder, tmp_path):
@@ -251,11 +252,12 @@ def test_a_deck_on_the_bench_is_named_as_the_user_names_it(demo, folder, tmp_pat
     deck.write_text(before.replace("CEND\n", held[0]) + held[1] + after, encoding="latin-1")
     words = ["bench", str(deck), "--units", "mm-t-s", "--out", str(tmp_path / "o")]
     words += ["--sensors", str(folder / "case" / "sensors.csv"), "--resolution", "1"]
-    words += ["--band", "15:80", "--averages", "2"]
+    words += ["--band", "15:80", "--averages", "2", "--finer"]
     done = CliRunner().invoke(application(), words)
     assert done.exit_code == 0, done.output
     assert f"{deck}: PARAM BAILOUT" in done.output
     assert "swing" not in done.output
+    assert "deck's own mesh" not in done.output
     deck.write_text(deck.read_text(encoding="latin-1").replace("\nPSHELL   ", "\nPSHELL  x", 1))
     refused = CliRunner().invoke(application(), words)
     assert refused.exit_code == 2

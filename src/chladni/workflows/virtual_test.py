@@ -335,6 +335,11 @@ def _notes(
         out.append("A table moves the supports: the article stands on it, cords are not used.")
     if not table and not case.setup.hangers and not article.elastic.all():
         out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
+    if not settings.finer and len(case.assembly.shells):
+        out.append(
+            "The articles have the deck's own mesh and with it its error, which a real one has not "
+            "and a diagnosis allows for: --finer is the truer test."
+        )
     for r in recordings:
         out += [f"{r.article}, level {r.test.level:.3g} {unit}: {said}" for said in r.notes]
         if r.overloads:
