@@ -47,6 +47,16 @@ def test_a_hinge_lets_the_end_of_the_bar_go(tmp_path, held, pins, loose):
         assert said[0].endswith("grid 9")
 
 
+def test_a_scalar_point_that_follows_is_not_loose(tmp_path):
+    """A mass on a spring goes with a free plate that turns, though a scalar point has no place."""
+    deck = tmp_path / "deck.bdf"
+    more = "SPOINT,90\nCMASS2,12,.01,90,1\nCELAS2,11,2000.,90,1,3,3\nENDDATA"
+    deck.write_text(DECK.format(held="", pins="").replace("ENDDATA", more))
+    found = chladni.modes(chladni.load(deck, "SI"), 14)
+    assert found.rigid.sum() == 6
+    assert not [n for n in found.notes if "hangs loose" in n]
+
+
 def test_a_free_plate_is_whole_and_two_are_not():
     """Rigid modes of one body are rigid motions; six of two bodies are not."""
     s = structure(plate(0.3, 0.2, 3, 2, 1e-3))

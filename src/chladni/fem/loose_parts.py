@@ -7,6 +7,7 @@ from .assemble import Structure
 from .energy import rigid_motions
 
 _BESIDE = 0.05  # sine of the angle to the rigid motions of the whole; rounding is far below
+_FOLLOWS = 1e-3  # weight of a scalar point: what it is tied to is moved as a whole with it
 
 
 def loose_grids(structure: Structure, phi: np.ndarray) -> tuple[int, ...]:
@@ -26,7 +27,10 @@ def loose_grids(structure: Structure, phi: np.ndarray) -> tuple[int, ...]:
     """
     made = structure.assembly
     size = float(np.linalg.norm(np.ptp(made.points, axis=0))) or 1.0
-    scale = np.tile([1.0] * 3 + [size / 2] * 3, len(made.ids))[:, None]
+    scale = np.tile([1.0] * 3 + [size / 2] * 3, (len(made.ids), 1))
+    if made.scalar_points is not None:
+        scale[made.scalar_points] *= _FOLLOWS
+    scale = scale.reshape(-1, 1)
     u, R = (orth(scale * A) for A in (structure.T @ phi, rigid_motions(made)))
     beside, sine, _ = np.linalg.svd(u - R @ (R.T @ u), full_matrices=False)
     moved = np.linalg.norm(beside[:, sine > _BESIDE].reshape(len(made.ids), 6, -1), axis=1)
