@@ -17,6 +17,7 @@ class Units:
     length: float  # [m]
     mass: float  # [kg]
     time: float = 1.0  # [s]
+    weight: float = 1.0  # what a deck multiplies its masses by: PARAM,WTMASS
 
     @property
     def force(self) -> float:
@@ -29,9 +30,14 @@ class Units:
         return self.mass / (self.length * self.time**2)
 
     @property
+    def inertia(self) -> float:
+        """Mass as a deck counts it, its weight included [kg]."""
+        return self.mass * self.weight
+
+    @property
     def density(self) -> float:
         """[kg/m³]."""
-        return self.mass / self.length**3
+        return self.inertia / self.length**3
 
 
 UNITS = {

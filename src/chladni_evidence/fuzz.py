@@ -28,6 +28,7 @@ from .fuzz_inputs import FuzzInput
 PATIENCE = 60.0  # of the processor's time [s]
 MEMORY = 2e9  # resident at most [bytes]
 _MOST = 4_000_000_000  # that a process gets at all
+_LIST = re.compile(r"[\[(]'[^']*'[,\])]")  # a list of words as Python writes it
 _STAGE = re.compile(r"\[\d+ s\] ")  # how a run that takes long says what it does
 _HEAVY = (  # what commands import when they need it: once here, not in every process
     *("chladni.cli.app", "chladni.report.modes_page", "chladni.report.correlation_page"),
@@ -115,7 +116,7 @@ def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
     if len(lines) != 1 or not lines[0].startswith("chladni: "):
         usage = lines and lines[0].startswith("Usage:")
         return "refused" if usage and code == 2 else "no sentence"
-    if "['" in said or "('" in said:
+    if _LIST.search(said):
         return "programmer's words"
     if code == 2 and out.exists():
         return "half-written"

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import chladni
 from chladni.case import load_case
 from chladni.cli.app import COMMANDS, application, guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
+from chladni.io.nastran import write_assembly
+from chladni.units import UNITS
 from chladni.workflows.diagnosis_pipeline import _deck
 from chladni.workflows.question_of_case import question
 
@@ -399,6 +402,25 @@ def test_plan_sees_every_mode(deck, tmp_path):
     assert (out / "sensors.csv").read_text().count("output") == 8
 
 
+def test_a_plan_without_units_says_what_it_took_the_deck_for(deck, tmp_path):
+    """Sensors weigh kilograms: a deck in millimetres is planned as the same one in metres."""
+    words = ["--sensors", 5, "--modes", 3, "--drawn", 0, "--candidates", 20]
+    made = chladni.load(deck, "SI").assembly
+    for name in ("SI", "mm-t-s"):
+        path = write_assembly(made, tmp_path / f"{name}.bdf", UNITS[name])
+        done = call("plan", path, *words, "--out", tmp_path / name)
+        assert done.exit_code == 0, done.output
+        assert f"units = {name}: " in done.output
+    a, b = (json.loads((tmp_path / n / "plan.json").read_text()) for n in ("SI", "mm-t-s"))
+    assert [m["frequency_hz"] for m in a["modes"]] == pytest.approx(
+        [m["frequency_hz"] for m in b["modes"]], rel=1e-5
+    )
+    at = [np.array([s["point_m"] for s in found["sensors"]]) for found in (a, b)]
+    np.testing.assert_allclose(*at, atol=1e-6)
+    deck.write_text(deck.read_text().replace("7850.", ""))
+    assert "--units" in call("plan", deck, *words, "--out", tmp_path / "x").stderr
+
+
 WITH_FILE = [c for c in COMMANDS if c not in ("demo", "blind")]  # these two take no file
 BAD = {
     "missing": None,
@@ -456,6 +478,9 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["render", "--modes", "0-3"], "from 1"),
         (["render", "--gif", "100000"], "100000"),
         (["plan", "--sensors", "3", "--modes", "9"], "3 sensors"),
+        (["plan", "--drawn", "99999999"], "--drawn"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--lines", "99999999"], "--lines"),
+        (["study", "--vary", "E=90%:110%", "--lines", "99999999"], "--lines"),
     ],
 )
 def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):

@@ -21,7 +21,7 @@ from chladni.errors import FileError, Interrupted
 from chladni.output import run_folder, write_text
 from chladni.report.blocks import Table
 
-from .test_cli import OSCILLATOR
+from .test_cli import OSCILLATOR, deck_text
 
 
 @pytest.fixture
@@ -51,10 +51,22 @@ def test_tables_are_said_with_all_their_numbers():
     assert table_lines(table) == ["part     Hz", "a       1.5", "longer   22"]
     rows = [(str(k), "1") for k in range(60)]
     why = Table(("what", "why"), [("x" * 60, "because " + "y" * 90)], words=("what", "why"))
-    assert table_lines(why)[1] == f"{'x' * 45}...  because {'y' * 90}"  # the sentence is whole
+    assert table_lines(why)[1] == f"{'x' * 53}...  because {'y' * 90}"  # the sentence is whole
     lines = table_lines(Table(("mode", "Hz"), rows), most=10)
     assert len(lines) == 12
     assert lines[-1] == "... 50 more rows in report.html"
+
+
+def test_energy_that_is_in_no_part_has_a_column_of_its_own(tmp_path, deck):
+    """Shares of a row come to 100 %, where springs hold the plate as where none do."""
+    for springs in ("", "CELAS2,91,1000.,1,3\nCELAS2,92,1000.,25,3\n"):
+        deck.write_text(deck_text(4).replace("ENDDATA", f"{springs}ENDDATA"))
+        done = call("modes", deck, "--units", "SI", "--count", 9, "--out", tmp_path / "out")
+        assert ("springs, bushes" in done.stdout) == bool(springs)
+        shares = [re.findall(r"([\d.]+) %", line) for line in done.stdout.splitlines()]
+        rows = [sum(map(float, row)) for row in shares if row]
+        assert len(rows) == (5 if springs else 3)
+        assert rows == pytest.approx([100.0] * len(rows), abs=0.11)
 
 
 def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
@@ -78,7 +90,7 @@ def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
         (["modes", "x.bdf", "--cuont", "8"], "no such option: --cuont", "modes"),
         (["modes"], "missing argument 'DECK_or_CASE'", "modes"),
         (["modes", "x.bdf", "--count", "many"], "invalid value for '--count': ", "modes"),
-        (["modes", "x.bdf", "y.bdf"], "got unexpected extra argument", "modes"),
+        (["modes", "x.bdf", "y.bdf"], "too many words: y.bdf; ", "modes"),
         (["xy"], "no such command 'xy'; there are diagnose, init, check, demo", ""),
         (["blind", "make", "--out", "x"], "missing option '--set'", "blind make"),
         (["blind", "xy"], "no such command 'xy'; there are make, run, score", "blind"),
@@ -114,6 +126,16 @@ def test_what_is_refused_leaves_no_folder(words, tmp_path, monkeypatch):
     assert done.exit_code == 2, done.output
     assert len(done.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+    assert " runs" not in done.stderr  # nor is what went again recommended
+
+
+def test_what_is_beside_the_missing_is_what_could_be_meant(tmp_path, monkeypatch):
+    """Files and cases; no folder of results, though it has the nearest name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pane").mkdir()
+    (tmp_path / "panel").mkdir()
+    (tmp_path / "panel" / "case.toml").write_text("")
+    assert call("modes", "pan").stderr.strip().endswith("beside it there is panel")
 
 
 def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):

@@ -217,3 +217,17 @@ def test_a_band_is_proved_too(monkeypatch):
     due = line_frequency(900, np.arange(12))
     modal = normal_modes(line(900), band=np.mean(due[-2:]))
     np.testing.assert_allclose(modal.frequency[1:], due[1:-1], rtol=1e-7)
+
+
+def test_what_does_not_converge_names_the_mass_out_of_proportion(shell_box, monkeypatch):
+    """A guessed shift is nobody's fault: the heaviest translation is named; a given one is."""
+    heavy = 42
+    assert shell_box.dofs[heavy, 1] <= 3
+    M = shell_box.M.copy().tolil()
+    M[heavy, heavy] = 1e5 * np.median(shell_box.M.diagonal()[shell_box.dofs[:, 1] <= 3])
+    monkeypatch.setattr(eigen, "_LOOSE", -1.0)  # whatever converges is not enough
+    at = f"{shell_box.dofs[heavy, 0]}:"
+    with pytest.raises(AccuracyError, match=f"proportion. {at}.* has 1e\\+05 times"):
+        normal_modes(replace(shell_box, M=sp.csr_array(M)), 8)
+    with pytest.raises(AccuracyError, match="nearer to the modes"):
+        normal_modes(shell_box, 8, shift=-1e3)

@@ -77,3 +77,12 @@ def test_what_breaks_a_rule_is_told_and_kept(called, tmp_path, monkeypatch):
 def test_an_unknown_kind_is_refused(tmp_path, capsys):
     assert main(["fuzz", "--kinds", "poem", "--out", str(tmp_path)]) == 2
     assert "no kind poem; there are deck" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("said", ["GRID [: ID is '[', not an integer", "too many words: (' OR 8)"])
+def test_what_the_user_wrote_is_no_programmers_word(said, tmp_path, monkeypatch):
+    import runpy
+
+    code = f"import sys; sys.stderr.write({'chladni: ' + said!r}); sys.exit(2)"
+    monkeypatch.setattr(runpy, "run_module", lambda *_, **__: exec(code))
+    assert outcome(FuzzInput("deck", {}, ("modes", "a.bdf"))).called == "refused"

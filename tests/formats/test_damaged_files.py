@@ -1,5 +1,6 @@
 """A damaged file ends in one sentence that names it, whatever library stumbled over it."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -212,3 +213,15 @@ def test_a_number_no_structure_has(tmp_path: Path) -> None:
     path.write_text("BEGIN BULK\nGRID,1,,1.+308,0.,0.\nENDDATA\n")
     with pytest.raises(ChladniError, match=r"GRID 1: X1 is '1\.\+308', not a number of any"):
         assembly(read_deck(path), UNITS["SI"])
+
+
+def test_a_header_of_an_npz_that_breaks_off_is_a_sentence(tmp_path: Path) -> None:
+    """A bracket that is never closed ends in the tokenizer of Python itself."""
+    header = b"{'descr': ('<f8', 'shape': (3L,\n"
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        head = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+        for name in ("frequency_hz", "frf", "outputs", "inputs", "quantity"):
+            archive.writestr(f"{name}.npy", head)
+    with pytest.raises(ChladniError, match=r"a\.npz") as caught:
+        read_npz(tmp_path / "a.npz")
+    assert "('" not in str(caught.value)

@@ -208,7 +208,10 @@ def test_a_quiet_verdict_that_is_not_trusted_says_so(verdict):
 def test_agreement_says_how_near():
     near = replace(RESULT, verdict="nothing missing", one_of=(), distrust=())
     error = FrequencyError(before=4.21)
-    assert "4.2 % of the frequencies" in sentence(replace(near, frequency_error=error))
+    said = sentence(replace(near, frequency_error=error))
+    assert "4.2 % apart in frequency" in said
+    assert "agree" not in said  # 4 % off is no agreement; what is allowed for it is said
+    assert "mesh, joints and scatter" in said
 
 
 @pytest.mark.parametrize("verdict", ["missing physics", "measurement fault"])

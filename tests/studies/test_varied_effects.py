@@ -14,7 +14,7 @@ from chladni.errors import FileError
 from chladni.fem.assemble import structure
 from chladni.model.ground_springs import with_ground_bushes
 from chladni.studies import StudySettings
-from chladni.studies.parameter_study import study
+from chladni.studies.parameter_study import _varied, study
 from chladni.studies.varied_effects import of_effect
 from chladni.studies.vary_text import vary_text
 from chladni.units import UNITS
@@ -131,3 +131,20 @@ def test_cords_of_a_case_are_used_where_they_are_varied(deck, tmp_path):
     assert not [n for n in held.notes if "hangers" in n]
     idle = chladni.study(case, ("t=90%:110%",), few)
     assert [n for n in idle.notes if "hangers" in n]
+
+
+def test_plain_numbers_are_those_of_the_cards_where_a_deck_counts_masses_its_own_way(
+    deck, tmp_path
+):
+    """With PARAM,WTMASS a density or a lump stands in the cards in other numbers; so it is here."""
+    heavy = tmp_path / "heavy.bdf"
+    text = deck.read_text()
+    heavy.write_text(text.replace("BEGIN BULK\n", "BEGIN BULK\nPARAM,WTMASS,2.59-3\n"))
+    model = chladni.load_model(heavy, "SI")
+    (rho,) = model.assembly.parts
+    own = rho.section.membrane.rho / 2.59e-3  # as the card has it
+    vary = (f"rho={0.9 * own:g}:{1.1 * own:g}", "point-mass at 8=1:3")
+    (a, b), _ = _varied(model, None, tuple(map(vary_text, vary)))
+    assert a.low / a.nominal == pytest.approx(0.9, rel=1e-5)
+    assert a.high / a.nominal == pytest.approx(1.1, rel=1e-5)
+    assert (b.low, b.high) == pytest.approx((2.59e-3, 3 * 2.59e-3))

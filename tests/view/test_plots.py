@@ -186,3 +186,15 @@ def test_a_ladder_of_many_modes_can_be_read_on_a_page(tmp_path, modes, numbers):
     assert float(root.get("width").removesuffix("pt")) <= 72 * 9.3
     ticks = [x for x in root.iter() if (x.get("id") or "").startswith("xtick_")]
     assert len(ticks) == numbers
+
+
+def test_what_is_none_at_all_is_drawn_at_the_edge_of_a_logarithmic_axis(tmp_path, monkeypatch):
+    """A statistic of zero has a mark in the picture, left of all that are not zero."""
+    drawn = []
+    monkeypatch.setattr(plots, "save", lambda figure, path: drawn.append(figure) or path)
+    plots.fit_test(tmp_path / "x.png", {"none": (0.0, 1.0, 0.4, 2.5), "some": (9.0, 2.0, 1.0, 4.0)})
+    (ax,) = drawn[0].axes
+    none, some = (float(line.get_xdata()[0]) for line in ax.lines if line.get_marker() == "o")
+    left, right = ax.get_xlim()
+    assert 0 < left == none < some == 4.5 < right
+    assert not [line for line in ax.lines if line.get_clip_on() and line.get_marker() == "o"]

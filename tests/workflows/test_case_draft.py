@@ -75,6 +75,11 @@ def test_a_material_of_no_system_is_refused(deck, tmp_path):
     assert draft(odd, units="SI").units.name == "SI"
 
 
+def test_units_that_no_material_bears_out_are_told(deck):
+    assert draft(deck, units="SI").units_why == "as given"
+    assert "but look: in SI the deck" in draft(deck, units="mm-t-s").units_why
+
+
 def ways(made):
     return {d.label: d.way for d in made.dofs}
 

@@ -202,6 +202,14 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(demo, tmp_path, words, sai
     assert not (tmp_path / "o").exists()
 
 
+def test_a_folder_that_is_no_case_is_not_called_one(tmp_path):
+    (tmp_path / "plan").mkdir()
+    words = ["bench", str(tmp_path / "plan"), "--units", "SI", "--out", str(tmp_path / "o")]
+    done = CliRunner().invoke(application(), words)
+    assert done.exit_code == 2
+    assert "no case.toml in the folder" in done.output
+
+
 def test_a_table_that_is_no_text_is_told(demo, tmp_path):
     (tmp_path / "x.csv").write_bytes(bytes(range(128, 200)))
     words = ["--units", "mm-t-s", "--sensors", tmp_path / "x.csv", "--out", tmp_path / "o"]
@@ -230,3 +238,27 @@ def test_a_bare_deck_is_tested_where_a_table_says(demo, folder, tmp_path):
     done = CliRunner().invoke(application(), [*words, *quick, "--units", "mm-t-s"])
     assert done.exit_code == 0, done.output
     assert chladni.load_case(tmp_path / "o" / "case").frfs[0].values.shape[1] == 20
+    assert "swing at 0.7 Hz" in done.output
+    assert "deck's own mesh" in done.output
+
+
+def test_a_deck_on_the_bench_is_named_as_the_user_names_it(demo, folder, tmp_path):
+    """Notes and faults name the file that was given; what supports hold does not swing."""
+    deck = tmp_path / "mine.bdf"
+    free = (demo / "deck.bdf").read_text(encoding="latin-1")
+    held = "CEND\nSPC = 88\n", "BEGIN BULK\nPARAM,BAILOUT,-1\nSPC1,88,123456,1,2,3\n"
+    assert "BEGIN BULK\n" in free
+    before, after = free.split("BEGIN BULK\n")
+    deck.write_text(before.replace("CEND\n", held[0]) + held[1] + after, encoding="latin-1")
+    words = ["bench", str(deck), "--units", "mm-t-s", "--out", str(tmp_path / "o")]
+    words += ["--sensors", str(folder / "case" / "sensors.csv"), "--resolution", "1"]
+    words += ["--band", "15:80", "--averages", "2", "--finer"]
+    done = CliRunner().invoke(application(), words)
+    assert done.exit_code == 0, done.output
+    assert f"{deck}: PARAM BAILOUT" in done.output
+    assert "swing" not in done.output
+    assert "deck's own mesh" not in done.output
+    deck.write_text(deck.read_text(encoding="latin-1").replace("\nPSHELL   ", "\nPSHELL  x", 1))
+    refused = CliRunner().invoke(application(), words)
+    assert refused.exit_code == 2
+    assert str(deck) in refused.output

@@ -33,6 +33,7 @@ from .schema import key, known, sections, unread
 from .sensor_places import ROLES, carried, carried_said, grid_row, labels, places, unrecorded
 from .toml_sections import KeyFile, TomlSection, read_keys
 
+OUTSIDE = "[model] outside: files of the case may lie outside of its folder"  # as a note
 _MASS_SD = 0.002  # of the mass, where the user gives none
 
 
@@ -151,7 +152,7 @@ def load_case(path: str | Path) -> Case:
     if allow:
         notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
     if outside:
-        notes.append("[model] outside: files of the case may lie outside of its folder")
+        notes.append(OUTSIDE)
     band, exclude = _bands(keys, recordings, notes)
     held_sensors, held_band = _held(keys, recordings, notes)
     outputs, inputs = (

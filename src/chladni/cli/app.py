@@ -3,6 +3,7 @@
 import functools
 import inspect
 import os
+import re
 import signal
 import threading
 import traceback
@@ -52,6 +53,8 @@ _EVERY = {  # options that every command takes
 }  # fmt: skip
 _UsageError: type[Any] = typer.BadParameter.__mro__[1]  # of the click that this typer brings
 
+_TOO_MANY = re.compile(r"^Got unexpected extra arguments?(?:\(s\))? \((.*)\)$")  # as click says it
+
 
 class OneSentenceGroup(TyperGroup):
     """Commands: a line that none of them takes is one sentence and exit code 2."""
@@ -82,6 +85,7 @@ def _misused(error: Any) -> int:
     while at.parent is not None:
         words, at = [at.info_name, *words], at.parent
     shown = " ".join(["chladni", *words, "--help"])
+    text = _TOO_MANY.sub(r"too many words: \1", text)
     text = text[:1].lower() + text[1:].rstrip(".").replace(". Did you", "; did you")
     return _said(f"{text}{there}; `{shown}` says more".replace("?;", "?"), AT_FAULT)
 

@@ -1,8 +1,8 @@
 """``chladni bench``: a virtual test of a case or a deck, and the case it leaves."""
 
 import json
-import shutil
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -10,6 +10,7 @@ import typer
 
 from ..bench.drive_signals import Kind
 from ..case import Case, load_case
+from ..case.load import OUTSIDE
 from ..case.sensor_places import placed
 from ..errors import FileError
 from ..io.tables.sensor_table import exciter, with_input
@@ -143,12 +144,13 @@ def _case(
 ) -> Case:
     """The case itself; of a bare deck one that is drafted in a scratch folder."""
     if source.exists() and is_case(source):
+        case = load_case(source)
         if sensors is not None or units is not None or allow or driven:
             raise FileError(
                 f"{source} is a case, which names its sensors, what drives it, its units and the "
                 "cards it allows itself"
             )
-        return load_case(source)
+        return case
     bare = load_deck(source, units, allow)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
@@ -166,13 +168,13 @@ def _case(
     elif driven:
         write_text(table, with_input(sensors, driven))
     else:  # as it is: what is wrong in it is told where it is read
-        shutil.copyfile(sensors, table)
-    from ..io.nastran import write_deck
-
-    write_deck(bare.deck, scratch / "deck.bdf", [])
+        table = sensors.resolve()
     write_text(
         scratch / "case.toml",
-        f'[model]\ndeck = "deck.bdf"\nunits = "{units}"\nallow = {json.dumps(allow)}\n'
-        f'[test]\nsensors = "sensors.csv"\n{hangers}',
+        f"[model]\ndeck = {json.dumps(str(source.resolve()))}\noutside = true\n"
+        f'units = "{units}"\nallow = {json.dumps(allow)}\n'
+        f"[test]\nsensors = {json.dumps(str(table))}\n{hangers}",
     )
-    return load_case(scratch)
+    case = load_case(scratch)
+    notes = tuple(note for note in case.notes if note != OUTSIDE)  # no word of the user's
+    return replace(case, path=source, notes=notes)

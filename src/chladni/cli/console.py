@@ -22,7 +22,7 @@ from ..report.blocks import Table
 QUIET = 10.0  # seconds after which a run without a terminal says what it does
 AGAIN = 60.0  # and how often from then on
 ROWS = 24  # of a table on the terminal; the page has them all
-_CELL, _LAST = 48, 110  # characters of a cell, and of a sentence at the end of a row
+_CELL, _LAST = 56, 110  # characters of a cell, and of a sentence at the end of a row
 
 
 @dataclass

@@ -24,6 +24,7 @@ from ..workflows.loaded_model import (
     load_model,
 )
 from .run import (
+    MOST_LINES,
     Allow,
     Answering,
     Damping,
@@ -43,7 +44,7 @@ def run(
     input: Driven = None,
     output: Answering = None,
     band: Annotated[str, typer.Option(help="From and to, in Hz.")] = "1:200",
-    lines: Annotated[int, typer.Option(help="How many frequencies.", min=2)] = 800,
+    lines: Annotated[int, typer.Option(help="How many frequencies.", min=2, max=MOST_LINES)] = 800,
     damping: Damping = 0.01,
     quantity: Kind = "accelerance",
     units: Units = None,

@@ -1,17 +1,21 @@
 """``chladni plan``: where to put sensors and shakers, and which lines to measure."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..errors import FileError
 from ..planning import PlanSettings
 from ..planning.plan_summary import durations
 from ..progress import within
 from ..report.result_json import to_json
-from ..workflows.loaded_model import load_model
+from ..workflows.loaded_model import Model, is_case, load_deck, load_model
 from ..workflows.plan import plan
 from ..workflows.smallest_findings import smallest_findings
+from ..workflows.unit_guess import guessed_units
 from .run import Allow, DeckOrCase, Out, Units, started
 
 
@@ -36,7 +40,8 @@ def run(
     ] = 0.15,
     mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
     drawn: Annotated[
-        int, typer.Option(help="Models with drawn thickness the layout must serve.", min=0)
+        int,
+        typer.Option(help="Models with drawn thickness the layout must serve.", min=0, max=1000),
     ] = 20,
     detect: Annotated[
         bool,
@@ -68,8 +73,10 @@ def run(
 
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
-        model = load_model(source, units, allow or (), command="plan")
+        model, said = _model(source, units, allow or ())
         job.notes += model.notes
+        if said:
+            job.say(said)
         found = plan(model, settings, within(job.progress, 0.1, 0.6))
         job.json("plan.json", to_json(found))
         job.progress("pictures", 0.7)
@@ -84,3 +91,14 @@ def run(
                 parts, sections=[*parts.sections, section], files=[*parts.files, picture]
             )
         job.show(parts)
+
+
+def _model(source: Path, units: str | None, allow: Sequence[str]) -> tuple[Model, str]:
+    """The model, and what its units were taken for: metres, kilograms and newtons are planned."""
+    if units is not None or not source.is_file() or is_case(source):
+        return load_model(source, units, allow, command="plan"), ""
+    bare = load_deck(source, None, allow)
+    guess = guessed_units(bare.model().assembly, source.name)
+    if not guess.sure:
+        raise FileError(f"{source}: {guess.why}; say which by --units")
+    return replace(bare, units=guess.units).model(), f"units = {guess.units.name}: {guess.why}"

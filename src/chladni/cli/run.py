@@ -52,6 +52,7 @@ Driven = Annotated[
 Answering = Annotated[
     list[str] | None, typer.Option("--output", help="Where it answers: 55:+Z, 55:n.")
 ]
+MOST_LINES = 1_000_000  # of responses that are evaluated: beyond, memory and patience end
 Damping = Annotated[float, typer.Option(help="Damping ratio of every mode.", min=0)]
 Kind = Annotated[str, typer.Option(help="receptance, mobility or accelerance.")]
 

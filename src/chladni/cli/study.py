@@ -17,6 +17,7 @@ from ..studies.workers import NO_WORKER
 from ..workflows.loaded_model import DeckModels, beside, is_case, load_deck
 from .console import say, watched
 from .run import (
+    MOST_LINES,
     Allow,
     Answering,
     Damping,
@@ -53,7 +54,7 @@ def run(
     input: Driven = None,
     output: Answering = None,
     band: Annotated[str, typer.Option(help="Of these responses, in Hz.")] = "1:200",
-    lines: Annotated[int, typer.Option(help="How many frequencies.")] = 400,
+    lines: Annotated[int, typer.Option(help="How many frequencies.", min=2, max=MOST_LINES)] = 400,
     damping: Damping = 0.01,
     quantity: Kind = "accelerance",
     frf: Annotated[bool, typer.Option("--frf", help="Keep every sample's responses.")] = False,

@@ -300,9 +300,24 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
     if np.any(ritz.error[:k] > _LOOSE):
         raise AccuracyError(
             f"{np.sum(ritz.error[:k] > _LOOSE)} of {k} modes did not converge from the shift "
-            f"{sigma:.2e} rad²/s²; give one nearer to the modes (negative, about -λ/1000)"
+            f"{sigma:.2e} rad²/s²; "
+            + (
+                "give one nearer to the modes (negative, about -λ/1000)"
+                if shift is not None
+                else _heaviest(problem)
+            )
         )
     return sigma, factor, ritz
+
+
+def _heaviest(problem: _Problem) -> str:
+    """Which translation weighs how many times the median one."""
+    d = np.where(problem.dofs[:, 1] <= 3, problem.M.diagonal(), 0.0)
+    k, usual = int(np.argmax(d)), np.median(d[d > 0]) if np.any(d > 0) else np.inf
+    return (
+        f"is a mass or a stiffness out of all proportion? {label(*problem.dofs[k])} has "
+        f"{d[k] / usual:.2g} times the usual mass"
+    )
 
 
 def _gap_above(lam: np.ndarray, error: np.ndarray, k: int) -> tuple[float, int]:

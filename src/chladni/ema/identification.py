@@ -167,8 +167,9 @@ def kept_lines(
     if use is not None:
         keep &= use
     if keep.sum() < 12:
+        asked = "" if band is None else " between {:g} and {:g} Hz".format(*band)
         raise FileError(
-            f"{int(keep.sum())} lines between {band} Hz are too few to identify from; the "
+            f"{int(keep.sum())} lines{asked} are too few to identify from; the "
             f"recording holds {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
         )
     return keep

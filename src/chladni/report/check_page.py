@@ -72,8 +72,8 @@ def _lead(found: CaseCheck) -> str:
 
 def _table(dofs: tuple[CheckedDof, ...]) -> Table:
     rows = [
-        (d.label, d.role, d.place, *(number(x) for x in d.point_m),
-         direction(d.direction), number(1e3 * d.off_mesh_m, 3),
+        (d.label, d.role, d.place, *(f"{x:.4f}" for x in d.point_m),
+         direction(d.direction), f"{1e3 * d.off_mesh_m:.1f}",
          number(1e3 * d.mass_kg, 3))
         for d in dofs
     ]  # fmt: skip

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from ..updating.detectable import Detectable
 from ..workflows.loaded_model import Model, on_faces
 from .blocks import Block, Picture, Section, Table
-from .words import number, quantity
+from .words import number, quantity, rounded
 
 _HEADS = ("what", "at the best place", "at half of the places", "at the worst", "nowhere found")
 _CAPTION = (
@@ -27,7 +27,7 @@ def detectable_section(folder: Path, model: Model, found: Detectable, noise: flo
     from ..view import scene
 
     rows = [
-        ("mass", *_row(found.mass, lambda x: quantity(x, "kg"))),
+        ("mass", *_row(found.mass, lambda x: quantity(rounded(x), "kg", np.nanmin(found.mass)))),
         ("softening", *_row(found.softer, _percent)),
         ("thinning", *_row(found.thinner, _percent)),
     ]

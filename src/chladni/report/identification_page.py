@@ -82,7 +82,7 @@ def _table(r: RecordingModes) -> Table:
             str(k + 1),
             hertz(f),
             number(sf, 2),
-            number(z, 3),
+            f"{z:#.3g}",
             number(sz, 2),
             f"{c:.3f}",
             number(v, 2),

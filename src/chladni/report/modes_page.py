@@ -10,6 +10,7 @@ from .blocks import Facts, PageParts, Picture, Section, Table
 from .words import hertz, number
 
 _SHOWN = 12  # modes in the picture
+LEFT = 1e-3  # of the strain energy; more of it that is in no part has a column
 _NODES = 20_000  # in the universal file, a text of a hundred bytes per node and mode
 
 
@@ -59,15 +60,13 @@ def _tables(found: NormalModes, kg: str) -> list[Facts | Table]:
     m, f = "m" if found.in_si else "deck units", found.modal.frequency
     centre = ", ".join(number(x) for x in found.centre_of_gravity)
     facts = [("Mass", f"{number(found.mass, 6)} {kg}"), ("Centre of gravity", f"({centre}) {m}")]
-    rows = [
-        (
-            str(k + 1),
-            hertz(f[k]),
-            *(_share(e) for e in found.strain_energy[:, k]),
-        )
-        for k in range(len(f))
-    ]
-    heads = ("mode", "Hz", *(name for name, _ in found.parts))
+    share = found.strain_energy
+    names = [name for name, _ in found.parts]
+    rest = 1 - share.sum(axis=0)
+    if np.nanmax(rest, initial=0.0) > LEFT:
+        share, names = np.vstack([share, rest]), [*names, "springs, bushes"]
+    rows = [(str(k + 1), hertz(f[k]), *(_share(e) for e in share[:, k])) for k in range(len(f))]
+    heads = ("mode", "Hz", *names)
     return [Facts(facts), Table(heads, rows, caption="Share of each part in the strain energy.")]
 
 

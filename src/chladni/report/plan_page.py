@@ -22,7 +22,7 @@ from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
 from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
-from .words import direction, hertz, number
+from .words import direction, hertz, number, rounded
 
 PICTURES = {
     "sensors.png": "the layout",
@@ -200,7 +200,7 @@ def _modes(
         (
             str(m.mode),
             hertz(m.frequency_hz),
-            number(m.visibility, 2),
+            f"{m.visibility:.2f}",
             "yes" if m.seen else "hardly",
             "yes" if m.seen_by_normals else "no, moves along the sheets",
             f"{100 * shift[k]:.2f} %",
@@ -242,7 +242,7 @@ def _shaker(
             str(k + 1),
             a.at.label,
             *_where(a.at),
-            number(a.condition),
+            number(rounded(a.condition)),
             number(a.least_over_mean_residue, 2),
             _rattling(a),
             "no" if a.vetoed else "yes",
@@ -275,7 +275,7 @@ def _rattling(actuator: PlannedActuator) -> str:
         return "none foretold"
     a, b = actuator.rattles_between
     about = "" if actuator.rattle_gap_known else "~"
-    return f"{about}{number(actuator.rattles_from_n, 2)} N: {a} / {b}"
+    return f"{about}{number(rounded(actuator.rattles_from_n))} N: {a} / {b}"
 
 
 def _hanger(found: Plan, grid: int) -> annotations.Marker:

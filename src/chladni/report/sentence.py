@@ -46,7 +46,10 @@ def _sentence(result: DiagnosisResult) -> str:
     if verdict == "calibration only":
         return f"Ordinary parameters explain the recording; no physics is missing{gain}."
     if verdict == "nothing missing":
-        return f"Model and recording agree within what repeats and dispersion allow{_off(result)}."
+        return (
+            f"Nothing is named: {_off(result)}, which the errors of mesh, joints and scatter that "
+            "are allowed for explain as well as any effect tried."
+        )
     if verdict == "not in catalogue" and result.one_of:
         return f"Nothing is named; the data cannot tell apart {', '.join(result.one_of[0])}."
     if verdict == "not in catalogue":
@@ -59,8 +62,8 @@ def _off(result: DiagnosisResult) -> str:
     """How far they are apart, for a mesh may be allowed much."""
     error = result.frequency_error
     if error is None or error.before is None:
-        return ""
-    return f", which is {number(error.before, 2)} % of the frequencies (rms)"
+        return "model and recording differ by little"
+    return f"model and recording are {number(error.before, 2)} % apart in frequency (rms)"
 
 
 def _each(effects: Sequence[NamedEffect]) -> str:

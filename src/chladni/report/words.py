@@ -21,6 +21,15 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits}g}"
 
 
+def rounded(value: float, digits: int = 2) -> float:
+    """A value of which no more than so many digits mean something.
+
+    >>> rounded(76390.0), rounded(0.6581)
+    (76000.0, 0.66)
+    """
+    return float(f"{value:.{digits}g}")
+
+
 def hertz(f: float | None) -> str:
     """A frequency in Hz: digits that a test can mean, the same in a column.
 
@@ -94,11 +103,13 @@ def direction(vector: Sequence[float]) -> str:
 
     >>> direction((0.0, 0.0, -1.0)), direction((0.6, 0.0, 0.8))
     ('-Z', '0.60 0.00 0.80')
+    >>> direction((-0.001, 0.0, 0.999999))
+    '0.00 0.00 1.00'
     """
     axis = max(range(3), key=lambda k: abs(vector[k]))
     if abs(vector[axis]) > 1 - 1e-6:
         return ("+" if vector[axis] > 0 else "-") + "XYZ"[axis]
-    return " ".join(f"{x:.2f}" for x in vector)
+    return " ".join(f"{round(x, 2) + 0.0:.2f}" for x in vector)  # no -0.00
 
 
 def counted(n: int, one: str, many: str) -> str:

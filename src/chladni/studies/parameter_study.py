@@ -18,6 +18,7 @@ from ..case import Case
 from ..case.free_parameters import fields_of
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import ChladniError, FileError, Interrupted
+from ..io.nastran import units_of
 from ..model.assembly import Assembly
 from ..output import own_version
 from ..progress import Progress, silent
@@ -187,11 +188,12 @@ def _varied(
 ) -> tuple[tuple[Variation, ...], list[str]]:
     """What is varied, and what the user should know of it."""
     notes: list[str] = []
+    units = units_of(model.deck, model.units) if model.deck and model.units else model.units
     if vary:
         found = [
-            of_effect(asked, model.assembly, case, model.units)
+            of_effect(asked, model.assembly, case, units)
             if asked.is_effect
-            else of_parts(asked, model.assembly, model.deck, model.units)
+            else of_parts(asked, model.assembly, model.deck, units)
             for asked in vary
         ]
         if case is not None and case.parameters:

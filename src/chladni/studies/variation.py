@@ -162,7 +162,7 @@ def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Unit
     moment = units.force * units.length if unit == "N m/rad" else units.force / units.length
     return {
         **dict.fromkeys(("E", "E1", "E2", "G12"), units.stress),
-        **{"rho": units.density, "t": units.length, "K": moment, "M": units.mass},
+        **{"rho": units.density, "t": units.length, "K": moment, "M": units.inertia},
     }.get(free.field, 1.0)
 
 

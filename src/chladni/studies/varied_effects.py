@@ -111,4 +111,4 @@ def _scale(unit: str, units: Units | None) -> tuple[float, str]:
     """What a number of the deck's units is multiplied by, and its unit then."""
     if units is None:
         return 1.0, "deck units"
-    return {"kg": units.mass, "N/m": units.force / units.length}[unit], unit
+    return {"kg": units.inertia, "N/m": units.force / units.length}[unit], unit

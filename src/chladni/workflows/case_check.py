@@ -14,6 +14,7 @@ from ..progress import Progress, silent, within
 from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model
+from .modes import loose_parts
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
 
@@ -21,6 +22,7 @@ COMMANDS = ("correlate", "calibrate", "diagnose", "study")  # whose use of the w
 MODES = 12  # of the model that are looked at
 OFF_MASS = 0.1  # of the weighed mass: more is no scatter of sheets
 OFF_MESH = 0.005  # of the structure's size: a sensor farther from the mesh is worth a look
+HANGS = "look at the rigid elements, releases and springs there"
 TOGETHER = 1e-4  # [m]; two channels nearer than this in one direction are one place
 
 
@@ -82,7 +84,7 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     dofs = (*_dofs(case, case.outputs, "output"), *_dofs(case, case.inputs, "input"))
     findings = [
         *_units(case), *_mass(case), *_size(case), *_places(case, dofs), *_band(case, elastic),
-        *_dead(case),
+        *_dead(case), *(CaseFinding(said, HANGS) for said in loose_parts(model, modal)),
     ]  # fmt: skip
     if not any(f.fault for f in findings):
         progress("the recording beside the model", 0.8)
@@ -112,13 +114,17 @@ def _facts(case: Case) -> list[tuple[str, str]]:
         ("mass", f"{mass:.5g} kg in the deck, {weighed}"),
         *(("recording", said_of(r)) for r in case.recordings),
         *([] if case.recordings else [("recording", _NO_RECORDING)]),
-        ("sensors", f"{len(case.outputs.labels)} outputs, {len(case.inputs.labels)} inputs"),
+        ("sensors", f"{_several(case.outputs, 'output')}, {_several(case.inputs, 'input')}"),
     ]
     band = "all the recording holds" if case.band is None else "{:g} to {:g} Hz".format(*case.band)
     without = "".join(f", without {a:g} to {b:g} Hz" for a, b in case.exclude)
     out.append(("band", band + without))
     free = ", ".join(p.name for p in case.parameters) or "the usual ones: E, t, rho"
     return [*out, ("free", free)]
+
+
+def _several(at: MeasuredDofs, what: str) -> str:
+    return f"{len(at.labels)} {what}" + "s" * (len(at.labels) != 1)
 
 
 def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:

@@ -102,7 +102,8 @@ def draft(
         sure = "no other system fits" if guess.sure else "another system fits, too: look at this"
         why = f"{why}; {sure}"
     else:
-        system, why = unit_system(units), "as given"
+        system = unit_system(units)
+        why = _as_given(assembly(bare.deck), deck.name, system)
     made = assembly(bare.deck, system)
     read = [r for path in recordings for r in _recordings(path, quantity)]
     read.sort(key=lambda r: (r.frf is None, r.poles is None))
@@ -114,6 +115,17 @@ def draft(
         deck, tuple(recordings), system, why, made, mass, quantity or "", weighed, tuple(allow),
         tuple(read), tuple(dofs), tuple(notes), tuple(_missing(read, dofs, mass, weighed)),
     )  # fmt: skip
+
+
+def _as_given(made: Assembly, name: str, system: Units) -> str:
+    """Why these units; what speaks for others where only they fit the materials."""
+    try:
+        guess = guessed_units(made, name)
+    except FileError:  # no known material in any system
+        return "as given"
+    if guess.sure and guess.units.name != system.name:
+        return f"as given, but look: {guess.why}; no other system fits"
+    return "as given"
 
 
 def _recordings(path: Path, quantity: str | None) -> tuple[Recording, ...]:

@@ -174,10 +174,11 @@ def is_case(source: Path) -> bool:
 
 
 def beside(source: Path) -> str:
-    """The names nearest to the one that is missing, else those of its kind."""
+    """The names nearest to the one that is missing, else those of its kind: files and cases."""
     if not source.parent.is_dir():
         return f"; there is no folder {source.parent} either"
-    names = sorted(p.name for p in source.parent.iterdir() if not p.name.startswith("."))
+    there = (p for p in source.parent.iterdir() if p.is_file() or (p / "case.toml").is_file())
+    names = sorted(p.name for p in there if not p.name.startswith("."))
     alike = [n for n in names if Path(n).suffix == source.suffix]
     near = get_close_matches(source.name, names, 4) or alike[:4]
     return f"; beside it there is {', '.join(near)}" if near else ""

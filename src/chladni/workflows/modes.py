@@ -7,6 +7,7 @@ import numpy as np
 from ..case import Case
 from ..dynamics.modes import ModalModel, rigid_modes
 from ..fem.energy import mass_properties, part_energies
+from ..fem.loose_parts import loose_grids
 from ..progress import Progress, silent
 from .loaded_model import LEAST, Model, as_model
 
@@ -59,15 +60,29 @@ def modes(source: Case | Model, count: int = 20, progress: Progress = silent) ->
         np.where(rigid, np.nan, part_energies(structure, phi)),
         tuple((part.name, part.id) for part in model.assembly.parts),
         bool(model.unit),
-        (*model.notes, *_notes(model, modal, count, int(still.sum()))),
+        (*model.notes, *_notes(model, modal, count, int(still.sum())), *loose_parts(model, whole)),
     )
+
+
+def loose_parts(model: Model, modal: ModalModel) -> list[str]:
+    """A sentence where modes without frequency are more than motions of the whole structure."""
+    grids = loose_grids(model.structure, modal.shapes[:, rigid_modes(modal)])
+    if not grids:
+        return []
+    motions = "1 motion" if len(grids) == 1 else f"{len(grids)} motions"
+    where = ", ".join(map(str, dict.fromkeys(grids)))
+    return [
+        f"{motions} without any stiffness beside those of the whole structure: something hangs "
+        f"loose; what moves most is grid {where}"
+    ]
 
 
 def _notes(model: Model, modal: ModalModel, count: int, rigid: int) -> list[str]:
     notes, size = [], len(model.structure.system.dofs)
     if len(modal) < count:
         notes.append(f"The model has {len(modal)} modes, {count} were asked for.")
-    notes.append(f"{size} degrees of freedom are free; {rigid} modes are rigid motions.")
+    motions = "1 mode is a rigid motion" if rigid == 1 else f"{rigid} modes are rigid motions"
+    notes.append(f"{size} degrees of freedom are free; {motions}.")
     if not model.unit:
         notes.append(
             "No unit system was given (--units), so mass and lengths are in the deck's own "

@@ -149,7 +149,8 @@ def _known(settings: BenchSettings) -> None:
     if not 1 <= settings.articles <= len(NAMES):
         raise LabelError(f"{settings.articles} articles; there may be 1 to {len(NAMES)}")
     if not settings.levels or min(settings.levels) <= 0:
-        raise LabelError(f"levels {settings.levels} must be factors above zero")
+        given = ", ".join(f"{x:g}" for x in settings.levels)
+        raise LabelError(f"levels {given} are to be factors above zero")
 
 
 def _places_known(case: Case, settings: BenchSettings) -> None:
@@ -216,7 +217,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     }
     return BenchResult(
         settings, setup, case.outputs, case.inputs, band, mass, tuple(recordings), truth, schedule,
-        _tapped(case, settings, mass), tuple(_notes(case, settings, recordings)),
+        _tapped(case, settings, mass), tuple(_notes(case, nominal, settings, recordings)),
     )  # fmt: skip
 
 
@@ -322,13 +323,23 @@ def level_unit(inputs: MeasuredDofs) -> str:
     return "m/s²" if inputs.base[0] else "N"
 
 
-def _notes(case: Case, settings: BenchSettings, recordings: Sequence[BenchRecording]) -> list[str]:
+def _notes(
+    case: Case,
+    article: BenchArticle,
+    settings: BenchSettings,
+    recordings: Sequence[BenchRecording],
+) -> list[str]:
     out = [*case.said("bench")]
     table, unit = bool(case.inputs.base[0]), level_unit(case.inputs)
     if table and case.setup.hangers:
         out.append("A table moves the supports: the article stands on it, cords are not used.")
-    if not table and not case.setup.hangers:
+    if not table and not case.setup.hangers and not article.elastic.all():
         out.append("The case names no hangers: the articles hang on nothing but swing at 0.7 Hz.")
+    if not settings.finer and len(case.assembly.shells):
+        out.append(
+            "The articles have the deck's own mesh and with it its error, which a real one has not "
+            "and a diagnosis allows for: --finer is the truer test."
+        )
     for r in recordings:
         out += [f"{r.article}, level {r.test.level:.3g} {unit}: {said}" for said in r.notes]
         if r.overloads:

@@ -243,6 +243,7 @@ def test_mass_at_a_place(bulk):
 
 def test_conm1_is_its_matrix(bulk):
     values = np.arange(1.0, 22)
+    values[np.cumsum(np.arange(1, 7)) - 1] += 100.0  # the diagonal, so that it is of a mass
     fields = "".join(f",{v}" + ("\n" if k % 8 == 4 else "") for k, v in enumerate(values))
     M = assembly(bulk("GRID,1\nCONM1,9,1," + fields.replace("\n,", "\n,") + "\n")).masses.matrix[0]
     np.testing.assert_allclose(M[np.tril_indices(6)], values)

@@ -18,7 +18,9 @@ from chladni.model.properties import Anisotropic, BeamSection, Part, ShellSectio
 from chladni.units import UNITS
 from chladni_specimens.plates import folded_panel, plate
 
-SYSTEMS = ("mm-t-s", "SI", "mm-kg-ms")
+SYSTEMS = ("mm-t-s", "SI", "mm-kg-ms", "mm-kg-ms, WTMASS")
+
+WEIGHED = "PARAM,WTMASS,2.59-3\n"
 
 
 @pytest.fixture(params=SYSTEMS)
@@ -28,8 +30,12 @@ def deck(request, tmp_path):
 
 
 def opened(made, folder, name="mm-t-s"):
-    units = UNITS[name]
-    found = read_deck(write_assembly(made, folder / "deck.bdf", units))
+    """The structure as a deck; with WTMASS every mass of it counts 0.00259 times."""
+    units = UNITS[name.partition(",")[0]]
+    path = write_assembly(made, folder / "deck.bdf", units)
+    if name.endswith("WTMASS"):
+        path.write_text(path.read_text().replace("BEGIN BULK\n", "BEGIN BULK\n" + WEIGHED))
+    found = read_deck(path)
     return found, assembly(found, units), units
 
 
@@ -190,6 +196,20 @@ def test_masses(deck, offset):
     np.testing.assert_array_equal(found.masses.node, after.masses.node)
     assert gone == []
     assert sum(line.startswith("CONM2") for line in fresh) == 2
+
+
+def test_non_structural_mass(deck):
+    """NSM of every sheet, and of one group of shells alone, which gets a property of its own."""
+    made, before, units = deck
+    heavy = [p.with_section(nonstructural=3.0) for p in before.parts]
+    part = np.array(before.shells.part)
+    part[np.flatnonzero(part == 0)[:5]] = len(heavy)
+    more = replace(heavy[0].with_section(nonstructural=7.5), id=91)
+    after = replace(before, parts=(*heavy, more), shells=replace(before.shells, part=part))
+    found, _, _ = repaired(made, before, after, units)
+    same(found, after, before)
+    loads = sorted(p.section.nonstructural for p in found.parts)
+    assert loads == pytest.approx([3.0] * len(heavy) + [7.5], rel=1e-6)
 
 
 def test_springs_to_ground(deck):

@@ -10,6 +10,7 @@ from .export.whole_deck import write_assembly as write_assembly
 from .read.analysis_requests import analysis as analysis
 from .read.assembly_from_deck import assembly as assembly
 from .read.connected import components as components
+from .read.context import units_of as units_of
 from .results.op2 import read_op2_modes as read_op2_modes
 from .results.op2 import read_op4 as read_op4
 from .results.punch import read_punch_modes as read_punch_modes

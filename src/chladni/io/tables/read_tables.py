@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from tokenize import TokenError
 from typing import cast, get_args
 
 import numpy as np
@@ -232,7 +233,8 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     except FileError:
         raise
     except _DAMAGED as error:
-        raise FileError(f"{path.name} cannot be read as NPZ: {error}") from error
+        why = error.args[0] if error.args else error
+        raise FileError(f"{path.name} cannot be read as NPZ: {why}") from error
     if timed:
         return _timed(path, read_time_npz(path, arrays), quantity)
     if missing := [name for name in _NPZ if name not in arrays]:
@@ -264,7 +266,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
 
 _DAMAGED = (
     *(ValueError, TypeError, OSError, EOFError, RuntimeError, MemoryError, KeyError),
-    *(zipfile.BadZipFile, zlib.error, NotImplementedError, OverflowError, SyntaxError),
+    *(zipfile.BadZipFile, zlib.error, NotImplementedError, OverflowError, SyntaxError, TokenError),
 )
 
 

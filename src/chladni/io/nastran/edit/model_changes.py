@@ -9,8 +9,7 @@ from ....errors import ModelError
 from ....model.assembly import Assembly, Shells
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic, Part, ShellSection
 from ....units import Units
-from ....units import units as unit_system
-from .. import Add, Deck, Replace, SetColumns, SetField
+from .. import Add, Deck, Replace, SetColumns, SetField, units_of
 from .added_elements import added_cards
 from .beam_changes import with_sections
 from .changes import Change
@@ -42,7 +41,7 @@ def changes(
     ModelError
         If the two differ in something no card here can say.
     """
-    units = unit_system(units or "SI")
+    units = units_of(deck, units)
     before, out = taken_out(deck, before, after)
     free = free_ids(deck, after)
     before, after, split = with_new_properties(before, after, free.properties)

@@ -128,7 +128,7 @@ def section_changes(before: Assembly, after: Assembly, units: Units) -> list[Cha
         if old.bending_ratio != new.bending_ratio:
             out.append(SetField("PSHELL", now.id, "12I/T3", new.bending_ratio))
         if old.nonstructural != new.nonstructural:
-            load = new.nonstructural / (units.mass / units.length**2)
+            load = new.nonstructural / (units.inertia / units.length**2)
             out.append(SetField("PSHELL", now.id, "NSM", load))
     return out
 

@@ -92,14 +92,14 @@ def _property(part: Part, pid: int, mid: list[int | None], units: Units) -> tupl
     values: list[Value] = [pid, mid[0], s.thickness / L, mid[1]]
     values += [None if s.bending_ratio == 1 else s.bending_ratio, mid[2]]
     values += [None if s.shear_ratio == 5 / 6 else s.shear_ratio]
-    values += [s.nonstructural / (units.mass / L**2) or None]
+    values += [s.nonstructural / (units.inertia / L**2) or None]
     return "PSHELL", values + ([None, None, mid[3]] if mid[3] else [])
 
 
 def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, list[Value]]:
     """(card name, fields): PBAR, PBEAM or PROD."""
     L = units.length
-    nsm = s.nonstructural / (units.mass / L)
+    nsm = s.nonstructural / (units.inertia / L)
     A, I1, I2, I12, J = s.area / L**2, *(x / L**4 for x in (s.I1, s.I2, s.I12, s.J))
     if s.kind == "rod":
         return "PROD", [pid, mid, A, J, None, nsm or None]
@@ -107,7 +107,7 @@ def beam_card(s: BeamSection, pid: int, mid: Value, units: Units) -> tuple[str, 
     if s.kind == "bar":
         return "PBAR", [pid, mid, A, I1, I2, J, nsm, None, *points, *s.shear, I12]
     n, m = ([x / L for x in pair] for pair in (s.neutral, s.nonstructural_at))
-    inertia = s.nonstructural_inertia / (units.mass * L)
+    inertia = s.nonstructural_inertia / (units.inertia * L)
     more: list[Value] = [*s.shear, None, None, inertia, inertia, None, None, *m, *m, *n, *n]
     return "PBEAM", [pid, mid, A, I1, I2, I12, J, nsm, *points, *more]
 

@@ -1,6 +1,6 @@
 """What every converter needs: unit factors, grids by row, coordinate systems."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,36 +11,6 @@ from ..text.deck import Deck
 from ..text.numbers import parse_real
 from ..text.table import Cards
 from .coordinate_systems import Frames
-
-
-@dataclass(frozen=True)
-class Scale:
-    """Factors from the deck's numbers to SI; ``weight`` is PARAM,WTMASS, on every mass."""
-
-    length: float = 1.0
-    mass: float = 1.0
-    time: float = 1.0
-    weight: float = 1.0
-
-    @property
-    def force(self) -> float:
-        """[N]."""
-        return self.mass * self.length / self.time**2
-
-    @property
-    def stress(self) -> float:
-        """[Pa]."""
-        return self.force / self.length**2
-
-    @property
-    def inertia(self) -> float:
-        """Mass as the deck counts it -> kg, WTMASS included."""
-        return self.mass * self.weight
-
-    @property
-    def density(self) -> float:
-        """[kg/m³]."""
-        return self.inertia / self.length**3
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +26,7 @@ class Context:
     """
 
     deck: Deck
-    scale: Scale
+    scale: Units  # from the deck's numbers to SI, PARAM,WTMASS included
     frames: Frames
     ids: np.ndarray
     places: np.ndarray
@@ -131,21 +101,23 @@ def real_parameter(deck: Deck, name: str, default: float) -> float:
     return value
 
 
-def context(deck: Deck, units: Units | str | None) -> Context:
-    """Points and factors of a deck; without units its numbers are kept."""
+def units_of(deck: Deck, units: Units | str | None) -> Units:
+    """The unit system of a deck with its PARAM,WTMASS; without one its numbers are kept."""
     weight = real_parameter(deck, "WTMASS", 1.0)
     if not weight > 0:
         raise FileError(f"{deck.path}: PARAM,WTMASS is {weight:g}; it scales mass, so it is > 0")
-    scale = Scale(weight=weight)
-    if units is not None:
-        system = unit_system(units)
-        scale = Scale(system.length, system.mass, system.time, weight)
+    return replace(unit_system(units or "SI"), weight=weight)
+
+
+def context(deck: Deck, units: Units | str | None) -> Context:
+    """Points and factors of a deck; without units its numbers are kept."""
+    scale = units_of(deck, units)
     default = deck["GRDSET"]
     cp, cd = (int(default.integers(k, 0)[0]) if len(default) else 0 for k in (2, 6))
     return _points(deck, scale, Frames(deck, cp), cp, cd)
 
 
-def _points(deck: Deck, scale: Scale, frames: Frames, cp: int, cd: int) -> Context:
+def _points(deck: Deck, scale: Units, frames: Frames, cp: int, cd: int) -> Context:
     grid = _without_repeats(deck["GRID"])
     ids = grid.unique()
     if np.any(bad := ids <= 0):

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic
+from ....units import Units
 from ..text.table import Cards
-from .context import Context, Scale
+from .context import Context
 
 _OTHER = ("MAT3", "MAT9", "MAT10", "MAT11", "MATHE", "MATHP", "MATORT", "MAT4", "MAT5")
 
@@ -57,14 +58,14 @@ class Materials:
         return found
 
 
-def _density(card: Cards, k: int, scale: Scale) -> float:
+def _density(card: Cards, k: int, scale: Units) -> float:
     rho = float(card.reals(k, 0.0)[0])
     if rho < 0:
         raise card.refuse(0, f"the density {rho:g} is negative")
     return rho * scale.density
 
 
-def _isotropic(card: Cards, scale: Scale) -> Isotropic:
+def _isotropic(card: Cards, scale: Units) -> Isotropic:
     """MAT1: whichever of E, G, ν is blank follows from E = 2 (1 + ν) G."""
     E, G, nu = (float(card.reals(k, np.nan)[0]) for k in (2, 3, 4))
     if np.isnan(E) and np.isnan(G):
@@ -89,7 +90,7 @@ def _isotropic(card: Cards, scale: Scale) -> Isotropic:
     )
 
 
-def _orthotropic(card: Cards, scale: Scale) -> Orthotropic:
+def _orthotropic(card: Cards, scale: Units) -> Orthotropic:
     """MAT8."""
     E1, E2 = card.block(2, 2)[0]
     nu12, G12, G1z, G2z = card.block(4, 4, 0.0)[0]
@@ -111,7 +112,7 @@ def _orthotropic(card: Cards, scale: Scale) -> Orthotropic:
     )
 
 
-def _anisotropic(card: Cards, scale: Scale) -> Anisotropic:
+def _anisotropic(card: Cards, scale: Units) -> Anisotropic:
     """MAT2: plane stiffness; as MID3 its G11, G12, G22 are the transverse shear moduli."""
     a, b, c, d, e, f = card.block(2, 6, 0.0)[0] * scale.stress
     Q = np.array([[a, b, c], [b, d, e], [c, e, f]])
@@ -126,7 +127,7 @@ def _anisotropic(card: Cards, scale: Scale) -> Anisotropic:
     )
 
 
-_MAKERS: dict[str, Callable[[Cards, Scale], Material]] = {
+_MAKERS: dict[str, Callable[[Cards, Units], Material]] = {
     "MAT1": _isotropic,
     "MAT2": _anisotropic,
     "MAT8": _orthotropic,

@@ -65,6 +65,7 @@ class Parts:
             cards, k = known[pid]
             card = cards.single(k)
             section = READERS[cards.name](self._ctx, self.materials, card, pid)
+            _weighs(card, section)
             name = self._ctx.deck.names.get(pid) or f"{cards.name} {pid}"
             part = Part(pid, name, section)
             self._at[family, pid] = self.add(part, cards, k, _shift(self._ctx, card))
@@ -82,11 +83,19 @@ class Parts:
         return np.array(sorted(range(len(self.made)), key=self._line.__getitem__), np.int64)
 
 
-def _positive(card: Cards, k: int, what: str) -> float:
-    value = float(card.reals(k)[0])
+def _positive(card: Cards, k: int, what: str, blank: float | None = None) -> float:
+    value = float(card.reals(k, blank)[0])
     if not value > 0:
         raise card.refuse(0, f"the {what} is {value:g}; it is to be positive")
     return value
+
+
+def _weighs(card: Cards, section: Section) -> None:
+    """Refuse a non-structural mass that takes away more than the sheet has."""
+    if isinstance(section, ShellSection) and section.nonstructural < 0:
+        sheet = getattr(section.membrane or section.bending, "rho", 0.0)
+        if not sheet * section.thickness + section.nonstructural >= 0:
+            raise card.refuse(0, "its NSM is negative, and more than the sheet weighs")
 
 
 def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSection:
@@ -98,7 +107,8 @@ def _pshell(ctx: Context, materials: Materials, card: Cards, _: int) -> ShellSec
     if found[0] is None and found[1] is None:
         raise card.refuse(0, "neither MID1 nor MID2 is given")
     blank = card.words(3)[0] == b""
-    ratio, ts = float(card.reals(5, 1.0)[0]), float(card.reals(7, 0.833333)[0])
+    ratio = _positive(card, 5, "bending ratio 12I/T3", 1.0)
+    ts = _positive(card, 7, "shear ratio TS/T", 0.833333)
     return ShellSection(
         np.nan if blank else _positive(card, 3, "thickness") * ctx.scale.length,
         found[0],

@@ -3,13 +3,14 @@
 import numpy as np
 
 from ....model.assembly import Bushes, Masses, Scalars
+from ....units import Units
 from ..text.table import Cards
-from .context import Context, Scale
+from .context import Context
 
 Values = dict[int, tuple[float, float]]
 
 
-def _work(scale: Scale, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
+def _work(scale: Units, component: np.ndarray, scalar: np.ndarray) -> np.ndarray:
     """Unit of length per unit of each dof: the scale of a translation, 1 for a rotation."""
     return np.where((component > 3) & ~scalar, 1.0, scale.length)
 
@@ -175,6 +176,7 @@ def _conm2(ctx: Context, cards: Cards) -> Masses:
     I11, I21, I22, I31, I32, I33 = cards.block(9, 6, 0.0).T * ctx.scale.inertia * L**2
     rows = [[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]]
     inertia = np.moveaxis(np.array(rows), 2, 0)
+    _no_negative(cards, inertia)
     x = np.einsum("ni,nij->nj", x, T)
     inertia = np.einsum("nia,nij,njb->nab", T, inertia, T)
     return Masses(cards.integers(1), node, point_mass(m, x, inertia))
@@ -188,11 +190,20 @@ def _conm1(ctx: Context, cards: Cards) -> Masses:
     M = np.zeros((len(cards), 6, 6))
     i, j = np.tril_indices(6)
     M[:, i, j] = M[:, j, i] = cards.block(4, 21, 0.0) * ctx.scale.inertia
+    _no_negative(cards, M)
     unit = np.array([1.0] * 3 + [ctx.scale.length] * 3)
     M *= unit[:, None] * unit
     R = np.zeros((len(cards), 6, 6))
     R[:, :3, :3] = R[:, 3:, 3:] = T
     return Masses(cards.integers(1), node, np.einsum("nia,nij,njb->nab", R, M, R))
+
+
+def _no_negative(cards: Cards, M: np.ndarray) -> None:
+    """Refuse inertia (n, k, k) that some motion would have less than none of."""
+    least, most = np.linalg.eigvalsh(M)[:, [0, -1]].T
+    if np.any(bad := least < -1e-6 * np.abs(most)):
+        i = int(np.argmax(bad))
+        raise cards.refuse(i, "its inertia is negative about some axis or along one")
 
 
 def _no_scalar(ctx: Context, cards: Cards, node: np.ndarray) -> None:

@@ -1,0 +1,37 @@
+"""Motions without strain that are none of the structure as a whole: something hangs loose."""
+
+import numpy as np
+from scipy.linalg import orth
+
+from .assemble import Structure
+from .energy import rigid_motions
+
+_BESIDE = 0.05  # sine of the angle to the rigid motions of the whole; rounding is far below
+_FOLLOWS = 1e-3  # weight of a scalar point: what it is tied to is moved as a whole with it
+
+
+def loose_grids(structure: Structure, phi: np.ndarray) -> tuple[int, ...]:
+    """The grid that moves most in each mechanism, P = 1 - R R⁺ of modes without strain.
+
+    Sines of the angles between the modes and the six rigid motions R are singular values of
+    P orth(Tφ) (Björck and Golub 1973); each that is not zero is a mechanism. Turns count by half
+    the structure's size, so that a bar which merely spins is one, too.
+
+    Parameters
+    ----------
+    phi : (n_free, r)   modes that have no frequency
+
+    Returns
+    -------
+    ids of grids, one for each mechanism; none where the whole structure moves as one
+    """
+    made = structure.assembly
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0))) or 1.0
+    scale = np.tile([1.0] * 3 + [size / 2] * 3, (len(made.ids), 1))
+    if made.scalar_points is not None:
+        scale[made.scalar_points] *= _FOLLOWS
+    scale = scale.reshape(-1, 1)
+    u, R = (orth(scale * A) for A in (structure.T @ phi, rigid_motions(made)))
+    beside, sine, _ = np.linalg.svd(u - R @ (R.T @ u), full_matrices=False)
+    moved = np.linalg.norm(beside[:, sine > _BESIDE].reshape(len(made.ids), 6, -1), axis=1)
+    return tuple(int(made.ids[k]) for k in np.argmax(moved, axis=0))
