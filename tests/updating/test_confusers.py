@@ -12,7 +12,7 @@ from chladni.effects.registry import families
 from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers, with_doubt
 from chladni.updating.diagnosis import Diagnosis
-from chladni.updating.result_parts import remainder, why_not
+from chladni.updating.result_parts import laid_on_sheets, remainder, why_not
 from chladni.updating.ties import TIED, simplest_first
 
 ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
@@ -190,3 +190,19 @@ def test_a_leader_that_is_refused_is_told_with_what_refused_it():
     )  # fmt: skip
     assert why_not(answer, lead, null).endswith(f"but what it leaves is not explained: {RUBS}")
     assert why_not(answer, second, null).endswith("but local-resonator, ahead of it, is not named")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "weighed", "said"),
+    [
+        ("calibration only", 6.0, "5.3% more"),
+        ("nothing missing", 5.4, "5.3% less"),
+        ("calibration only", 5.75, ""),
+        ("calibration only", None, ""),
+        ("missing physics", 6.0, ""),
+    ],
+)
+def test_weight_that_calibration_lays_on_sheets_may_be_trim(verdict, weighed, said):
+    answer = Diagnosis(None, None, None, (tried("point-mass", 0.0),), verdict)
+    assert said in "".join(laid_on_sheets(answer, weighed, 5.7))
+    assert bool(laid_on_sheets(answer, weighed, 5.7)) == bool(said)

@@ -25,6 +25,7 @@ from .result import (
 from .ties import TIED
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
+HEAVIER = 0.02  # of the deck's mass: what paint and sealant weigh, which no deck of sheets has
 
 
 def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
@@ -88,6 +89,23 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
     return (
         f"with other poles taken for spurious, other values of {effect.name} explain the poles "
         f"nearly as well: {'; or '.join(said)}; the intervals reach over all of them",
+    )
+
+
+def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> tuple[str, ...]:
+    """A sentence on weight that the deck lacks or has too much of, where nothing is named.
+
+    Parameters
+    ----------
+    weighed, deck : mass of the article and of the deck as it was given [kg]
+    """
+    if weighed is None or diagnosis.found is not None or abs(weighed / deck - 1) < HEAVIER:
+        return ()
+    off = weighed / deck - 1
+    return (
+        f"the article weighs {abs(off):.1%} {'more' if off > 0 else 'less'} than the deck, which "
+        "calibration lays on density and thickness; trim, mastic or a liner all over a sheet would "
+        "look the same: the drawing tells them apart, or a part weighed alone",
     )
 
 

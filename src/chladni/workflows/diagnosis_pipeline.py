@@ -52,6 +52,7 @@ from ..updating.result_parts import (
     agreement,
     alternatives,
     calibrated,
+    laid_on_sheets,
     named_effects,
     otherwise,
     remainder,
@@ -288,6 +289,7 @@ def _result(
         notes=(
             *prepared.notes,
             *found.notes,
+            *laid_on_sheets(found, weighed, mass_properties(asked.assembly)[0]),
             *otherwise(found),
             *away,
             left.sentence,
