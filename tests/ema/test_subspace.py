@@ -92,13 +92,14 @@ def test_a_dropped_pole_is_gone_and_a_picked_one_is_back() -> None:
     found = identify(frf)
     f = found.frequency[found.inside][3]
     without = identify(frf, drop=[f * 1.001])
-    assert without.order == found.order - 1
-    assert np.abs(without.frequency - f).min() > found.damping.max() * f
+    assert without.inside.sum() == found.inside.sum() - 1  # those beside the band are no modes
+    assert np.abs(without.frequency - f).min() > found.damping[found.inside].max() * f
     with pytest.raises(LabelError, match="no pole within 2 % of 500 Hz; there are"):
         identify(frf, drop=[500.0])
     again = identify(frf, drop=[f], pick=[f * 1.002])
-    assert again.frequency_sd == pytest.approx(found.frequency_sd, rel=0.1)
-    assert (np.abs(again.frequency - found.frequency) < found.frequency_sd).all()
+    own, sd = found.frequency[found.inside], found.frequency_sd[found.inside]
+    assert again.frequency_sd[again.inside] == pytest.approx(sd, rel=0.1)
+    assert (np.abs(again.frequency[again.inside] - own) < sd).all()
 
 
 def test_indicators_peak_at_the_modes() -> None:

@@ -6,8 +6,17 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import LabelError
+from .outer_poles import outside
 from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solved
-from .pole_search import ROUNDING, STEADY, Solution, chi_of, own_spread, with_noise_left
+from .pole_search import (
+    ROUNDING,
+    STEADY,
+    Solution,
+    chi_of,
+    own_spread,
+    with_noise_left,
+    with_those_beside,
+)
 from .pole_search_by_parts import few_channels
 from .pole_selection import Rule, uncertainty
 from .subspace import subspace
@@ -44,14 +53,16 @@ def edited(
 ) -> Solution:
     """Without the poles nearest to ``drop``, with ones begun at ``pick`` [Hz].
 
-    ``f_max`` is the frequency that scaled s.
+    ``f_max`` is the frequency that scaled s. Those beside the band are sought anew: left alone they
+    would come in and take the place of one that was dropped.
     """
-    p = solution.fit.p
+    p = solution.fit.p[~outside(data, solution.fit.p)]
     for f in drop:
         p = np.delete(p, _nearest(p, f, f_max))
     usual = float(np.median(-p.real / np.abs(p))) if len(p) else 0.01
     begun = np.array([f / f_max * (-usual + 1j) for f in pick])
-    fit, slope = polish(data, np.concatenate([p, begun]), rule.largest, iterations=6)
+    alone = polish(data, np.concatenate([p, begun]), rule.largest, iterations=6)
+    fit, slope = with_those_beside(data, alone, rule)
     for f in pick:
         _nearest(fit.p, f, f_max)
     return _solution(data, fit, slope, stated)

@@ -20,7 +20,7 @@ from .pole_selection import (
 )
 from .response_variance import left_variance
 
-UNSETTLED = 2.0  # times the noise that is left: the sweep may have begun badly
+UNSETTLED = 2.0  # times the noise: more that is left has another cause
 OTHERS = (5, 8, 12, 18, 26, 36, 48)  # orders that are tried then
 ROUNDS = 4  # of weights from what is left
 QUIET = 0.3  # times the noise assumed: so little is left that poles below it may be seen
@@ -69,15 +69,22 @@ def selected(
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = with_neighbours(data, fit, slope, rule)
     fit, _ = merge_duplicate_poles(data, fit, slope, rule)
-    alone = paid(data, fit.p, rule)
+    return with_those_beside(data, paid(data, fit.p, rule), rule)
+
+
+def with_those_beside(
+    data: PoleData, alone: tuple[PoleFit, PoleSystem], rule: Rule
+) -> tuple[PoleFit, PoleSystem]:
+    """The solution with poles beside the band, where these leave little but noise.
+
+    Where much is left with them it is not what rings next door: of a peak that leans they would
+    make a smooth rest, of a pole taken out by hand another pole.
+    """
     beside, _ = with_outer_poles(data, alone[0].p, rule)
-    return min(alone, paid(data, beside.p, rule), key=lambda one: _cost(one, rule))
-
-
-def _cost(solution: tuple[PoleFit, PoleSystem], rule: Rule) -> float:
-    """χ² and the price of its poles."""
-    fit, _ = solution
-    return fit.chi2 + rule.price * len(fit.p)
+    found = paid(data, beside.p, rule)
+    if chi_of(data, found[0]) > UNSETTLED:
+        return alone
+    return min(alone, found, key=lambda one: one[0].chi2 + rule.price * len(one[0].p))
 
 
 def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int) -> Solution:
