@@ -79,6 +79,12 @@ class Identified:
         """The residues, a column a channel (r, n_out n_in); of no poles too."""
         return self.residues.reshape(self.order, self.lower.size)
 
+    @property
+    def moved(self) -> np.ndarray:
+        """True for poles that damping equalisation moves, near enough to the band (r,)."""
+        low, high = self.band
+        return (self.frequency > low / AWAY) & (self.frequency < high * AWAY)
+
     def sel(self, modes: np.ndarray | slice) -> Self:
         """Some of the modes; the residual terms stay."""
         names = ("poles", "residues", "frequency_sd", "damping_sd", "relative_delta_chi2")
@@ -248,7 +254,6 @@ def equalised(identified: Identified, s: np.ndarray) -> np.ndarray:
 
     Abrahamsson and Kammer (2015), IMAC XXXIII, eqs. 26.14-26.28 (damping equalisation).
     """
-    p, (low, high) = identified.poles, identified.band
-    near = (identified.frequency > low / AWAY) & (identified.frequency < high * AWAY)
+    p, near = identified.poles, identified.moved
     R = identified.residues * np.where(near, p.imag / np.abs(p), 1.0)[:, None, None]
     return evaluate(identified, s, np.where(near, 1j * np.abs(p), p), R)

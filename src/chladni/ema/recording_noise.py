@@ -42,13 +42,14 @@ def equalised_noise(
     known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]
     S = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)
     H, out = np.zeros((len(s), w.shape[1]), complex), np.empty((len(s), w.shape[1]))
-    columns = _equalised_columns(s / omega_max, p, q)
+    near = identified.moved
+    columns = _equalised_columns(s / omega_max, p, q, near)
     for c, (root, tied, _) in enumerate(known):
         x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / omega_max**2,
                             identified.upper.ravel()[c : c + 1]])  # fmt: skip
         H[:, c] = columns @ x
         own = solve_triangular(root, columns.T, trans="T")
-        shared = _equalised_slopes(s / omega_max, p, R[:, c], q).T - tied.T @ own
+        shared = _equalised_slopes(s / omega_max, p, R[:, c], q, near).T - tied.T @ own
         variance = (np.abs(own) ** 2).sum(axis=0)
         out[:, c] = variance + np.einsum("ks,kl,ls->s", shared.conj(), S, shared).real
     return (out / (np.abs(H) * LN10) ** 2).reshape(len(s), *identified.lower.shape)
@@ -95,16 +96,23 @@ def _moved(second: np.ndarray, R: np.ndarray) -> np.ndarray:
     return np.stack([_taken(second, R), _taken(second, 1j * R)], -1).reshape(len(second), -1)
 
 
-def _equalised_columns(s: np.ndarray, p: np.ndarray, q: int) -> np.ndarray:
-    """The linear columns with every pole at i|p|, its residue times Im p/|p| (n_s, 2 r + 2)."""
-    first = basis(s, 1j * np.abs(p), q) * np.repeat(p.imag / np.abs(p), 2)
+def _equalised_columns(s: np.ndarray, p: np.ndarray, q: int, near: np.ndarray) -> np.ndarray:
+    """The linear columns with near poles at i|p|, their residue times Im p/|p| (n_s, 2 r + 2)."""
+    at, share = np.where(near, 1j * np.abs(p), p), np.where(near, p.imag / np.abs(p), 1.0)
+    first = basis(s, at, q) * np.repeat(share, 2)
     return np.concatenate([first, residual_terms(s, q)], axis=1)
 
 
-def _equalised_slopes(s: np.ndarray, p: np.ndarray, R: np.ndarray, q: int) -> np.ndarray:
-    """∂H_X/∂(Re p, Im p) of every pole (n_s, 2 r): through m = |p| and through f = Im p/m."""
+def _equalised_slopes(
+    s: np.ndarray, p: np.ndarray, R: np.ndarray, q: int, near: np.ndarray
+) -> np.ndarray:
+    """∂H_X/∂(Re p, Im p) of every pole (n_s, 2 r): through m = |p| and through f = Im p/m.
+
+    Of a pole that stays where it is, ∂H/∂p.
+    """
     m, a, b = np.abs(p), p.real, p.imag
     by_f = _taken(basis(s, 1j * m, q), R)
     by_m = _taken(basis(s, 1j * m, q, 2), 1j * R * b / m)
     slopes = [by_m * (a / m) - by_f * (a * b / m**3), by_m * (b / m) + by_f * (a**2 / m**3)]
-    return np.stack(slopes, -1).reshape(len(s), -1)
+    there = np.stack(slopes, -1).reshape(len(s), -1)
+    return np.where(np.repeat(near, 2), there, _moved(basis(s, p, q, 2), R))
