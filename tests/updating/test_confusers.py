@@ -58,7 +58,8 @@ def test_where_nothing_is_named_nothing_is_tied():
         ((TIED + 9, TIED - 1, 1.0), "nothing missing", None, ("point-mass",)),
         ((TIED - 1, 2.0, 1.0), "calibration only", None, ()),
         ((TIED + 2, 2.0, 1.0), "not in catalogue", None, ()),  # says so itself
-        ((TIED + 2, 2.0, 1.0), "calibration only", "refused", ()),
+        ((TIED + 2, 2.0, 1.0), "calibration only", {"lines": 9.0, "sensors": -1.0}, ()),
+        ((TIED + 2, 2.0, 1.0), "calibration only", {"lines": 9.0, "sensors": 1.0}, ("point-mass",)),
     ],
 )
 def test_what_leads_without_being_named_leaves_calibration_in_doubt(gains, verdict, heard, tied):
@@ -66,6 +67,7 @@ def test_what_leads_without_being_named_leaves_calibration_in_doubt(gains, verdi
     hypotheses = tuple(tried(name, -gain) for name, gain in zip(names, gains, strict=True))
     null = tried("", 0.0)
     null.data = None
+    heard = heard and SimpleNamespace(votes=heard)
     answer = with_doubt(Diagnosis(None, null, None, hypotheses, verdict, heard=heard))
     assert answer.one_of == (("calibration alone", *tied) if tied else ())
     assert bool(answer.notes) == bool(tied)

@@ -16,8 +16,9 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
     apart, and no data that were not fitted have refused it, the answer is one of both.  So it is
     where calibration strains a family of joints that stays as it is with the effect.
     """
-    plainly = diagnosis.verdict in ("nothing missing", "calibration only")
-    if not plainly or not diagnosis.hypotheses or diagnosis.heard is not None:
+    plainly, heard = diagnosis.verdict in ("nothing missing", "calibration only"), diagnosis.heard
+    against = heard is not None and not all(g > 0 for g in heard.votes.values())
+    if not plainly or not diagnosis.hypotheses or against:
         return diagnosis
     lead = diagnosis.hypotheses[0]
     gain = diagnosis.two_log_bayes_factor(lead)
