@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from chladni.dynamics.frf import FRF
-from chladni.ema.identification import evaluate, identify
+from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mode_indicators import cmif, mif
+from chladni.ema.outer_poles import outside
+from chladni.ema.pole_fitting import polish
+from chladni.ema.pole_search import with_those_beside
+from chladni.ema.pole_selection import Rule
 from chladni.ema.stabilisation import ghosts, prominence, stabilisation
 from chladni.errors import LabelError
 from chladni_evidence.identification_evidence import Known, recording, structure
@@ -112,3 +116,15 @@ def test_indicators_peak_at_the_modes() -> None:
         gap = np.abs(f[peak][:, None] / (np.abs(known.inside) / 2 / np.pi) - 1).min(axis=0)
         assert gap.max() < 0.004
     assert mif(frf).max() <= 1
+
+
+def test_poles_beside_the_band_take_none_away_that_was_picked() -> None:
+    """One in a gap that pays nothing: whoever picked it keeps it."""
+    frf, _ = recording(structure(4, 8, 6), "share", 4, lines=600)
+    found = identify(frf)
+    data, omega_max = pole_data(frf, kept_lines(frf))
+    own = found.poles[found.inside] / omega_max
+    idle = 0.5 * (np.abs(own[4]) + np.abs(own[5])) * (-0.01 + 1j)
+    alone = polish(data, np.append(own, idle), 0.1, iterations=0)
+    fit, _ = with_those_beside(data, alone, Rule(data.y.shape[1], len(data.s)))
+    assert (~outside(data, fit.p)).sum() == len(own) + 1

@@ -69,7 +69,9 @@ def selected(
     fit, slope = extended(data, fit, slope, rule, tries)
     fit, slope = with_neighbours(data, fit, slope, rule)
     fit, _ = merge_duplicate_poles(data, fit, slope, rule)
-    return with_those_beside(data, paid(data, fit.p, rule), rule)
+    alone = paid(data, fit.p, rule)
+    found = with_those_beside(data, alone, rule)
+    return alone if found is alone else paid(data, found[0].p, rule)
 
 
 def with_those_beside(
@@ -77,11 +79,10 @@ def with_those_beside(
 ) -> tuple[PoleFit, PoleSystem]:
     """The solution with poles beside the band, where these leave little but noise.
 
-    Where much is left with them it is not what rings next door: of a peak that leans they would
-    make a smooth rest, of a pole taken out by hand another pole.
+    All its own stay. Where much is left with them it is not what rings next door: of a peak that
+    leans they would make a smooth rest, of a pole taken out by hand another pole.
     """
-    beside, _ = with_outer_poles(data, alone[0].p, rule)
-    found = paid(data, beside.p, rule)
+    found = with_outer_poles(data, alone[0].p, rule)
     if chi_of(data, found[0]) > UNSETTLED:
         return alone
     return min(alone, found, key=lambda one: one[0].chi2 + rule.price * len(one[0].p))
