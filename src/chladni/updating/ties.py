@@ -43,8 +43,8 @@ def tied(best: HypothesisFit, hypotheses: Iterable[HypothesisFit]) -> dict[str, 
     """Names of what explains the data as well, its own first, and ln odds against each.
 
     What as it was fitted is another name for the best is none of them. What the best is somewhere
-    in its intervals is one, whatever the odds: a lump hangs on the sheet under it, which gives more
-    than shells say, and on a tailgate (tuning 561) was a resonator of 253 Hz, 74 to 862.
+    in its intervals is one, whatever the odds: a point mass on a tailgate (tuning 561) was called a
+    resonator of 253 Hz, 74 to 862.
     """
     behind = {
         t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
