@@ -1,7 +1,7 @@
-"""Make a demonstration case: a panel with something concealed in it, recorded on our own bench.
+"""Make the demonstration case: a panel with something concealed in it, solved by CalculiX.
 
 Run from the checkout: ``python meshes/make_demo.py``; it writes ``demo/`` and ``demo.truth.json``
-anew. Those that ship were made by an earlier bench; README and tests tell their numbers.
+anew. CalculiX (``ccx``) has to be installed for that.
 """
 
 from pathlib import Path
@@ -13,5 +13,5 @@ from chladni_evidence.made_case import write_case
 HERE = Path(__file__).resolve().parent
 
 if __name__ == "__main__":
-    case = made_of(Order("panel", "point-mass", 560, "fine"))
+    case = made_of(Order("panel", "point-mass", 560, "calculix"))
     write_case(case, HERE / "demo", HERE / "demo.truth.json")

@@ -12,6 +12,7 @@ from ..geometry.grid_normals import grid_normals
 from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
+from .label_directions import ways_said
 from .toml_sections import TomlSection
 
 ROLES: tuple[Role, ...] = ("output", "input")
@@ -44,7 +45,9 @@ def places(
     known = {**table, **{label: _spoken(label, test, made, nodes, axes) for label in spoken}}
     notes += _nodes_said(made, spoken, nodes, axes)
     notes += _off_said(made, role, [x for n in labels if (x := known[n].place) is not None])
-    return placed(made, [known[label] for label in labels], test.at("recordings"))
+    found = placed(made, [known[label] for label in labels], test.at("recordings"))
+    notes += ways_said(made, found, table)
+    return found
 
 
 def placed(made: Assembly, sensors: Sequence[Sensor], where: str) -> MeasuredDofs:

@@ -109,7 +109,8 @@ def _table(found: BenchResult) -> Table:
     rows = []
     for r in found.recordings:
         gamma = None if r.frf.coherence is None else float(np.median(r.frf.coherence))
-        error = np.abs(r.frf.values[:, :, 0] / r.truth - 1)
+        felt = np.abs(r.truth) > 0  # what is held moves nowhere
+        error = np.abs(r.frf.values[:, :, 0][felt] / r.truth[felt] - 1)
         over = ", ".join(f"{k} ({n})" for k, n in r.overloads.items()) or "none"
         rows.append((r.article, number(r.test.level, 3), number(gamma, 6),
                      number(100 * float(np.median(error)), 2), over))  # fmt: skip

@@ -1,11 +1,13 @@
 """Sensors declared along one axis that measured along another: X for Z."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 
 from ..case import Case
+from ..case.label_directions import surface_normals
 from ..dynamics.modes import rigid_modes
 from ..ema.correlation import mac
 from ..ema.identification import Identified
@@ -18,14 +20,16 @@ from .identify import firm
 OUTPUTS = 8  # fewer, and shapes of other axes are alike by chance
 SHARE = 0.5  # of the test's modes that must find a partner along the other axes
 ALIKE = 0.8  # mean MAC of these pairs
+SURE, MOST = 0.95, 0.7  # or: so like these pairs are, and what declared axes reach of them at most
+LEANS = 0.5  # cosine: a direction that leans so far against a normal is its other side
 BETTER = 2.0  # times the sum of MAC along the axes declared
 
 
 def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     """Refuse a table of sensors whose axes are exchanged, all of them in the same way.
 
-    The shapes of the test are held against the model's along the axes declared, and along the five
-    other orders of X, Y and Z.
+    The shapes of the test are held against the model's along the axes declared, along the five
+    other orders of X, Y and Z, and along the normals of the surface.
 
     Raises
     ------
@@ -35,26 +39,45 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     found = found.sel(firm(found))
     if len(case.outputs.labels) < OUTPUTS or not found.order:
         return
-    declared, _, _ = _fit(case, found, model, (0, 1, 2))
-    others = [(_fit(case, found, model, p), p) for p in list(permutations(range(3)))[1:]]
-    (total, pairs, mean), order = max(others, key=lambda one: one[0][0])
-    if pairs < SHARE * found.order or mean < ALIKE or total < BETTER * declared:
+    ways = case.outputs.directions
+    declared, _, _ = _fit(case, found, model, ways)
+    others = [(f"along {_turned(ways, o)}", ways[:, o]) for o in list(permutations(range(3)))[1:]]
+    others.append(("across the surface", _across(case, ways)))
+    fits = [(_fit(case, found, model, way), said) for said, way in others]
+    (total, pairs, mean), said = max(fits, key=lambda one: one[0][0])
+    beaten = total >= BETTER * declared or (mean > SURE and total * MOST > declared)
+    if pairs < SHARE * found.order or mean < ALIKE or not beaten:
         return
-    axes = np.abs(case.outputs.directions)
-    main = int(np.bincount(axes.argmax(axis=1), minlength=3).argmax())
     raise FileError(
-        f"{case.path}: the sensors are declared along {'XYZ'[main]}, but {pairs} of {found.order} "
-        f"modes have the model's shapes along {'XYZ'[order.index(main)]} (mean MAC {mean:.2f}): "
-        "mend the directions of sensors.csv, or of the labels"
+        f"{case.path}: the sensors are declared along {_main(ways)}, but {pairs} of {found.order} "
+        f"modes have the model's shapes {said} (mean MAC {mean:.2f}): mend the directions of "
+        "sensors.csv, or of the labels"
     )
 
 
+def _main(ways: np.ndarray) -> str:
+    """The axis that most of some directions (k, 3) lie nearest to."""
+    return "XYZ"[int(np.bincount(np.abs(ways).argmax(axis=1), minlength=3).argmax())]
+
+
+def _turned(ways: np.ndarray, order: Sequence[int]) -> str:
+    """The axis that most of them point along once component k is taken from order[k]."""
+    return _main(ways[:, order])
+
+
+def _across(case: Case, ways: np.ndarray) -> np.ndarray:
+    """Normals of the surface, with the sign that is declared; what is declared where none is."""
+    normal = surface_normals(case.assembly, case.outputs)
+    normal *= np.where((normal * ways).sum(axis=1) < -LEANS, -1.0, 1.0)[:, None]
+    return np.where(normal.any(axis=1, keepdims=True), normal, ways)
+
+
 def _fit(
-    case: Case, found: Identified, model: Modelled, order: tuple[int, ...]
+    case: Case, found: Identified, model: Modelled, ways: np.ndarray
 ) -> tuple[float, int, float]:
-    """(sum of MAC, pairs, mean MAC) with component k of every direction taken from order[k]."""
+    """(sum of MAC, pairs, mean MAC) with the outputs along these directions (k, 3)."""
     near = model.modes.sel(~rigid_modes(model.modes))
-    turned = replace(case.outputs, directions=case.outputs.directions[:, list(order)])
+    turned = replace(case.outputs, directions=ways)
     phi, psi = turned.rows(model.structure) @ near.shapes, driven_shapes(found)
     paired = pair(near.frequency, found.frequency, mac(phi, psi))
     mean = float(paired.mac.mean()) if len(paired) else 0.0
