@@ -12,8 +12,10 @@ from chladni.effects import point_mass, sensor_mass
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
+from chladni.effects.mass_patch import MassPatch
 from chladni.effects.ordinary import ordinary, random_field
 from chladni.effects.point_mass import PointMass
+from chladni.effects.search_context import Candidate
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
 from chladni.effects.surroundings import Setup
 from chladni.fem.energy import mass_properties
@@ -138,6 +140,24 @@ def test_two_lumps_are_two_each_at_its_place(found):
     for where in (HERE, THERE):
         assert min(np.linalg.norm(np.subtract(p, where)) for p in known) < 0.02
     assert both.hypothesis.neg2_log_evidence < singles[0].neg2_log_evidence - both.due
+
+
+@pytest.mark.parametrize("only", ["local-resonator", "mass-patch"])
+def test_a_mass_that_no_candidate_was_is_found_where_another_lump_is(reduced, only):
+    """A scan proposes a lump on a spring alone, or a spread one: the mass leads all the same."""
+    weight = 0.06 * mass_properties(reduced.structure.assembly)[0]
+    problem = problem_of(reduced, [lump(reduced, HERE, 2.0)], weight)
+    where, k = problem.where, at(reduced, *HERE)
+    spread = MassPatch.of_lump(where, where.grids.point[k], 0.5 * weight)
+    swings = LocalResonator.near(where, k), np.array([0.5, 0.0, 0.0, 0.5])
+    begun = {"local-resonator": swings, "mass-patch": spread}[only]
+    tried, null = [Candidate(*begun, problem.mean())], null_of(problem)
+    best = search_round(problem, null, tried, lambda text, share: None)
+    assert {t.name for t in best} == {only, "point-mass", "mass-patch"}
+    (place, m) = best[0].effect.lump(best[0].fit.of(best[0].effect))
+    assert best[0].name == "point-mass"
+    assert np.linalg.norm(place[:2] - HERE) < 0.01
+    assert m == pytest.approx(weight, rel=0.05)
 
 
 def test_each_gains_what_the_others_lose_without_it(two, found):

@@ -258,6 +258,17 @@ class Effect:
         """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
 
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float] | None:
+        """Place (3,) [m] and mass [kg], where it is a mass at a place; None: it is none."""
+        return None
+
+    @classmethod
+    def of_lump(
+        cls, where: "Surroundings", point: np.ndarray, mass: float
+    ) -> tuple["Effect", np.ndarray] | None:
+        """The effect as a mass [kg] at a place (3,) [m] begins it, and its start; None: not so."""
+        return None
+
     def off_the_scales(self, x: np.ndarray) -> float:
         """Mass [kg] it puts on the structure that is taken off before this is weighed."""
         return 0.0

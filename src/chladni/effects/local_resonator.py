@@ -97,6 +97,10 @@ class LocalResonator(MovableAttachment):
         """A lump, where the frequency of its spring may lie above the highest line."""
         return self.becomes(x + 1.96 * WIDER * sd)
 
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Its place and the mass that swings."""
+        return self.at(x), self.parameters[0].value(x[0])
+
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The lump itself."""
         m = self.parameters[0].value(x[0])

@@ -1,7 +1,7 @@
 """A mass spread over a region of a sheet: trim, mastic, a damping mat, paint that has run."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from .family import Article, Family
 from .points import strength
 from .property_bands import levels, with_bands
 from .search_context import Candidate, SearchContext
-from .sheet_patch import RIMMED, SheetPatch, patches
+from .sheet_patch import RADII, RIMMED, SheetPatch, patches
+from .surroundings import Surroundings
 
 SHARE = 0.03  # of the structure's mass: prior median
 
@@ -55,6 +56,24 @@ class MassPatch(SheetPatch):
     def begun(cls, amount: float) -> float:
         """Masses up to ten times the one scanned."""
         return cls.scanned + float(np.log(np.clip(amount, 0.05, 10.0)))
+
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Its middle and the mass, wherever that is spread."""
+        return self.deepest(x)[1], self.parameters[0].value(x[0])
+
+    @classmethod
+    def of_lump(
+        cls, where: Surroundings, point: np.ndarray, mass: float
+    ) -> tuple[Self, np.ndarray] | None:
+        """The mass spread as narrowly as a scan begins, round the nearest group of shells."""
+        groups = where.groups
+        sheet = np.flatnonzero(groups.sheet)
+        if not len(sheet):
+            return None
+        g = int(sheet[np.linalg.norm(groups.centre[sheet] - point, axis=1).argmin()])
+        effect = cls.on(groups, g, len(set(groups.connected[sheet].tolist())))
+        ln_m = np.log(mass / effect.parameters[0].scale)
+        return effect, np.array([ln_m, np.log(RADII[0]), 0.0, 0.0, cls.rim[0]])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """Properties of their own with more mass per area, by bands."""

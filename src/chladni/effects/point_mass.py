@@ -30,6 +30,19 @@ class PointMass(MovableAttachment):
         m = strength("M", "kg", SHARE * where.setup.weight, 1.2, (-1.5, -0.5, 0.5))
         return cls(moved(m), patch=patch(where, k, np.eye(3)), **there(where, k))
 
+    def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """Its place and the mass."""
+        return self.at(x), self.parameters[0].value(x[0])
+
+    @classmethod
+    def of_lump(
+        cls, where: Surroundings, point: np.ndarray, mass: float
+    ) -> tuple[Self, np.ndarray]:
+        """The mass at the nearest grid."""
+        k = int(np.linalg.norm(where.grids.point - point, axis=1).argmin())
+        effect = cls.near(where, k)
+        return effect, np.array([np.log(mass / effect.parameters[0].scale), 0.0, 0.0])
+
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The mass itself."""
         m = self.parameters[0].value(x[0])
