@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import Basis
+from chladni.effects.effect import WIDER
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.freed import freed, with_factor
 from chladni.effects.local_resonator import LocalResonator
@@ -218,6 +219,14 @@ def test_nothing_sits_beside_a_frame(where, effect):
             along = [term.moving[1] for term in one.terms(x) if term.moving]
             assert along
             assert not any(abs(slope).sum() for slope in along)
+
+
+def test_across_a_tube_nothing_is_known_and_nothing_counts(where):
+    """The second parameter of a place does nothing on a line of beams: its prior is no doubt."""
+    mass = PointMass.near(where, len(where.grids) // 2)
+    sd = np.array([0.1, 0.6, 1.5])
+    radius = mass.located(np.zeros(3), sd).radius_m
+    assert radius == pytest.approx(1.96 * WIDER * 0.6 * mass.patch.size)
 
 
 def test_at_the_end_of_a_tube_the_slope_is_that_inwards(where):

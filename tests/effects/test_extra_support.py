@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
+from chladni.effects.effect import WIDER
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.surroundings import Setup, Surroundings
 from chladni.fem.assemble import structure
@@ -66,3 +67,14 @@ def test_begun_anew_it_pushes_as_before(where, support):
 def test_a_tilt_worth_a_word_is_said(support):
     assert "along" not in support.location(np.zeros(5)).text
     assert "along (" in support.location(np.array([0, 0, 0, 1.0, 0])).text
+
+
+def test_a_place_is_known_as_well_as_the_fit_says(support):
+    """95 % of a Gaussian in a plane lie in the radius √5.99 sd (χ² of two); no less than h."""
+    rng, sd = np.random.default_rng(0), np.array([0.1, 0.8, 0.8, 0.1, 0.1])
+    radius = support.located(np.zeros(5), sd).radius_m
+    drawn = support.patch.size * WIDER * 0.8 * rng.normal(size=(20000, 2))
+    assert np.mean(np.linalg.norm(drawn, axis=1) < radius) == pytest.approx(0.95, abs=0.01)
+    longer = support.located(np.zeros(5), sd * [1, 1, 2, 1, 1]).radius_m
+    assert longer == pytest.approx(2 * radius)  # what one way is less known counts
+    assert support.located(np.zeros(5), 1e-3 * sd).radius_m == support.patch.size

@@ -328,6 +328,10 @@ class Effect:
         """Where it is once it has been fitted."""
         return self.where()
 
+    def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
+        """The same, with how well the place is known where the fit says so."""
+        return self.location(x)
+
     def becomes(self, x: np.ndarray) -> str:
         """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
         return ""

@@ -16,7 +16,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Location:
-    """Where an effect acts: in words, and as far as it is known in numbers."""
+    """Where an effect acts: in words, and as far as it is known in numbers.
+
+    ``radius_m`` is how far what is spread reaches; of what sits at one place, how well that is
+    known.
+    """
 
     text: str = ""
     parts: tuple[str, ...] = ()

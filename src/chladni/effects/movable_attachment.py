@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..geometry.facets import tangents
-from .effect import Effect, Parameter, PointTerm
+from .effect import WIDER, Effect, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .surroundings import ElementGrids, Surroundings
@@ -143,6 +143,17 @@ class MovableAttachment(Effect):
         text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
         size = self.patch.size
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=size)
+
+    def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
+        """The place, and the radius [m] in which it lies with 95 %, widened as intervals are.
+
+        Of a place in a plane that is at most √5.99 times the larger of both deviations, along a
+        line 1.96 times the one; the mesh size where that is more.
+        """
+        assert self.patch is not None
+        ways, times = (2, np.sqrt(5.99)) if self.patch.plane[1].any() else (1, 1.96)
+        far = float(times * WIDER * sd[1 : 1 + ways].max())
+        return replace(self.location(x), radius_m=self.patch.size * max(far, 1.0))
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""

@@ -43,7 +43,7 @@ def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffec
         effect.name,
         effect.claim,
         -hypothesis.neg2_log_evidence / 2,
-        effect.location(x),
+        effect.located(x, hypothesis.fit.sd(effect)),
         _reported(hypothesis, effect),
         gain,
     )
@@ -119,7 +119,9 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             hypothesis.effect.name,
             -hypothesis.neg2_log_evidence / 2,
             why_not(diagnosis, hypothesis, best),
-            hypothesis.effect.location(hypothesis.fit.of(hypothesis.effect)),
+            hypothesis.effect.located(
+                hypothesis.fit.of(hypothesis.effect), hypothesis.fit.sd(hypothesis.effect)
+            ),
         )
         for hypothesis in diagnosis.hypotheses
         if hypothesis is not found and hypothesis.effect.name not in named
