@@ -197,7 +197,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
     some = ", ".join(grids[:12]) + (f" … ({len(grids)} in all)" if len(grids) > 12 else "")
     at = ""
     if where.point_m:
-        at = "(" + ", ".join(number(x) for x in where.point_m) + ") m"
+        at = "(" + ", ".join(f"{round(x, 4) + 0.0:.4f}" for x in where.point_m) + ") m"
         at += f", within {quantity(where.radius_m, 'm')}" if where.radius_m else ""
     return [
         ("place", where.text),
