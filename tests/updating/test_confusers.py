@@ -103,6 +103,18 @@ def test_what_the_named_effect_may_be_is_told_whatever_the_odds(nearly, one_of):
     assert answer.one_of[:2] == (("local-resonator", "point-mass") if one_of else ())
 
 
+@pytest.mark.parametrize(
+    ("behind", "lead"), [(TIED - 1, "point-mass"), (TIED + 1, "local-resonator")]
+)
+def test_what_may_be_simpler_lets_the_simpler_lead_where_that_is_as_probable(behind, lead):
+    """A point or two made a resonator of a mass at the edge of a tailgate (tuning 561)."""
+    lump = tried("local-resonator", 0.0, nearly="point-mass")
+    ordered = simplest_first([lump, tried("point-mass", behind)], 200.0)
+    assert ordered[0].name == lead
+    answer = with_confusers(Diagnosis(None, None, None, tuple(ordered), "missing physics"))
+    assert answer.one_of[:2] == (() if lead == "point-mass" else ("local-resonator", "point-mass"))
+
+
 @pytest.mark.parametrize(("sd", "name"), [(0.05, ""), (0.5, "point-mass")])
 def test_a_lump_whose_spring_may_be_stiff_may_be_a_point_mass(sd, name):
     """Half of the highest line, known to a tenth or to no better than a factor of two."""

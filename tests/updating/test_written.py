@@ -165,10 +165,35 @@ def test_all_poles_together_may_bear_a_name(monkeypatch, reduced, gain, news, na
     monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
     found = Diagnosis(null, null, null, (lead,), "nothing missing", ("of calibration",))
     asked = SimpleNamespace(problem=None, unseen=None, too_little="")
-    got = outcome.borne_by_all_poles(asked, found)
+    got = outcome.borne_by_all_data(asked, found)
     assert (got.verdict == "missing physics") == named
     asked = SimpleNamespace(problem=None, unseen=None, too_little="three modes are the least")
-    assert outcome.borne_by_all_poles(asked, found) is found
+    assert outcome.borne_by_all_data(asked, found) is found
+
+
+@pytest.mark.parametrize(
+    ("gain", "heard", "named"),
+    [
+        (0.7, HeldOutEvidence(0.4 * DUE, 1.0, 1.0), True),
+        (0.7, HeldOutEvidence(0.2 * DUE, 1.0, 1.0), False),  # not enough together
+        (0.7, HeldOutEvidence(9 * DUE, -1.0, 1.0), False),  # folds of what was fitted object
+        (0.4, HeldOutEvidence(9 * DUE, 1.0, 1.0), False),  # what was fitted hardly points there
+        (0.7, HeldOutEvidence(None, 9 * DUE, 9 * DUE), False),  # folds are no new data
+    ],
+)
+def test_all_responses_together_may_bear_a_name(monkeypatch, hypothesis, gain, heard, named):
+    """Those held out are data as those fitted are; the bound on false alarms is that of all."""
+    worse = replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + gain * DUE)
+    null = HypothesisFit(Effect(), worse, hypothesis.model)
+    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
+    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
+    found = Diagnosis(null, null, null, (hypothesis,), "nothing missing", ("of calibration",))
+    asked = SimpleNamespace(problem=None, unseen=None, too_little="")
+    got = outcome.borne_by_all_data(asked, found)
+    assert (got.verdict == "missing physics") == named
+    assert ("together more than" in got.notes[-1]) == named
+    again = outcome.borne_by_all_data(asked, replace(found, refused="it left too much"))
+    assert again.verdict == "nothing missing"
 
 
 def test_calibration_alone_is_written_without_scatter(reduced, responses):

@@ -90,6 +90,7 @@ def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
 
 
 CONFLICT = 2.0  # times the gain due: what was fitted refutes calibration, whatever else says
+GOOD_PART = 0.5  # of the gain due, that fitted responses bear where others bear the rest
 HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
 MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
 AGAINST = "the data that no fit saw speak against it"
@@ -98,25 +99,28 @@ MORE_LEFT = "but with it in place more is left than it explains"
 BEYOND = "something that the catalogue does not hold"
 
 
-def borne_by_all_poles(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis with a name that all poles together bear, those that no fit saw included.
+def borne_by_all_data(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with a name that all data together bear, those that no fit saw included.
 
-    A fifth of a dozen natural frequencies is much of what is known.  The Bayes factor of all of
-    them is the product of that of the fitted ones and of how well the others are foretold, and the
-    bound on false alarms holds for it as for the first alone.
+    A fifth of a dozen natural frequencies is much of what is known, and held-out sensors and lines
+    may feel an effect that the fitted band hardly does.  The Bayes factor of all data is the
+    product of that of the fitted ones and of how well the others are foretold, and the bound on
+    false alarms holds for it as for the first alone.  Responses bear a good part of it themselves.
     """
     lead = diagnosis.hypotheses[0] if diagnosis.hypotheses else None
+    if lead is None or diagnosis.found is not None or prepared.too_little or diagnosis.refused:
+        return diagnosis
     poles = isinstance(diagnosis.null.data, Poles)
-    if lead is None or diagnosis.found is not None or prepared.too_little or not poles:
+    gain, data = diagnosis.two_log_bayes_factor(lead), "poles" if poles else "data"
+    if gain <= (0.0 if poles else GOOD_PART * diagnosis.due):
         return diagnosis
     heard = held_out_evidence(prepared.problem, prepared.unseen, diagnosis.null, lead)
-    gain, news = diagnosis.two_log_bayes_factor(lead), heard.held_out or 0.0
-    if not (gain > 0 and gain + news > diagnosis.due):
+    if not carried(gain, heard, diagnosis.due, poles):
         return diagnosis
     note = (
-        f"{lead.name} gained {gain:.1f} in -2 ln evidence on the poles that were fitted, and those "
-        f"that no fit saw speak for it with {news:.1f}: together more than the {diagnosis.due:.0f} "
-        "that are needed"
+        f"{lead.name} gained {gain:.1f} in -2 ln evidence on the {data} that were fitted, and "
+        f"those that no fit saw speak for it with {heard.held_out or 0.0:.1f}: together more than "
+        f"the {diagnosis.due:.0f} that are needed"
     )
     of_null = 0 if diagnosis.adequacy is None else 1  # the last is what was said of calibration
     notes = (*diagnosis.notes[: len(diagnosis.notes) - of_null], note)
@@ -177,10 +181,12 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False) -> bool:
     """Whether fitted data and those that no fit saw bear a name that has to gain what is due.
 
-    ``poles`` are few: all of them together bear it, or do not.
+    ``poles`` are few: all of them together bear it, or do not.  So do responses, where all that was
+    asked speaks for the name and what was fitted bears a good part of it.
     """
     together = gain + (heard.held_out or 0.0)
-    least = together if poles else min(gain, together)
+    for_it = gain > GOOD_PART * due and all(g > 0 for g in heard.votes.values())
+    least = together if poles or for_it else min(gain, together)
     return least > due and not any(g < -due for g in heard.votes.values())
 
 

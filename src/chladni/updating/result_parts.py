@@ -22,7 +22,7 @@ from .result import (
     Remainder,
     Scores,
 )
-from .ties import TIED
+from .ties import TIED, same
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 HEAVIER = 0.02  # of the deck's mass: what paint and sealant weigh, which no deck of sheets has
@@ -147,7 +147,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
             "before anything is named"
         )
-    if hypothesis.effect.becomes(hypothesis.fit.of(hypothesis.effect)) == best.name:
+    if same(hypothesis, best.name):
         return f"as it was fitted it is {best.name} for all these data can tell"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (

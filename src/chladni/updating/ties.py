@@ -12,7 +12,8 @@ def simplest_first(hypotheses: list[HypothesisFit], null: float) -> list[Hypothe
     """Best first, but for a leader that another close behind is to be preferred to.
 
     A lump on a spring that is tuned above all lines is a point mass: the simpler effect leads,
-    unless the foot of a resonance that no line shows is more than a hundredth of what was gained. A
+    unless the foot of a resonance that no line shows is more than a hundredth of what was gained.
+    Where it may be tuned there, as well as it is known, the simpler leads that is as probable. A
     sealant as stiff as steel is no sealant: what has a value it can have leads.
 
     Parameters
@@ -24,11 +25,12 @@ def simplest_first(hypotheses: list[HypothesisFit], null: float) -> list[Hypothe
     lead = hypotheses[0]
     at = lead.fit.of(lead.effect)
     simpler, odd = lead.effect.becomes(at), bool(lead.effect.implausible(at))
+    perhaps = lead.effect.nearly(at, lead.fit.sd(lead.effect))
     foot = FOOT * (null - lead.neg2_log_evidence)
     for t in hypotheses[1:]:
         sound = not t.effect.implausible(t.fit.of(t.effect))
         behind = t.neg2_log_evidence - lead.neg2_log_evidence
-        near = odd and sound and behind < TIED
+        near = behind < TIED and ((odd and sound) or t.effect.name == perhaps)
         if near or (t.effect.name == simpler and behind < max(TIED, foot)):
             return [t, *(other for other in hypotheses if other is not t)]
     return hypotheses
@@ -39,17 +41,24 @@ def needs_impossible(name: str, why: str) -> str:
     return f"{name} would need a value it cannot have: {why}"
 
 
+def same(hypothesis: HypothesisFit, name: str) -> bool:
+    """Whether an explanation, as it was fitted or within its intervals, is a simpler one's."""
+    effect, fit = hypothesis.effect, hypothesis.fit
+    x = fit.of(effect)
+    return name in (effect.becomes(x), effect.nearly(x, fit.sd(effect)))
+
+
 def tied(best: HypothesisFit, hypotheses: Iterable[HypothesisFit]) -> dict[str, float]:
     """Names of what explains the data as well, its own first, and ln odds against each.
 
-    What as it was fitted is another name for the best is none of them. What the best is somewhere
-    in its intervals is one, whatever the odds: a point mass on a tailgate (tuning 561) was called a
-    resonator of 253 Hz, 74 to 862.
+    What as it was fitted is another name for the best, or may be, is none of them. What the best is
+    somewhere in its intervals is one, whatever the odds: a point mass on a tailgate (tuning 561)
+    was called a resonator of 253 Hz, 74 to 862.
     """
     behind = {
         t.effect.name: (t.neg2_log_evidence - best.neg2_log_evidence) / 2
         for t in hypotheses
-        if t.effect.becomes(t.fit.of(t.effect)) != best.effect.name
+        if not same(t, best.effect.name)
     }
     also = best.effect.nearly(best.fit.of(best.effect), best.fit.sd(best.effect))
     return {name: gap for name, gap in behind.items() if 2 * gap < TIED or name == also}

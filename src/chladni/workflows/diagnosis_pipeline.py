@@ -36,7 +36,7 @@ from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.other_recordings import scored_others
 from ..updating.outcome import (
-    borne_by_all_poles,
+    borne_by_all_data,
     fitted_scores,
     held_out,
     judged,
@@ -159,7 +159,7 @@ def _judged(
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
-    found = borne_by_all_poles(prepared, found)
+    found = borne_by_all_data(prepared, found)
     for more in reversed(found.sets):
         whole = renewed(asked, prepared, more.hypothesis)
         together, why_not = named_together(prepared, found, more, whole.hypothesis)
