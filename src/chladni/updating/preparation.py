@@ -26,6 +26,7 @@ from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
+from ..progress import Progress, silent
 from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
@@ -48,12 +49,12 @@ SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis an
 FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
-def prepare(question: Question) -> Prepared:
+def prepare(question: Question, progress: Progress = silent) -> Prepared:
     """Identify, decide how to compare, choose what is held out, build the reduced problem."""
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain)
-    return _by_responses(question)
+    return _by_responses(question, progress)
 
 
 def _place_sd(question: Question) -> float:
@@ -62,7 +63,7 @@ def _place_sd(question: Question) -> float:
     return max(float(p.sd.max(initial=0.0)) for p in places)
 
 
-def _by_responses(question: Question) -> Prepared:
+def _by_responses(question: Question, progress: Progress) -> Prepared:
     frf = question.frf
     assert frf is not None
     low, high = band_of(question, frf)
@@ -79,11 +80,14 @@ def _by_responses(question: Question) -> Prepared:
             f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
+    progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
     rows_o, rows_i = question.outputs.rows(built), question.inputs.rows(built)
     wrong = sensor_errors(question.outputs, question.inputs, built, question.accuracy)
+    progress("what its mesh hides", 0.5)
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
+    progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
     lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)

@@ -109,7 +109,7 @@ def explained(
         )
     asked = question(case)
     try:
-        prepared = prepare(asked)
+        prepared = prepare(asked, within(progress, 0.0, 0.1))
     except FileError:  # a recording at fault may hold nothing to fit, and says so itself
         alone = screened_alone(case)
         if alone is None or not alone.faults:
