@@ -26,7 +26,7 @@ from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.candidates import candidates, repeats
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence, held_out_evidence
-from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, as_written, fitted
+from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
@@ -34,6 +34,7 @@ from chladni.updating.rivals import _on_its_own_basis
 from chladni.updating.search_round import on_common_basis, search_round
 from chladni.updating.several import Rival, _begun_with, _More, _paying, _same, several
 from chladni.updating.several_judged import named_together
+from chladni.updating.written_hypothesis import as_written
 
 SENSORS = [1, 7, 57, 63, 25, 39]
 TOP, LINES = 200.0, 30

@@ -18,12 +18,13 @@ from chladni.fem.derivative import Slope
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
-from chladni.updating.hypothesis_fit import HypothesisFit, as_found, as_written
+from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.result_parts import calibrated
+from chladni.updating.written_hypothesis import as_foretold, as_found, as_written
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +51,58 @@ def test_is_the_best_without_scatter(hypothesis):
     left = evaluate(hypothesis.model, deck.fit.effects, x, False)
     r, _ = hypothesis.data.residual(left, False)
     assert deck.fit.misfit <= r @ r + 1e-6
+
+
+@pytest.fixture(scope="module")
+def unseen(hypothesis):
+    """A fifth of the lines, which the fit is then made without."""
+    use = np.zeros_like(hypothesis.data.use)
+    use[-len(use) // 5 :] = True
+    return use
+
+
+@pytest.fixture(scope="module")
+def learned(hypothesis, unseen):
+    """The hypothesis with a scatter that is felt, found on the lines that were not held out."""
+    own, x = hypothesis.fit, hypothesis.fit.x.copy()
+    (scatter,) = [e for e in own.effects if not e.writable]
+    x[own.slice(scatter)] = 3 * np.eye(len(scatter.parameters))[2]
+    data = hypothesis.data.using(hypothesis.data.use & ~unseen)
+    return replace(hypothesis, fit=replace(own, x=x, data=data))
+
+
+def off(deck, whole, use):
+    """Mean square of the log deviation between a deck and the hypothesis it was made of."""
+    state = evaluate(whole.model, whole.fit.effects, whole.fit.x, False)
+    foretold = replace(whole.data, values=whole.data.model(state), use=use)
+    delta = foretold.deviation(deck.fit.state)[use]
+    return float((np.abs(delta) ** 2).mean())
+
+
+def test_a_deck_that_can_hold_all_that_was_found_keeps_its_numbers(learned, unseen):
+    """Without scatter the hypothesis is the deck: no number moves, wherever the prior would."""
+    kept = [e for e in learned.fit.effects if e.writable]
+    bare = fit(learned.model, kept, learned.data, None, np.concatenate(
+        [learned.fit.of(e) for e in kept]))  # fmt: skip
+    deck = as_foretold(replace(learned, fit=bare), None, unseen)
+    assert deck.fit.x == pytest.approx(bare.x, abs=2e-3)
+
+
+def test_a_deck_responds_as_what_was_found_does_on_lines_that_were_held_out_too(learned, unseen):
+    """Nearer to it than a deck fitted to what was recorded, or what was found less scatter."""
+    whole, deck = learned.data.use | unseen, as_foretold(learned, None, unseen)
+    assert [e.name for e in deck.fit.effects] == ["part-scale", "thickness-distribution"]
+    for other in (as_written(learned, None), as_found(learned)):
+        assert off(deck, learned, whole) < 0.9 * off(other, learned, whole)
+    assert deck.fit.of(deck.effect) == pytest.approx(learned.fit.of(learned.effect), abs=5e-3)
+
+
+def test_what_was_held_out_does_not_enter_the_deck(learned, unseen):
+    """Its recorded values may be anything."""
+    values = np.where(unseen[:, :, None], 7.0 + 3.0j, learned.data.values)
+    spoilt = replace(learned, fit=replace(learned.fit, data=replace(learned.data, values=values)))
+    one, other = (as_foretold(h, None, unseen) for h in (learned, spoilt))
+    np.testing.assert_allclose(one.fit.x, other.fit.x, atol=1e-5)
 
 
 def test_what_was_found_is_told_beside_what_the_written_deck_has(hypothesis):
@@ -126,7 +179,8 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
     problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
-    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
+    unseen = np.zeros_like(hypothesis.data.use)
+    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=unseen), found)
     assert judged.verdict == called
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)

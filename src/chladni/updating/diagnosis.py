@@ -51,6 +51,7 @@ class Diagnosis:
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
     written : the named effect as a deck can hold it, once the held-out data have been heard
+    deck : the same with numbers that make the updated deck respond as all that was found does
     adequacy : whether the explanation fits at all, where that was tested
     one_of : what the data cannot tell apart, where they are too few to name anything
     heard : what data that no fit saw say of the leading effect
@@ -68,6 +69,7 @@ class Diagnosis:
     verdict: str
     notes: tuple[str, ...] = ()
     written: HypothesisFit | None = None
+    deck: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
     heard: HeldOutEvidence | None = None
@@ -82,6 +84,11 @@ class Diagnosis:
         """The named effect, if any."""
         named = self.verdict in ("missing physics", "measurement fault")
         return self.hypotheses[0] if named and self.hypotheses else None
+
+    @property
+    def as_deck(self) -> HypothesisFit | None:
+        """The named effect as the updated deck holds it, if anything is named."""
+        return self.deck or self.written or self.found
 
     @property
     def unexplained(self) -> bool:

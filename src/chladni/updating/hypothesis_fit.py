@@ -6,13 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from ..effects.calibrated_family import calibrated_family
 from ..effects.effect import Effect
 from ..effects.surroundings import Setup, Surroundings
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned
-from .leaning import is_strained
 from .likelihood import SCALE, SCALE_SD, Data, Poles, Responses
 from .map_fit import Fit, MassMeasurement, beside, constants, fit
 from .reduced_model import Reduced, State, evaluate
@@ -298,54 +296,3 @@ def neg2_log_mixture(data: Poles, state: State) -> float:
 
 def _scale_prior(scale: float, median: float = SCALE) -> float:
     return float((np.log(scale / median) / SCALE_SD) ** 2)
-
-
-HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
-
-
-def as_written(
-    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
-) -> HypothesisFit:
-    """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
-
-    The ordinary parameters are fitted anew, for they were found beside a scatter that is not there
-    any more.  The learned error of the model stays in
-    the likelihood, else they would bend to make up for mesh and joints: on a coarse plate with a
-    concealed crack E went to 264 GPa for 210 without it, and to 212 with it.
-    """
-    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
-    kept = [e for e in hypothesis.fit.effects if e.writable]
-    start = np.concatenate([hypothesis.fit.of(e) for e in kept])
-    effects = [held.get(id(e), e) for e in kept]
-    model = hypothesis.model
-    found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
-    effect, *beside = held.values()
-    return HypothesisFit(effect, found, model, tuple(beside))
-
-
-def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
-    """A hypothesis without effects as a deck can hold it, its numbers as they were found.
-
-    They were found beside all that is known to err, and the better for it: on a tailgate where
-    nothing was missing E of the inner panel ended 2 % nearer its value, t 2 % and E of a bracket
-    7 % than fitted anew without joints and scatter, which :func:`as_written` does.  Joints that
-    took more than joints scatter are numbers of the deck as well: a deck whose adhesive is six
-    times too soft stays 4 % off in frequency without.
-    """
-    fit = hypothesis.fit
-    every = [calibrated_family(e) if is_strained(e, fit.of(e)) else e for e in fit.effects]
-    inside = np.concatenate([np.full(len(e.parameters), e.writable) for e in every])
-    effects, x = tuple(e for e in every if e.writable), fit.x[inside]
-    state = evaluate(hypothesis.model, effects, x)
-    covariance = fit.covariance[np.ix_(inside, inside)]
-    found = replace(fit, effects=effects, x=x, state=state, covariance=covariance)
-    return replace(hypothesis, fit=found)
-
-
-def _held(effect: Effect, found: Fit) -> Effect:
-    """An effect that has to stay where it was found."""
-    if not effect.parameters:
-        return effect
-    at = zip(effect.parameters, found.of(effect), strict=True)
-    unknown = tuple(replace(p, mean=float(v), sd=HELD) for p, v in at)
-    return replace(effect, parameters=unknown)

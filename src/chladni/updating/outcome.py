@@ -15,13 +15,14 @@ from ..model.assembly import Assembly
 from .adequacy import FitTest
 from .diagnosis import UNEXPLAINED, Diagnosis, tested, verdict
 from .held_out_evidence import HeldOutEvidence, held_out_evidence
-from .hypothesis_fit import HypothesisFit, UpdatingProblem, as_found, as_written
+from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .leaning import leaning, strained
 from .likelihood import Poles
 from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 from .ties import tied
+from .written_hypothesis import as_foretold, as_found, as_written
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
     if found is None or not found.physics:
         return Models(question.assembly, calibrated, calibrated)
     return Models(
-        question.assembly, calibrated, applied(question.assembly, diagnosis.written or found)
+        question.assembly, calibrated, applied(question.assembly, diagnosis.as_deck or found)
     )
 
 
@@ -176,6 +177,15 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     if gain > CONFLICT * due:
         return _unexplained(replace(refused, one_of=one_of), lead, gain, "what was fitted", but)
     return tested(refused, problem)
+
+
+def with_deck(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis with the numbers of the updated deck, where an effect of its own is named."""
+    found = diagnosis.found
+    if found is None or diagnosis.shared:
+        return diagnosis
+    mass = prepared.problem.mass_measurement
+    return replace(diagnosis, deck=as_foretold(found, mass, prepared.unseen))
 
 
 def carried(gain: float, heard: HeldOutEvidence, due: float, poles: bool = False) -> bool:

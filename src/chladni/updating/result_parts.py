@@ -182,7 +182,7 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
     The deck that is written has none of these to stand for and may need other values to respond
     alike: those that serve it are no estimates. Of several states the shared ones are both.
     """
-    deck = (diagnosis.written or diagnosis.found or diagnosis.plain).fit
+    deck = (diagnosis.as_deck or diagnosis.plain).fit
     whole = (diagnosis.found or diagnosis.null).fit
     changed = diagnosis.verdict != "nothing missing"
     out = []

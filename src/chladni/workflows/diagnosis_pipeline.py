@@ -43,6 +43,7 @@ from ..updating.outcome import (
     models,
     prudently_calibrated,
     real_poles,
+    with_deck,
 )
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
@@ -135,7 +136,8 @@ def explained(
 
 def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """The result of an explanation: the decks as they are written, and every number from them."""
-    case, asked, prepared, found = known.case, known.asked, known.prepared, known.found
+    case, asked, prepared = known.case, known.asked, known.prepared
+    found = with_deck(prepared, known.found)
     give_back_freed_memory()
     progress("the updated deck", 0.85)
     stages, lost = _updated(case, asked, prepared, found)
@@ -191,7 +193,7 @@ def _updated(
     final = calibrated
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, asked, nominal, stages.final)
-        final = _commented(final, found.written or found.found)
+        final = _commented(final, found.as_deck)
     made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
     return replace(made, curves=_curves(case, made)), lost
 
@@ -259,7 +261,7 @@ def _result(
     asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
 ) -> DiagnosisResult:
     """All numbers and words, from the decks as written."""
-    last, deck = found.found or found.null, found.written or found.found or found.plain
+    last, deck = found.found or found.null, found.as_deck or found.plain
     real = real_poles(prepared, last)
     every = (
         ("before", stages.nominal),

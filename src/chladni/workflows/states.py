@@ -14,10 +14,11 @@ from ..case import Case
 from ..case.recording_groups import of_state, states
 from ..progress import Progress, within
 from ..updating.diagnosis import Diagnosis
-from ..updating.hypothesis_fit import HypothesisFit, as_written
+from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import JointFit, joint_fit
 from ..updating.result import CalibratedParameter
 from ..updating.result_parts import shared_values
+from ..updating.written_hypothesis import as_written
 from .diagnosis_pipeline import Explained, explained, told
 from .diagnosis_result import DiagnosisResult, StateResult
 from .effects_by_state import by_state
@@ -78,8 +79,6 @@ def _lead(found: Diagnosis) -> HypothesisFit:
 
 def _as_deck(one: Explained) -> HypothesisFit:
     """The explanation as a deck can hold it, beside the learned error of the model."""
-    if one.found.written is not None:
-        return one.found.written
     return as_written(_lead(one.found), one.prepared.problem.mass_measurement)
 
 

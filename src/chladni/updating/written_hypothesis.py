@@ -1,0 +1,116 @@
+"""A hypothesis as a deck can hold it: no scatter, no joints that scatter, no error of the mesh."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects.calibrated_family import calibrated_family
+from ..effects.discretisation import MeshError
+from ..effects.effect import Effect
+from .hypothesis_fit import HypothesisFit
+from .leaning import is_strained
+from .likelihood import Responses
+from .map_fit import Fit, MassMeasurement, fit
+from .reduced_model import evaluate
+
+HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
+LEFT = 0.3  # decades: with what is left itself, 0.06, E of a flange went to 264 GPa for 210
+
+
+def as_written(
+    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
+) -> HypothesisFit:
+    """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
+
+    The ordinary parameters are fitted anew, for they were found beside a scatter that is not there
+    any more.  The learned error of the model stays in
+    the likelihood, else they would bend to make up for mesh and joints: on a coarse plate with a
+    concealed crack E went to 264 GPa for 210 without it, and to 212 with it.
+    """
+    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
+    kept = [e for e in hypothesis.fit.effects if e.writable]
+    start = np.concatenate([hypothesis.fit.of(e) for e in kept])
+    effects = [held.get(id(e), e) for e in kept]
+    model = hypothesis.model
+    found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
+    effect, *beside = held.values()
+    return HypothesisFit(effect, found, model, tuple(beside))
+
+
+def as_foretold(
+    hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None, unseen: np.ndarray
+) -> HypothesisFit:
+    """The hypothesis as a deck can hold it, so that the deck responds as the hypothesis does.
+
+    What it has beside the deck (mesh error, joints, folds, scatter) is known on all lines and at
+    all sensors, where they were held out too, for there it is foretold and not measured. The
+    ordinary parameters take up what they can of that, as far as their priors let them against a
+    spread of ``LEFT``. On a tailgate (tuning 561, sensor mass) the held-out Q of the deck fell from
+    0.108 to 0.091, no number going farther than 4 %. What changes no response, and natural
+    frequencies, are written as :func:`as_written` does.
+
+    Parameters
+    ----------
+    unseen : samples held out, in the shape of ``hypothesis.data.use``
+    """
+    data, found, model = hypothesis.data, hypothesis.fit, hypothesis.model
+    if not isinstance(data, Responses) or not hypothesis.physics:
+        return as_written(hypothesis, mass_measurement)
+    whole = data.exactly().using(data.use | unseen)
+    state = evaluate(model, found.effects, found.x, False)
+    target = replace(whole, values=whole.values * 10 ** whole.deviation(state))
+    kept, held, bare = _split(hypothesis)
+    x = np.concatenate([found.of(e) * (not isinstance(e, MeshError)) for e in kept])
+    target = replace(target, sigma_model=LEFT)
+    near = fit(model, bare, target, mass_measurement, x)
+    of_each = zip(kept, bare, strict=True)
+    own = [found.of(e) if isinstance(e, MeshError) else near.of(b) for e, b in of_each]
+    effects = tuple(held.get(id(e), e) for e in kept)
+    x = np.concatenate([np.zeros(0), *own])
+    near = replace(near, effects=effects, x=x, state=evaluate(model, effects, x, False), data=data)
+    effect, *beside = (held[id(e)] for e in hypothesis.effects)
+    return HypothesisFit(effect, near.kept(), model, tuple(beside))
+
+
+def _split(
+    hypothesis: HypothesisFit,
+) -> tuple[list[Effect], dict[int, Effect], list[Effect]]:
+    """What a deck keeps; what was named, held where it was; and all of it without mesh errors."""
+    kept = [e for e in hypothesis.fit.effects if e.writable]
+    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
+    bare = [_idle(e) if isinstance(e, MeshError) else held.get(id(e), e) for e in kept]
+    return kept, held, bare
+
+
+def _idle(mesh: MeshError) -> Effect:
+    """An error of the mesh that is none."""
+    none = tuple(replace(p, mean=0.0, sd=HELD) for p in mesh.parameters)
+    return replace(mesh, parameters=none)
+
+
+def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
+    """A hypothesis without effects as a deck can hold it, its numbers as they were found.
+
+    They were found beside all that is known to err, and the better for it: on a tailgate where
+    nothing was missing E of the inner panel ended 2 % nearer its value, t 2 % and E of a bracket
+    7 % than fitted anew without joints and scatter, which :func:`as_written` does.  Joints that
+    took more than joints scatter are numbers of the deck as well: a deck whose adhesive is six
+    times too soft stays 4 % off in frequency without.
+    """
+    fit = hypothesis.fit
+    every = [calibrated_family(e) if is_strained(e, fit.of(e)) else e for e in fit.effects]
+    inside = np.concatenate([np.full(len(e.parameters), e.writable) for e in every])
+    effects, x = tuple(e for e in every if e.writable), fit.x[inside]
+    state = evaluate(hypothesis.model, effects, x)
+    covariance = fit.covariance[np.ix_(inside, inside)]
+    found = replace(fit, effects=effects, x=x, state=state, covariance=covariance)
+    return replace(hypothesis, fit=found)
+
+
+def _held(effect: Effect, found: Fit) -> Effect:
+    """An effect that has to stay where it was found."""
+    if not effect.parameters:
+        return effect
+    at = zip(effect.parameters, found.of(effect), strict=True)
+    unknown = tuple(replace(p, mean=float(v), sd=HELD) for p, v in at)
+    return replace(effect, parameters=unknown)
