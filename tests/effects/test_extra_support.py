@@ -78,3 +78,12 @@ def test_a_place_is_known_as_well_as_the_fit_says(support):
     longer = support.located(np.zeros(5), sd * [1, 1, 2, 1, 1]).radius_m
     assert longer == pytest.approx(2 * radius)  # what one way is less known counts
     assert support.located(np.zeros(5), 1e-3 * sd).radius_m == support.patch.size
+    beyond = np.array([0.0, 0.0, 40.0, 0.0, 0.0])  # its deviation there is that of the prior
+    assert support.located(beyond, sd * [1, 1, 9, 1, 1]).radius_m == pytest.approx(radius)
+
+
+def test_at_the_edge_of_a_fold_what_leads_off_it_is_no_doubt(support):
+    """All grids that face as it does lie on a line: the other parameter stays at its prior."""
+    line = replace(support.patch, flat=support.patch.flat * [1.0, 0.0])
+    known = replace(support, patch=line).located(np.zeros(5), np.array([0.1, 0.8, 1.5, 0.1, 0.1]))
+    assert known.radius_m == pytest.approx(1.96 * WIDER * 0.8 * support.patch.size)

@@ -24,6 +24,7 @@ from .surroundings import ElementGrids, Surroundings
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
 FAR = 0.75  # of a patch's size: beyond it the interpolation begins anew where the fit went
+_FLAT = 1e-6  # of a patch's size: grids that reach no farther lie on a line
 STEP = 1e-4  # of the local mesh size, for the slope of the interpolation weights
 
 
@@ -148,12 +149,16 @@ class MovableAttachment(Effect):
         """The place, and the radius [m] in which it lies with 95 %, widened as intervals are.
 
         Of a place in a plane that is at most √5.99 times the larger of both deviations, along a
-        line 1.96 times the one; the mesh size where that is more.
+        line (of beams, or the edge of a fold) 1.96 times the one; the mesh size where that is more,
+        and where the fit went on beyond the last grid, where nothing moves the place any more.
         """
         assert self.patch is not None
-        ways, times = (2, np.sqrt(5.99)) if self.patch.plane[1].any() else (1, 1.96)
-        far = float(times * WIDER * sd[1 : 1 + ways].max())
-        return replace(self.location(x), radius_m=self.patch.size * max(far, 1.0))
+        at, size = self.patch.size * x[1:3], self.patch.size
+        moves = np.ptp(self.patch.flat, axis=0) > _FLAT * size
+        times = np.sqrt(5.99) if moves.all() else 1.96
+        known = moves & (self.patch.inside(at) == at)
+        far = float(times * WIDER * sd[1:3][known].max(initial=0.0))
+        return replace(self.location(x), radius_m=size * max(far, 1.0))
 
     def nearest(self, x: np.ndarray) -> int:
         """Id of the grid nearest to the place."""
