@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
 from chladni.effects.ordinary import ordinary, random_field
@@ -15,6 +16,7 @@ from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.errors import ModelError
 from chladni.fem.derivative import Slope
+from chladni.fem.modelled import modelled
 from chladni.updating import outcome
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
@@ -103,6 +105,28 @@ def test_what_was_held_out_does_not_enter_the_deck(learned, unseen):
     spoilt = replace(learned, fit=replace(learned.fit, data=replace(learned.data, values=values)))
     one, other = (as_foretold(h, None, unseen) for h in (learned, spoilt))
     np.testing.assert_allclose(one.fit.x, other.fit.x, atol=1e-5)
+
+
+def test_what_the_mesh_hides_is_made_up_for_and_still_known(learned, unseen, reduced):
+    """E takes up the error a deck cannot hold; the error itself stays as it was found."""
+    plain = modelled(reduced.structure.assembly, 2.5 * 200.0)
+    over = mesh_errors(plain, 200.0)[0]
+    E, effect = learned.fit.effects[0], learned.effect
+    effects, x = (E, over, effect), np.concatenate([[0.0], [4.0], learned.fit.of(effect)])
+    model = reduced.model_for(over, np.array([4.0]))
+    state = evaluate(model, effects, x, False)
+    own = replace(learned.fit, effects=effects, x=x, state=state, data=learned.data.over(model))
+    found = HypothesisFit(effect, own, model)
+    deck = as_foretold(found, None, unseen)
+    assert deck.fit.of(over) == pytest.approx([4.0])
+    assert abs(deck.fit.of(E)[0]) > 1e-3
+    whole, bare = found.data.use | unseen, np.array([1.0, 0.0, *np.ones(len(x) - 2)])
+
+    def written(values):
+        at = evaluate(model, effects, values * bare, False)
+        return off(replace(deck, fit=replace(deck.fit, state=at)), found, whole)
+
+    assert written(deck.fit.x) < 0.5 * written(x)
 
 
 def test_what_was_found_is_told_beside_what_the_written_deck_has(hypothesis):
