@@ -31,7 +31,7 @@ from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.rivals import _on_its_own_basis
-from chladni.updating.search_round import on_common_basis, search_round
+from chladni.updating.search_round import _of_the_same_lump, on_common_basis, search_round
 from chladni.updating.several import Rival, _begun_with, _More, _paying, _same, several
 from chladni.updating.several_judged import named_together
 from chladni.updating.written_hypothesis import as_written
@@ -159,6 +159,16 @@ def test_a_mass_that_no_candidate_was_is_found_where_another_lump_is(reduced, on
     assert best[0].name == "point-mass"
     assert np.linalg.norm(place[:2] - HERE) < 0.01
     assert m == pytest.approx(weight, rel=0.05)
+
+
+@pytest.mark.parametrize(("place", "begun"), [(HERE, 0), (THERE, 2)])
+def test_no_other_lump_is_begun_where_one_was_found(two, place, begun):
+    mass, x = PointMass.near(two.where, at(two.reduced, *HERE)), np.zeros(3)
+    held = two.holding([(mass, x)])
+    effect, start = PointMass.of_lump(held.where, np.append(place, 0.0), 0.05)
+    fit = SimpleNamespace(of=lambda e: start, effects=())
+    lead = SimpleNamespace(effect=effect, effects=(effect,), fit=fit)
+    assert len(_of_the_same_lump(held, [lead])) == begun
 
 
 def test_each_gains_what_the_others_lose_without_it(two, found):

@@ -41,15 +41,21 @@ def candidates(
     ----------
     most : so many of them alone, those that score best where they begin
     """
-    context, found = UpdatingContext(problem, null).ready(), [e for e, _ in problem.found]
-    free = {e.text for e in problem.base if e not in found}  # by the user: in every fit already
+    context = UpdatingContext(problem, null).ready()
     every = [
         c
         for proposed in side_by_side(lambda family: family.proposed(context), families())
         for c in proposed
-        if c.effect.text not in free and not repeats(problem, c.effect, c.start)
+        if not already_there(problem, c.effect, c.start)
     ]
     return every if most is None else _leading(context, every, most)
+
+
+def already_there(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:
+    """Whether an effect at x is in every fit already: freed by the user, or found before."""
+    found = [e for e, _ in problem.found]
+    free = {e.text for e in problem.base if e not in found}
+    return effect.text in free or repeats(problem, effect, x)
 
 
 def repeats(problem: UpdatingProblem, effect: Effect, x: np.ndarray) -> bool:

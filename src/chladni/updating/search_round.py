@@ -16,7 +16,7 @@ from ..effects.search_context import Candidate
 from ..errors import ModelError
 from ..side_by_side import side_by_side
 from ..sparse.freed_memory import give_back_freed_memory
-from .candidates import UpdatingContext
+from .candidates import UpdatingContext, already_there
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
@@ -172,7 +172,7 @@ def _of_the_same_lump(
     base, out = taken(problem, lead, ("ordinary", "nuisance")), list[HypothesisFit]()
     for family in families():
         begun = family.effect.of_lump(problem.where, *lump)
-        if begun is not None:
+        if begun is not None and not already_there(problem, *begun):
             with suppress(ModelError):
                 out.append(problem.fitted_with(*begun, base))
     return out
