@@ -203,8 +203,7 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
     )
     found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
     problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
-    unseen = np.zeros_like(hypothesis.data.use)
-    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=unseen), found)
+    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
     assert judged.verdict == called
     assert (judged.written is not None) == (called == NAMED)
     assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
@@ -220,6 +219,14 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
         assert outcome.AGAINST not in judged.adequacy.what
     open_ = called == REST and not against  # it may be the leader, with more beside it
     assert judged.one_of == ((hypothesis.effect.name, outcome.BEYOND) if open_ else ())
+
+
+def unnamed(monkeypatch, null, lead, heard):
+    """A case and its diagnosis: a leader that what was fitted does not name, and what is heard."""
+    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
+    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
+    found = Diagnosis(null, null, null, (lead,), "nothing missing", ("of calibration",))
+    return SimpleNamespace(problem=None, unseen=None, too_little=""), found
 
 
 @pytest.mark.parametrize(
@@ -239,10 +246,7 @@ def test_all_poles_together_may_bear_a_name(monkeypatch, reduced, gain, news, na
     heard = HeldOutEvidence(news * due / DUE)
     null = replace(null, fit=replace(worse, neg2_log_evidence=(
         fitted.neg2_log_evidence + gain * due / DUE)))  # fmt: skip
-    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
-    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
-    found = Diagnosis(null, null, null, (lead,), "nothing missing", ("of calibration",))
-    asked = SimpleNamespace(problem=None, unseen=None, too_little="")
+    asked, found = unnamed(monkeypatch, null, lead, heard)
     got = outcome.borne_by_all_data(asked, found)
     assert (got.verdict == "missing physics") == named
     asked = SimpleNamespace(problem=None, unseen=None, too_little="three modes are the least")
@@ -263,10 +267,7 @@ def test_all_responses_together_may_bear_a_name(monkeypatch, hypothesis, gain, h
     """Those held out are data as those fitted are; the bound on false alarms is that of all."""
     worse = replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + gain * DUE)
     null = HypothesisFit(Effect(), worse, hypothesis.model)
-    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
-    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
-    found = Diagnosis(null, null, null, (hypothesis,), "nothing missing", ("of calibration",))
-    asked = SimpleNamespace(problem=None, unseen=None, too_little="")
+    asked, found = unnamed(monkeypatch, null, hypothesis, heard)
     got = outcome.borne_by_all_data(asked, found)
     assert (got.verdict == "missing physics") == named
     assert ("together more than" in got.notes[-1]) == named

@@ -23,15 +23,17 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
     """
     if made.axes is not None:
         return []
-    normal, other, known = surface_normals(made, found), list[str](), set(tabled)
-    for label, given, n in zip(found.labels, found.directions, normal, strict=True):
-        _, colon, way = label.rpartition(":")
-        if label not in known or not colon or not _WAY.fullmatch(way.strip()):
-            continue
-        own = direction(label, label)
-        along = float(np.abs(n @ given)) if own is None else float(own @ given)
-        if along < _SAME and (own is not None or n.any()):
-            other.append(label)
+    known = set(tabled)
+    own = {
+        k: direction(label, label)
+        for k, label in enumerate(found.labels)
+        if label in known and ":" in label and _WAY.fullmatch(label.rpartition(":")[2].strip())
+    }
+    across = any(way is None for way in own.values())
+    normal = surface_normals(made, found) if across else np.zeros_like(found.directions)
+    other = [
+        found.labels[k] for k, way in own.items() if _apart(way, found.directions[k], normal[k])
+    ]
     if not other:
         return []
     is_ = "says" if len(other) == 1 else "say"
@@ -39,6 +41,13 @@ def ways_said(made: Assembly, found: MeasuredDofs, tabled: Iterable[str]) -> lis
         f"{named(other)} {is_} another direction than the table of sensors: the table counts; "
         "mend it, or the label"
     ]
+
+
+def _apart(own: np.ndarray | None, given: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether a label says another direction; None is the normal, either side of it."""
+    if own is None:
+        return bool(normal.any() and np.abs(normal @ given) < _SAME)
+    return bool(own @ given < _SAME)
 
 
 def surface_normals(made: Assembly, dofs: MeasuredDofs) -> np.ndarray:

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..ema.odds import evidence_in_words
@@ -22,7 +21,7 @@ from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
 from .ties import tied
-from .written_hypothesis import as_foretold, as_found, as_written
+from .written_hypothesis import as_foretold, as_found, as_written, of_mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,8 +277,7 @@ def _deck_stays(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
 def _mesh_idle(effects: Sequence[Effect], x: np.ndarray) -> np.ndarray:
     """The same parameters without what the mesh hides: no deck has it in it."""
-    idle = [np.full(len(e.parameters), isinstance(e, MeshError)) for e in effects]
-    return np.where(np.concatenate([np.zeros(0, bool), *idle]), 0.0, x)
+    return np.where(of_mesh(effects), 0.0, x)
 
 
 def said(heard: HeldOutEvidence) -> str:

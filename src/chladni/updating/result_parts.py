@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.estimate import Estimate
+from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
@@ -38,15 +38,18 @@ def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
 
 
 def _named(hypothesis: HypothesisFit, effect: Effect, gain: float) -> NamedEffect:
-    x = hypothesis.fit.of(effect)
     return NamedEffect(
         effect.name,
         effect.claim,
         -hypothesis.neg2_log_evidence / 2,
-        effect.located(x, hypothesis.fit.sd(effect)),
+        _located(hypothesis, effect),
         _reported(hypothesis, effect),
         gain,
     )
+
+
+def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
+    return effect.located(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
 
 
 def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:
@@ -119,9 +122,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
             hypothesis.effect.name,
             -hypothesis.neg2_log_evidence / 2,
             why_not(diagnosis, hypothesis, best),
-            hypothesis.effect.located(
-                hypothesis.fit.of(hypothesis.effect), hypothesis.fit.sd(hypothesis.effect)
-            ),
+            _located(hypothesis, hypothesis.effect),
         )
         for hypothesis in diagnosis.hypotheses
         if hypothesis is not found and hypothesis.effect.name not in named

@@ -1,5 +1,6 @@
 """A hypothesis as a deck can hold it: no scatter, no joints that scatter, no error of the mesh."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,11 @@ from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
 from .leaning import is_strained
 from .likelihood import Responses
-from .map_fit import Fit, MassMeasurement, fit
+from .map_fit import MassMeasurement, fit
 from .reduced_model import evaluate
 
 HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
-LEFT = 0.1  # decades; half and a third of it bring a hundredth more and numbers twice as far off
+LEFT = 0.1  # decades that a deck may be off: with less, numbers go to their priors' ends for little
 
 
 def as_written(
@@ -23,17 +24,13 @@ def as_written(
     """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
 
     The ordinary parameters are fitted anew, for they were found beside a scatter that is not there
-    any more.  The learned error of the model stays in
-    the likelihood, else they would bend to make up for mesh and joints: on a coarse plate with a
-    concealed crack E went to 264 GPa for 210 without it, and to 212 with it.
+    any more.  The learned error of the model stays in the likelihood, else they would bend to make
+    up for mesh and joints: on a coarse plate with a concealed crack E went to 264 GPa for 210
+    without it, and to 212 with it.
     """
-    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
-    kept = [e for e in hypothesis.fit.effects if e.writable]
-    start = np.concatenate([hypothesis.fit.of(e) for e in kept])
-    effects = [held.get(id(e), e) for e in kept]
+    effects, start, (effect, *beside) = _kept(hypothesis)
     model = hypothesis.model
     found = fit(model, effects, hypothesis.data, mass_measurement, start).kept()
-    effect, *beside = held.values()
     return HypothesisFit(effect, found, model, tuple(beside))
 
 
@@ -58,34 +55,31 @@ def as_foretold(
         return as_written(hypothesis, mass_measurement)
     whole = data.exactly().using(data.use | unseen)
     state = evaluate(model, found.effects, found.x, False)
-    target = replace(whole, values=whole.values * 10 ** whole.deviation(state))
-    kept, held, bare = _split(hypothesis)
-    x = np.concatenate([found.of(e) * (not isinstance(e, MeshError)) for e in kept])
-    target = replace(target, sigma_model=LEFT)
-    near = fit(model, bare, target, mass_measurement, x)
-    of_each = zip(kept, bare, strict=True)
-    own = [found.of(e) if isinstance(e, MeshError) else near.of(b) for e, b in of_each]
-    effects = tuple(held.get(id(e), e) for e in kept)
-    x = np.concatenate([np.zeros(0), *own])
-    near = replace(near, effects=effects, x=x, state=evaluate(model, effects, x, False), data=data)
-    effect, *beside = (held[id(e)] for e in hypothesis.effects)
+    foretold = whole.values * 10 ** whole.deviation(state)
+    target = replace(whole, values=foretold, sigma_model=LEFT)
+    effects, x, (effect, *beside) = _kept(hypothesis)
+    hidden = of_mesh(effects)
+    bare = [_held(e, 0 * found.of(e)) if isinstance(e, MeshError) else e for e in effects]
+    near = fit(model, bare, target, mass_measurement, np.where(hidden, 0.0, x))
+    x = np.where(hidden, x, near.x)
+    state = evaluate(model, effects, x, False)
+    near = replace(near, effects=tuple(effects), x=x, state=state, data=data)
     return HypothesisFit(effect, near.kept(), model, tuple(beside))
 
 
-def _split(
-    hypothesis: HypothesisFit,
-) -> tuple[list[Effect], dict[int, Effect], list[Effect]]:
-    """What a deck keeps; what was named, held where it was; and all of it without mesh errors."""
-    kept = [e for e in hypothesis.fit.effects if e.writable]
-    held = {id(e): _held(e, hypothesis.fit) for e in hypothesis.effects}
-    bare = [_idle(e) if isinstance(e, MeshError) else held.get(id(e), e) for e in kept]
-    return kept, held, bare
+def of_mesh(effects: Sequence[Effect]) -> np.ndarray:
+    """Which of their parameters are of errors of the mesh (n_p,) bool: no deck has these in it."""
+    each = [np.full(len(e.parameters), isinstance(e, MeshError)) for e in effects]
+    return np.concatenate([np.zeros(0, bool), *each])
 
 
-def _idle(mesh: MeshError) -> Effect:
-    """An error of the mesh that is none."""
-    none = tuple(replace(p, mean=0.0, sd=HELD) for p in mesh.parameters)
-    return replace(mesh, parameters=none)
+def _kept(hypothesis: HypothesisFit) -> tuple[list[Effect], np.ndarray, tuple[Effect, ...]]:
+    """What a deck keeps, where it was found; and what was named, which has to stay there."""
+    found = hypothesis.fit
+    held = {id(e): _held(e, found.of(e)) if e.parameters else e for e in hypothesis.effects}
+    kept = [e for e in found.effects if e.writable]
+    x = np.concatenate([np.zeros(0), *(found.of(e) for e in kept)])
+    return [held.get(id(e), e) for e in kept], x, tuple(held.values())
 
 
 def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
@@ -107,10 +101,7 @@ def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
     return replace(hypothesis, fit=found)
 
 
-def _held(effect: Effect, found: Fit) -> Effect:
-    """An effect that has to stay where it was found."""
-    if not effect.parameters:
-        return effect
-    at = zip(effect.parameters, found.of(effect), strict=True)
-    unknown = tuple(replace(p, mean=float(v), sd=HELD) for p, v in at)
-    return replace(effect, parameters=unknown)
+def _held(effect: Effect, x: np.ndarray) -> Effect:
+    """An effect that has to stay at x."""
+    at = zip(effect.parameters, x, strict=True)
+    return replace(effect, parameters=tuple(replace(p, mean=float(v), sd=HELD) for p, v in at))

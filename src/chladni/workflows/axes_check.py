@@ -1,6 +1,5 @@
 """Sensors declared along one axis that measured along another: X for Z."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -41,7 +40,8 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
         return
     ways = case.outputs.directions
     declared, _, _ = _fit(case, found, model, ways)
-    others = [(f"along {_turned(ways, o)}", ways[:, o]) for o in list(permutations(range(3)))[1:]]
+    turned = [ways[:, order] for order in list(permutations(range(3)))[1:]]
+    others = [(f"along {_main(way)}", way) for way in turned]
     others.append(("across the surface", _across(case, ways)))
     fits = [(_fit(case, found, model, way), said) for said, way in others]
     (total, pairs, mean), said = max(fits, key=lambda one: one[0][0])
@@ -58,11 +58,6 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
 def _main(ways: np.ndarray) -> str:
     """The axis that most of some directions (k, 3) lie nearest to."""
     return "XYZ"[int(np.bincount(np.abs(ways).argmax(axis=1), minlength=3).argmax())]
-
-
-def _turned(ways: np.ndarray, order: Sequence[int]) -> str:
-    """The axis that most of them point along once component k is taken from order[k]."""
-    return _main(ways[:, order])
 
 
 def _across(case: Case, ways: np.ndarray) -> np.ndarray:
