@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.modal_sum import modal_sum
 from ..dynamics.reduction import attachments
 from ..effects.joints import Connection, fasteners
 from ..geometry.sampling import farthest_point_sample
@@ -101,10 +102,10 @@ def loosened_receptance(
     follow = d - still + beyond[:, None] * still**2
     b = reduced.model.rows(one.joint.rows, keep=False) @ state.phi
     G = data.receptance(state, phi_o, phi_i, d)
-    G_ob = np.einsum("or,fr,br->fob", phi_o, d, b, optimize=True)
-    G_bi = np.einsum("br,fr,ir->fbi", b, d, phi_i, optimize=True)
+    G_ob = modal_sum(phi_o, d, b)
+    G_bi = modal_sum(b, d, phi_i)
     R = one.R + beyond[:, None, None] * one.N
-    R = R - np.einsum("br,fr,cr->fbc", b, follow, b, optimize=True)
+    R = R - modal_sum(b, follow, b)
     return np.array(
         [G + (1 - f) * (G_ob @ np.linalg.solve(f * np.eye(len(b)) + (1 - f) * R, G_bi))
          for f in left]

@@ -12,6 +12,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
+from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
 from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
@@ -89,7 +90,7 @@ class Responses:
         self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray
     ) -> np.ndarray:
         """Of modes as :meth:`modal` gives them, made complex by what dissipates."""
-        H = np.einsum("or,fr,ir->foi", phi_o, d, phi_i, optimize=True)
+        H = modal_sum(phi_o, d, phi_i)
         lost = state.dissipated
         return H if lost is None else H + lost.seen(self.s, d, phi_o, phi_i)
 
@@ -208,9 +209,9 @@ class Responses:
                 out[p] += seen
         for p, moved in state.dmoved.items():
             moved_o, moved_i = self._of_test(moved)
-            out[p] += np.einsum("or,fr,ir->foi", moved_o, d, phi_i, optimize=True)
+            out[p] += modal_sum(moved_o, d, phi_i)
             if state.drive is None:
-                out[p] += np.einsum("or,fr,ir->foi", phi_o, d, moved_i, optimize=True)
+                out[p] += modal_sum(phi_o, d, moved_i)
         out /= H * LN10
         if state.doffset is not None:
             out += state.doffset.T[:, None, :, None]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..dynamics.modal_sum import modal_sum
 from ..effects.effect import Effect, FieldChange, Parameter
 from ..effects.surroundings import ElementGrids
 from .likelihood import LN10, Data, Responses
@@ -147,7 +148,7 @@ def reanalysis(
     """
     phi_o, phi_i, d = data.modal(base.state)
     phi_b = model.rows(places.rows) @ base.state.phi
-    G_bi = np.einsum("br,fr,ir->bfi", phi_b, d, phi_i, optimize=True)
+    G_bi = modal_sum(phi_b, d, phi_i).transpose(1, 0, 2)
     if massive and model.base is not None:
         carried = model.base.motion.carried(places.rows)
         G_bi = G_bi + carried[:, None] / (data.s**2)[:, None]
@@ -155,7 +156,7 @@ def reanalysis(
         base,
         data,
         data.receptance(base.state, phi_o, phi_i, d),
-        np.einsum("or,fr,br->bfo", phi_o, d, phi_b, optimize=True),
+        modal_sum(phi_o, d, phi_b).transpose(2, 0, 1),
         G_bi,
         (phi_b**2) @ d.T + residual_flexibility[:, None],
     )

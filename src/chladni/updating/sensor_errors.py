@@ -18,6 +18,7 @@ from typing import Self
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.modal_sum import modal_sum
 from ..ema.setup import SensorAccuracy
 from ..fem.assemble import Structure
 from ..fem.measured_dofs import MeasuredDofs
@@ -146,7 +147,7 @@ def _of_outputs(
     _, phi_i, d = data.modal(state)
     out = [errors.gain / scale]
     for modal, carried in zip(errors.modal, errors.carried, strict=True):
-        G = np.einsum("or,fr,ir->foi", modal @ state.phi, d, phi_i, optimize=True)
+        G = modal_sum(modal @ state.phi, d, phi_i)
         out.append((data.s[:, None, None] ** data.power * G + carried) / (H * scale))
     return np.stack(out)
 
