@@ -182,6 +182,17 @@ def test_sensors_declared_along_another_axis_are_told(along_x, tmp_path, command
     assert (tmp_path / "out").exists() == (command == "check")
 
 
+def test_only_axes_that_differ_are_spoken_of():
+    """Half along X that are along Z, half along Y as declared."""
+    said = import_module("chladni.workflows.axes_check")._where_declared
+    ways = np.eye(3)[[0, 1, 0, 1]]
+    assert said(ways, ways[:, [2, 1, 0]]) == "along Z where X is declared"
+    assert (
+        said(ways, -ways[:, [1, 0, 2]])
+        == "along Y where X is declared, along X where Y is declared"
+    )
+
+
 def test_sensors_declared_as_they_are_pass(along_x, tmp_path):
     place = tmp_path / "case"
     shutil.copytree(along_x, place)

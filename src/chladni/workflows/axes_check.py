@@ -41,23 +41,30 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     ways = case.outputs.directions
     declared, _, _ = _fit(case, found, model, ways)
     turned = [ways[:, order] for order in list(permutations(range(3)))[1:]]
-    others = [(f"along {_main(way)}", way) for way in turned]
+    others = [(_where_declared(ways, way), way) for way in turned]
     others.append(("across the surface", _across(case, ways)))
     fits = [(_fit(case, found, model, way), said) for said, way in others]
     (total, pairs, mean), said = max(fits, key=lambda one: one[0][0])
     beaten = total >= BETTER * declared or (mean > SURE and total * MOST > declared)
     if pairs < SHARE * found.order or mean < ALIKE or not beaten:
         return
+    declared_along = " and ".join(sorted(set(_axes(ways))))
     raise FileError(
-        f"{case.path}: the sensors are declared along {_main(ways)}, but {pairs} of {found.order} "
-        f"modes have the model's shapes {said} (mean MAC {mean:.2f}): mend the directions of "
-        "sensors.csv, or of the labels"
+        f"{case.path}: the sensors are declared along {declared_along}, but {pairs} of "
+        f"{found.order} modes have the model's shapes {said} (mean MAC {mean:.2f}): mend the "
+        "directions of sensors.csv, or of the labels"
     )
 
 
-def _main(ways: np.ndarray) -> str:
-    """The axis that most of some directions (k, 3) lie nearest to."""
-    return "XYZ"[int(np.bincount(np.abs(ways).argmax(axis=1), minlength=3).argmax())]
+def _axes(ways: np.ndarray) -> list[str]:
+    """The axis that each of some directions (k, 3) lies nearest to."""
+    return ["XYZ"[k] for k in np.abs(ways).argmax(axis=1)]
+
+
+def _where_declared(ways: np.ndarray, others: np.ndarray) -> str:
+    """Which axes stand for which, of those that differ."""
+    differ = sorted({(a, b) for a, b in zip(_axes(ways), _axes(others), strict=True) if a != b})
+    return ", ".join(f"along {other} where {said} is declared" for said, other in differ)
 
 
 def _across(case: Case, ways: np.ndarray) -> np.ndarray:
