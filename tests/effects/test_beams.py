@@ -23,6 +23,7 @@ from chladni.model.assembly import Beams
 from chladni.model.free_parameter import FreeParameter
 from chladni.model.properties import BeamSection, Part
 from chladni.updating.accuracy import products
+from chladni.updating.matrix_stack import weighted
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.forms import FORMS
@@ -198,8 +199,8 @@ def test_a_stiffened_plate_frees_both_and_its_sheet_alone_is_patched():
     assert (reduced.grids.line < 0).all()  # the tube's grids are the sheet's
     system = reduced.structure.system
     split = reduced.model.with_components()
-    K = sum(A.weighted(np.ones((1, len(groups))))[0] for A in split.linear.values())
-    K = K + sum(A.weighted(np.ones((1, len(groups))))[0] for A in split.cubic.values())
+    K = sum(weighted(A, np.ones((1, len(groups))))[0] for A in split.linear.values())
+    K = K + sum(weighted(A, np.ones((1, len(groups))))[0] for A in split.cubic.values())
     Phi = reduced.model.basis
     due = Phi.T @ (system.K.real @ Phi) - reduced.model.K0
     assert_allclose(K, due, atol=1e-8 * abs(due).max())

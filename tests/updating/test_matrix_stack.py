@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from chladni.updating.matrix_stack import Bordered, Whole
+from chladni.updating.matrix_stack import Bordered, Whole, weighted
 
 G, R, K = 5, 4, 2
 
@@ -22,8 +22,21 @@ def test_bordered_sums_are_those_of_the_whole():
     weights = rng.normal(size=(3, G))
     expected = np.einsum("pg,gij->pij", weights, whole)
     assert twice.shape == (G, R + 2 * K)
-    assert_allclose(twice.weighted(weights), expected, atol=1e-12)
-    assert_allclose(Whole(whole).weighted(weights), expected, atol=1e-12)
+    assert_allclose(weighted(twice, weights), expected, atol=1e-12)
+    assert_allclose(weighted(Whole(whole), weights), expected, atol=1e-12)
+
+
+def test_some_groups_add_to_what_is_there():
+    """Each target in place, over a stretch of groups, the others left out."""
+    rng = np.random.default_rng(4)
+    whole = symmetric(rng, R + K)
+    stack = Bordered(Whole(whole[:, :R, :R]), whole[:, :R, R:], whole[:, R:, R:])
+    weights, held = rng.normal(size=(2, 2)), rng.normal(size=(3, R + K, R + K))
+    targets = held.copy()
+    stack.add_to([targets[2], targets[0]], weights, slice(1, 3))
+    assert_allclose(targets[2] - held[2], np.tensordot(weights[0], whole[1:3], 1), atol=1e-12)
+    assert_allclose(targets[0] - held[0], np.tensordot(weights[1], whole[1:3], 1), atol=1e-12)
+    assert_allclose(targets[1], held[1])
 
 
 def test_what_is_common_is_held_once():

@@ -4,10 +4,13 @@ Every hypothesis has a basis of its own: the common one and a few vectors more. 
 the border is its own; what they have in common is held once, however many hypotheses there are.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
+EVERY = slice(None)
 
 
 class MatrixStack(Protocol):
@@ -17,8 +20,17 @@ class MatrixStack(Protocol):
     def shape(self) -> tuple[int, int]:
         """(g, r)."""
 
-    def weighted(self, weights: np.ndarray) -> np.ndarray:
-        """Σ_g w_g A_g of each row of weights (p, g) -> (p, r, r)."""
+    def add_to(
+        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
+    ) -> None:
+        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r), weights (p, n) of it."""
+
+
+def weighted(stack: MatrixStack, weights: np.ndarray) -> np.ndarray:
+    """Σ_g w_g A_g of each row of weights (p, g) -> (p, r, r)."""
+    out = np.zeros((len(weights), stack.shape[1], stack.shape[1]))
+    stack.add_to(tuple(out), weights)
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +44,18 @@ class Whole:
         """(g, r)."""
         return self.values.shape[0], self.values.shape[1]
 
-    def weighted(self, weights: np.ndarray) -> np.ndarray:
-        """Σ_g w_g A_g (p, r, r)."""
-        g, r = self.shape
-        return np.asarray(weights @ self.values.reshape(g, r * r)).reshape(-1, r, r)
+    def add_to(
+        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
+    ) -> None:
+        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r)."""
+        for target, A in zip(targets, _summed(weights, self.values[among]), strict=True):
+            target += A
+
+
+def _summed(weights: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Σ_g w_pg A_g of weights (p, g) and matrices (g, m, n): (p, m, n)."""
+    g, m, n = values.shape
+    return np.asarray(weights @ values.reshape(g, m * n)).reshape(-1, m, n)
 
 
 def bordered(inner: MatrixStack, border: np.ndarray) -> "Bordered":
@@ -66,12 +86,14 @@ class Bordered:
         g, r, k = self.side.shape
         return g, r + k
 
-    def weighted(self, weights: np.ndarray) -> np.ndarray:
-        """Σ_g w_g A_g (p, r + k, r + k)."""
-        g, r, k = self.side.shape
-        out = np.empty((len(weights), r + k, r + k))
-        out[:, :r, :r] = self.inner.weighted(weights)
-        out[:, :r, r:] = (weights @ self.side.reshape(g, r * k)).reshape(-1, r, k)
-        out[:, r:, :r] = out[:, :r, r:].transpose(0, 2, 1)
-        out[:, r:, r:] = (weights @ self.corner.reshape(g, k * k)).reshape(-1, k, k)
-        return out
+    def add_to(
+        self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
+    ) -> None:
+        """Add Σ_g w_g A_g over the groups ``among`` to each target (r + k, r + k)."""
+        r = self.side.shape[1]
+        self.inner.add_to([target[:r, :r] for target in targets], weights, among)
+        sides, corners = _summed(weights, self.side[among]), _summed(weights, self.corner[among])
+        for target, side, corner in zip(targets, sides, corners, strict=True):
+            target[:r, r:] += side
+            target[r:, :r] += side.T
+            target[r:, r:] += corner

@@ -376,14 +376,20 @@ def _add(
     """Add Σ_g w_g A_g to A, and its slopes to those of the parameters that have any."""
     if not len(w):
         return
-    active = np.zeros(0, int)
-    if change is not None:
-        active = np.flatnonzero(np.abs(change).max(axis=0) > 0)
-        w = np.vstack([w, change[:, active].T])
-    every = stack.weighted(np.atleast_2d(w))
-    A += every[0]
-    for p, slope in zip(active, every[1:], strict=True):  # in place, a matrix at a time
-        dA[p] += slope
+    stack.add_to([A], w[None])
+    if change is None:
+        return
+    for among, parameters in _felt_alike(change):
+        stack.add_to([dA[p] for p in parameters], change[among, parameters].T, among)
+
+
+def _felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
+    """Groups, one after another, that the same parameters move (g, n_p), and these."""
+    felt = change != 0
+    ends = np.stack([felt.argmax(axis=0), len(felt) - felt[::-1].argmax(axis=0)], axis=1)
+    for first, stop in np.unique(ends[felt.any(axis=0)], axis=0):
+        alike = felt.any(axis=0) & (ends == (first, stop)).all(axis=1)
+        yield slice(first, stop), list(np.flatnonzero(alike))
 
 
 def _weight(
