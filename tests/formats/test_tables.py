@@ -97,14 +97,37 @@ def test_sensors_of_every_kind(tmp_path: Path) -> None:
 HEAD = "frequency_hz,output,input,real,imag\n"
 
 
+@pytest.mark.parametrize(("phase", "in_a_turn"), [("phase_deg", 360), ("phase_rad", 2 * np.pi)])
+def test_magnitude_and_phase_are_real_and_imaginary_part(
+    tmp_path: Path, phase: str, in_a_turn: float
+) -> None:
+    H = np.array([2.0 - 3j, -1e-3j, -4.0])
+    turns = np.angle(H) / (2 * np.pi) + 1  # a phase may have been unwrapped
+    rows = zip((1, 2, 3), np.abs(H).tolist(), (turns * in_a_turn).tolist(), strict=True)
+    (tmp_path / "a.csv").write_text(
+        f"{phase},frequency_hz,magnitude,output,input\n"
+        + "".join(f"{angle},{f},{size},1:+Z,2:+Z\n" for f, size, angle in rows)
+    )
+    (read,) = read_recordings(tmp_path / "a.csv", "mobility")
+    assert read.frf is not None
+    np.testing.assert_allclose(read.frf.values.ravel(), H, rtol=1e-12, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("", "empty"),
         (HEAD, "no rows"),
-        ("frequency_hz,magnitude\n1,2\n", "line 1: neither FRFs .* nor poles .*; there are freq"),
+        ("frequency_hz,level\n1,2\n", "line 1: neither FRFs .* nor poles .*; there are freq"),
+        ("frequency_hz,magnitude\n1,2\n", "line 1: no column output, input, phase_deg; there are"),
+        (HEAD.replace("real", "magnitude"), "line 1: no column phase_deg; there are"),
+        (HEAD.replace("real,imag", "magnitude,phase_rad,phase_deg"), "column 'phase_rad'; known"),
         ("frequency_hz,output,real,imag\n1,1:+Z,1,1\n", "no column input"),
         ("frequency_hz,output,input,real,imag,phase\n", "unknown column 'phase'; known are"),
+        (
+            "frequency_hz,output,input,magnitude,phase_rad\n1,1:+Z,1:+Z,-9,1\n",
+            "line 2: a magnitude of -9 is none; is it in decibels",
+        ),
         (HEAD + "1,1:+Z,1:+Z,1\n", "line 2: 4 cells, the header has 5"),
         (HEAD + "1,1:+Z,1:+Z,1,1\n2,1:+Z,1:+Z,nan,1\n", "line 3: real is 'nan'"),
         (HEAD + "1,1:+Z,1:+Z,1,one\n", "line 2: imag is 'one'"),

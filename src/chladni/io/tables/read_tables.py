@@ -22,7 +22,10 @@ from .csv_table import CsvTable, beside_it, read_table
 
 _UNIVERSAL = (".uff", ".unv", ".ufb", ".uf", ".uff58", ".bunv")
 ENDINGS = (".npz", ".csv", ".wav", ".mat", *_UNIVERSAL)
-_FRF = ("frequency_hz", "output", "input", "real", "imag")
+_CHANNEL = ("frequency_hz", "output", "input")
+_CARTESIAN = ("real", "imag")
+_PHASE = {"phase_deg": np.pi / 180, "phase_rad": 1.0}  # radians each
+_FRF = (*_CHANNEL, *_CARTESIAN)
 _FRF_OPTIONAL = ("coherence", "variance", "level", "article")
 _POLES = ("mode", "frequency_hz")
 _POLES_OPTIONAL = ("frequency_sd_hz", "damping", "state")
@@ -89,28 +92,52 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
     """FRFs (one recording per article and level) or poles, told apart by the header."""
     path = Path(path)
     head = _first_line(path) - {""} if path.is_file() else set()
-    if head and head.isdisjoint({"real", "imag", "output", "input"}):
+    if head and head.isdisjoint({*_CARTESIAN, "output", "input", "magnitude"}):
         if "mode" not in head:
             raise FileError(
-                f"{path.name}, line 1: neither FRFs (columns {', '.join(_FRF)}) nor poles (columns "
-                f"mode, frequency_hz); there are {', '.join(sorted(head))}"
+                f"{path.name}, line 1: neither FRFs (columns {', '.join(_FRF)}; or magnitude and "
+                f"phase_deg or phase_rad for the last two) nor poles (columns mode, frequency_hz); "
+                f"there are {', '.join(sorted(head))}"
             )
         return (Recording(name=path.name, poles=read_poles(path)),)
-    table = read_table(path, _FRF, _FRF_OPTIONAL)
+    parts = _parts(head)
+    table = read_table(path, (*_CHANNEL, *parts), _FRF_OPTIONAL)
     if quantity is None:
         raise FileError(f"{path.name} does not say its quantity: one of {_quantities()}")
-    numbers = {k: table.numbers(k) for k in (*_FRF, *_FRF_OPTIONAL) if k in table and k in _NUMERIC}
+    numbers = {k: table.numbers(k) for k in ("frequency_hz", *_NUMERIC) if k in table}
+    values = _responses(table, parts)
     article = table.columns.get("article", [""] * len(table.line))
     level = numbers.get("level", np.full(len(table.line), np.nan))
     groups: dict[tuple[str, float], list[int]] = {}
     for k, key in enumerate(zip(article, np.nan_to_num(level, nan=-1.0).tolist(), strict=True)):
         groups.setdefault(key, []).append(k)
     return tuple(
-        _recording(table, numbers, np.array(rows), key, quantity) for key, rows in groups.items()
+        _recording(table, values, numbers, np.array(rows), key, quantity)
+        for key, rows in groups.items()
     )
 
 
-_NUMERIC = {"frequency_hz", "real", "imag", "coherence", "variance", "level"}
+_NUMERIC = ("coherence", "variance", "level")
+
+
+def _parts(head: set[str]) -> tuple[str, str]:
+    """The two columns that hold a response: its parts, or its magnitude and phase."""
+    if "magnitude" not in head:
+        return _CARTESIAN
+    return "magnitude", next((k for k in _PHASE if k in head), "phase_deg")
+
+
+def _responses(table: CsvTable, parts: tuple[str, str]) -> np.ndarray:
+    """Complex responses of every row (n,)."""
+    one, other = (table.numbers(k) for k in parts)
+    if parts == _CARTESIAN:
+        return one + 1j * other
+    for k in np.flatnonzero(one < 0):
+        raise FileError(
+            f"{table.path.name}, line {table.line[k]}: a magnitude of {one[k]:g} is none; is it in "
+            "decibels?"
+        )
+    return one * np.exp(1j * _PHASE[parts[1]] * other)
 
 
 def _quantities() -> str:
@@ -124,6 +151,7 @@ def _first_line(path: Path) -> set[str]:
 
 def _recording(
     table: CsvTable,
+    values: np.ndarray,
     numbers: dict[str, np.ndarray],
     rows: np.ndarray,
     key: tuple[str, float],
@@ -147,8 +175,7 @@ def _recording(
         return cube
 
     extra = {n: array(numbers[n]) for n in ("coherence", "variance") if n in numbers}
-    values = array(numbers["real"] + 1j * numbers["imag"])
-    frf = _frf(name, values, frequency, outputs, inputs, quantity, **extra)
+    frf = _frf(name, array(values), frequency, outputs, inputs, quantity, **extra)
     return Recording(name=name, frf=frf, level=level if level >= 0 else None, article=article)
 
 
