@@ -9,15 +9,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
-from .correlation import mac
 from .identification import DERIVATIVES, Identified, evaluate
+from .one_peak import alike_shapes, twins_joined
 from .pole_search import STEADY
 from .response_variance import frf_variance, left_scatter
 from .setup import Control
 
 PARTNER = 0.05  # of a frequency: farther away is another mode
-SAME_SHAPE = 0.8  # MAC of the residues over three channels or more: less is another mode
-TWIN = 1.5  # half-bandwidths: poles of one shape nearer than that are one mode
 STANDS_OUT = 3.0  # of χ² a pole must bring, over what it pays, to be followed
 KNOWN = 0.5  # standard deviation over its damping: a mode of which less is known is not followed
 NEAR = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
@@ -146,27 +144,10 @@ def modes_over_levels(recordings: Sequence[AtLevel]) -> tuple[ModeLevels, ...]:
     if len({r.level for r in known}) < 2:
         return ()
     first = known[0]
-    lowest = _twins_joined(first.modes)
+    lowest = twins_joined(first.modes)
     noise = [_noise(first, one) for one in known]
     tracks = [_track(lowest, int(k), known, noise) for k in np.flatnonzero(_clear(lowest))]
     return tuple(t for t in tracks if t is not None and len(set(t.level)) > 1)
-
-
-def _twins_joined(found: Identified) -> Identified:
-    """Poles of one shape within a bandwidth made one mode, of the residues of all.
-
-    A peak that leans is fitted better by two poles than by one; neither has its residue.
-    """
-    half, strength = np.abs(found.poles.real), found.relative_delta_chi2
-    near = np.abs(found.poles[:, None] - found.poles)
-    close = (near < TWIN * np.maximum(half[:, None], half)) & _alike(found, found)
-    residues, kept = found.residues.copy(), np.ones(found.order, bool)
-    for k in np.argsort(-strength):
-        twins = close[k] & kept & (np.arange(found.order) != k)
-        if kept[k] and twins.any():
-            residues[k] += residues[twins].sum(axis=0)
-            kept &= ~twins
-    return replace(found, residues=residues).sel(kept)
 
 
 def _clear(found: Identified) -> np.ndarray:
@@ -198,19 +179,12 @@ def _track(
 
 def _partner(first: Identified, mode: int, other: Identified) -> int | None:
     """The mode of another level that is this one: the nearest of its shape, and it of that."""
-    alike = _alike(first, other) & _clear(first)[:, None] & _clear(other)[None, :]
+    alike = alike_shapes(first, other) & _clear(first)[:, None] & _clear(other)[None, :]
     far = np.abs(np.log(other.frequency[None, :] / first.frequency[:, None]))
     far = np.where(alike & (far < PARTNER), far, np.inf)
     k = int(far[mode].argmin()) if far.shape[1] else 0
     found = far.size and np.isfinite(far[mode, k]) and int(far[:, k].argmin()) == mode
     return k if found else None
-
-
-def _alike(a: Identified, b: Identified) -> np.ndarray:
-    """Whether modes of two levels are of one shape, as far as their channels tell (r_a, r_b)."""
-    if (a.outputs, a.inputs) != (b.outputs, b.inputs) or len(a.outputs) * len(a.inputs) < 3:
-        return np.ones((a.order, b.order), bool)
-    return mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE
 
 
 Seen = tuple[float, float, float, float, float, float, float, float]  # as `ModeLevels` has them

@@ -14,6 +14,7 @@ from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
+from ..ema.one_peak import peak_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
@@ -164,6 +165,7 @@ def identify(
         *choice.notes,
         *said,
         *(note for note in _notes(held, gaps, averages) if note not in said),
+        *(f"{r.recording.name}: {note}" for r in found for note in peak_notes(r.modes.sel(r.firm))),
         *(note for study in levels for note in level_notes(study)),
     ]
     return Identification(tuple(found), tuple(notes), _doubts(found), levels)
