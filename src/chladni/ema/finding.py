@@ -5,7 +5,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from ..errors import named
+
 Severity = Literal["fault", "warning"]
+TINY = 1e-12  # a smaller probability is a word, not a number
+
+
+def probability(p: float) -> str:
+    """A probability in a sentence, however small.
+
+    >>> probability(0.03), probability(0.0)
+    ('p = 0.03', 'p < 1e-12')
+    """
+    return f"p = {p:.1g}" if p >= TINY else f"p < {TINY:g}"
 
 
 @dataclass(frozen=True)
@@ -77,6 +89,45 @@ class Screening:
         known = {(f.kind, f.channels) for f in self.findings}
         fresh = tuple(f for f in findings if (f.kind, f.channels) not in known)
         return Screening(self.name, (*self.findings, *fresh), (*self.checks, *checks))
+
+
+def of_all(screenings: Sequence[Screening]) -> str:
+    """What was found in several recordings, each kind once, in one sentence; "" where nothing.
+
+    >>> turned, late = Finding("reversed sign", "..."), Finding("delay", "...", "warning")
+    >>> of_all([Screening("a", (turned,)), Screening("b", (turned, late)), Screening("c")])
+    'at fault: reversed sign in a, b; to be looked at: delay in b'
+    """
+    said = []
+    for severity, word in (("fault", "at fault"), ("warning", "to be looked at")):
+        where: dict[str, list[str]] = {}
+        for s in screenings:
+            for f in s.findings:
+                if f.severity == severity:
+                    where.setdefault(f.kind + _of(f.channels), []).append(s.name)
+        kinds = [f"{what} in {which(names, screenings)}" for what, names in where.items()]
+        said += [f"{word}: {', '.join(kinds)}"] if kinds else []
+    return "; ".join(said)
+
+
+def notes_of_all(screenings: Sequence[Screening]) -> list[str]:
+    """One sentence a finding, said once of all recordings that have it; which, where not all."""
+    where: dict[str, list[str]] = {}
+    for s in screenings:
+        for note in s.notes:
+            where.setdefault(note, []).append(s.name)
+    several = len(screenings) > 1
+    return [
+        f"{note} ({which(names, screenings)})" if several else note for note, names in where.items()
+    ]
+
+
+def which(names: Sequence[str], every: Sequence[object]) -> str:
+    """Recordings by name; all of them, where it is all of three or more."""
+    each = list(dict.fromkeys(names))
+    if len(each) == len(every) > 2:
+        return f"all {len(every)} recordings"
+    return named(each, 3)
 
 
 def _of(channels: Sequence[str]) -> str:

@@ -2,9 +2,8 @@
 
 import numpy as np
 
+from .finding import probability
 from .level_study import CALM, MEANING, SETTLED_BY, LevelStudy, ModeStudy
-
-TINY = 1e-12  # a smaller probability is a word, not a number
 
 
 def level_notes(study: LevelStudy) -> list[str]:
@@ -32,17 +31,14 @@ def mode_sentence(study: ModeStudy) -> str:
     if m.frequency_moves:
         f = ", ".join(f"{x:.5g}" for x in m.frequency)
         what.append(f"natural frequencies move with level: {f} Hz at level {at}"
-                    f" ({_p(m.p_frequency)})")  # fmt: skip
+                    f" ({probability(m.p_frequency)})")  # fmt: skip
     if m.damping_moves:
         z = ", ".join(f"{100 * x:.3g}" for x in m.damping)
         near = "" if m.frequency_moves else f" of {m.frequency[0]:.5g} Hz"
-        what.append(f"damping{near} moves with level: {z} % at level {at} ({_p(m.p_damping)})")
+        what.append(
+            f"damping{near} moves with level: {z} % at level {at} ({probability(m.p_damping)})"
+        )
     return f"{'; '.join(what)}: {study.signature}, {MEANING[study.signature]}{_elements(study)}"
-
-
-def _p(p: float) -> str:
-    """A probability, however small."""
-    return f"p = {p:.1g}" if p >= TINY else f"p < {TINY:g}"
 
 
 def _elements(study: ModeStudy) -> str:
@@ -54,7 +50,9 @@ def _elements(study: ModeStudy) -> str:
         return "; three levels would tell which element does it"
     if best is None:
         lead = study.fits[0]
-        said = f"; no element explains it, {lead.element.name} comes nearest ({_p(lead.p)})"
+        said = (
+            f"; no element explains it, {lead.element.name} comes nearest ({probability(lead.p)})"
+        )
     else:
         said = f"; {best.element.name} explains it (p = {best.p:.2g})"
         said += f", not told apart from {', '.join(study.as_good)}" if study.as_good else ""

@@ -10,7 +10,7 @@ from scipy.special import gammaincc
 from ..dynamics.frf import FRF
 from ..errors import ShapeError, named
 from .correlation import wrapped
-from .finding import Check, Finding
+from .finding import Check, Finding, probability
 from .response_variance import moving_mean
 from .setup import Recording
 
@@ -204,15 +204,16 @@ def levels_checked(
         if (compared := _compared(recording, other)) is None:
             continue
         name = "homogeneity" if recording.level != other.level else "repeatability"
-        text = f"{compared.ratio:.3g} times the noise, p = {compared.p:.2g}, rms {compared.rms:.2g}"
+        size, p = f"{compared.ratio:.{0 if compared.ratio > 99 else 2}f}", probability(compared.p)
+        text = f"{size} times the noise, {p}, rms {compared.rms:.2g}"
         said[name].append(f"{other.name}: {text} decades")
         if compared.linear or name == "repeatability":
             continue
         odd.add(name)
         sentence = (
             f"levels {recording.level:g} and {other.level:g} do not give the same FRFs: they are "
-            f"apart {compared.ratio:.3g} times as much as their noise (p = {compared.p:.2g}, "
-            f"{compared.rms:.2g} decades rms), {_worst(compared)}: not linear."
+            f"apart {size} times as much as their noise ({p}, {compared.rms:.2g} decades rms), "
+            f"{_worst(compared)}: not linear."
         )
         mend = "name one level by use in case.toml, and read the result as that level's own"
         worst = compared.channels[:_NAMED]

@@ -14,7 +14,7 @@ from ..io.uff.write_uff import write_uff
 from ..workflows.evaluation import Evaluation, RecordingEvaluation
 from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
-from .screening_blocks import screening_section
+from .screening_blocks import lead_of, screening_section
 from .words import number
 
 _SHOWN = 12  # channels drawn
@@ -36,7 +36,7 @@ def evaluation_page(folder: Path, found: Evaluation) -> PageParts:
             of = f"Free decays of {r.recording.name} by amplitude"
             sections.append(replace(level_section(tables, pictures), title=of))
             files += [(path.name, "a mode over its amplitudes") for path in pictures.values()]
-    lead = "; ".join(r.screening.sentence for r in found.recordings)
+    lead = lead_of([r.screening for r in found.recordings])
     return PageParts(lead, sections, found.notes, files)
 
 

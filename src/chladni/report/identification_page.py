@@ -7,6 +7,7 @@ import numpy as np
 
 from ..dynamics.frf import UNIT
 from ..ema.correlation import auto_mac
+from ..ema.finding import of_all
 from ..ema.identification import evaluate
 from ..ema.level_table import level_tables
 from ..ema.mode_indicators import cmif, mif
@@ -16,11 +17,10 @@ from ..io.tables.write_tables import write_levels, write_poles
 from ..workflows.identify import Identification, RecordingModes
 from .blocks import PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
-from .screening_blocks import screening_section
+from .screening_blocks import SEVERAL, screening_section
 from .words import hertz, number
 
 _SHOWN = 6  # channels drawn
-_TOLD = 2  # recordings a headline tells one by one
 _CIRCLES = 30  # modes drawn
 _MATRIX = 40  # modes of an AutoMAC that can still be read
 _FILES = {
@@ -166,14 +166,14 @@ def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 def _lead(recordings: Sequence[RecordingModes]) -> str:
     """One recording in full, of several how many modes they show and which are to be looked at."""
-    if len(recordings) <= _TOLD:
+    if len(recordings) <= SEVERAL:
         return "; ".join(_sentence(r) for r in recordings)
     counts = sorted({len(r.poles.frequency) for r in recordings})
     span = _span(np.sort(np.concatenate([r.poles.frequency for r in recordings])))
     many = " to ".join(str(n) for n in dict.fromkeys((counts[0], counts[-1])))
     said = f"{len(recordings)} recordings of {many} {'mode' if many == '1' else 'modes'} each{span}"
-    bad = [r.screening.sentence for r in recordings if r.screening.findings]
-    return "; ".join([said, *bad])
+    bad = of_all([r.screening for r in recordings])
+    return "; ".join([said, *([bad] if bad else [])])
 
 
 def _sentence(r: RecordingModes) -> str:

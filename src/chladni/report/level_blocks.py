@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..ema.finding import TINY
 from ..ema.level_study import CALM
 from ..ema.level_table import ElementNumber, LevelRow, LevelTable, TriedElement
-from ..ema.level_words import TINY
 from .blocks import Block, Items, Picture, Section, Table
 from .words import interval, number
 

@@ -3,30 +3,67 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..ema.finding import Check, Finding, Screening
+from ..ema.finding import Check, Finding, Screening, of_all, which
+from ..errors import named
 from .blocks import Block, Items, Section, Table
 
 _FINDING = ("finding", "channels", "is a", "what", "repair")
 _CHECK = ("check", "result", "is")
+SEVERAL = 2  # recordings, beyond which what is alike in them is told once
 _WORD = {True: "in order", False: "look at it", None: "not possible"}
 
 
 def screening_section(*screenings: Screening | None) -> Section:
     """Findings first, then every check; nothing where nothing was screened."""
-    blocks: list[Block] = []
     told = [s for s in screenings if s is not None and (s.checks or s.findings)]
+    if len(told) > SEVERAL:
+        return Section("The recordings", _of_several(told))
+    blocks: list[Block] = []
     for s in told:
         of = s.name if len(told) > 1 else ""
         blocks.append(Items([s.sentence + "."]))
         if s.findings:
-            rows = [
-                (f.kind, ", ".join(f.channels) or "all", f.severity, f.text, f.repair)
-                for f in s.findings
-            ]
-            blocks.append(Table(_FINDING, rows, _FINDING, of))
+            blocks.append(Table(_FINDING, [_found(f) for f in s.findings], _FINDING, of))
         looked = [(c.name, c.result, _WORD[c.passed]) for c in s.checks]
         blocks.append(Table(_CHECK, looked, _CHECK, of))
     return Section("The recording", blocks)
+
+
+def lead_of(screenings: Sequence[Screening]) -> str:
+    """One sentence of a few recordings each, of more than that one of all."""
+    if len(screenings) <= SEVERAL:
+        return "; ".join(s.sentence for s in screenings)
+    return f"{len(screenings)} recordings; {of_all(screenings) or 'nothing found in any of them'}"
+
+
+def _of_several(told: Sequence[Screening]) -> list[Block]:
+    """One table of findings and one of checks: what came out alike stands once."""
+    blocks: list[Block] = [Items([(of_all(told) or "nothing found in any of them") + "."])]
+    found: dict[tuple[str, ...], list[str]] = {}
+    looked: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for s in told:
+        for f in s.findings:
+            found.setdefault(_found(f), []).append(s.name)
+        for c in s.checks:
+            of = looked.setdefault((c.name, _WORD[c.passed]), {})
+            of.setdefault(c.result, []).append(s.name)
+    if found:
+        rows = [(which(names, told), *row) for row, names in found.items()]
+        blocks.append(Table(("in", *_FINDING), rows, ("in", *_FINDING)))
+    rows = [
+        (name, named(results, 2), word, which([n for each in results.values() for n in each], told))
+        for (name, word), results in sorted(looked.items(), key=lambda one: _order(told, one[0][0]))
+    ]
+    return [*blocks, Table((*_CHECK, "in"), rows, (*_CHECK, "in"))]
+
+
+def _order(told: Sequence[Screening], name: str) -> int:
+    """Where a check stands among those of the recording that has it first."""
+    return next(k for s in told for k, c in enumerate(s.checks) if c.name == name)
+
+
+def _found(f: Finding) -> tuple[str, ...]:
+    return f.kind, ", ".join(f.channels) or "all", f.severity, f.text, f.repair
 
 
 def screening_json(s: Screening) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
-from ..ema.finding import Check, Finding, Screening
+from ..ema.finding import Check, Finding, Screening, notes_of_all
 from ..ema.frf_estimate import EstimateSettings, FrfEstimate, refuse_unknown
 from ..ema.identification import Identified, identify
 from ..ema.level_study import LevelStudy, decay_study
@@ -93,7 +93,7 @@ def evaluate_recordings(
             levels = decay_study(decays, r.frf.quantity)
             screening = _with_time(screening, e, decays)
             found.append(RecordingEvaluation(r, e, decays, screening, levels))
-    said = [note for f in found for note in f.screening.notes]
+    said = notes_of_all([f.screening for f in found])
     said += [note for f in found for note in _decay_notes(f)]
     if settings != EstimateSettings() and not any(e for _, e in held):
         said.append("Nothing was estimated, so excitation, method, lines and band were not used.")

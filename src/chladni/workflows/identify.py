@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
-from ..ema.finding import Screening
+from ..ema.finding import Screening, notes_of_all, which
 from ..ema.identification import Identified
 from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
@@ -158,7 +158,7 @@ def identify(
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
             found.append(_modes(recording, band, gaps, averages, () if k else held, choice))
-    screenings = [note for r in found for note in r.screening.notes]
+    screenings = notes_of_all([r.screening for r in found])
     levels = _levels(found, averages)
     said = [*screenings, *said]
     notes = [
@@ -230,11 +230,15 @@ def without_window(found: Identified, added: float) -> Identified:
 def _notes(
     held: Sequence[Recording], gaps: Sequence[tuple[float, float]], averages: int
 ) -> tuple[str, ...]:
-    notes: list[str] = []
+    notes = list(dict.fromkeys(note for r in held for note in r.notes))
+    sources: dict[str, list[str]] = {}
     for r in held:
-        notes += r.notes
         if r.frf is not None:
-            notes.append(f"Noise of {r.name}: {noise_source(r.frf, averages)}.")
+            sources.setdefault(noise_source(r.frf, averages), []).append(r.name)
+    notes += [f"Noise of {which(names, held)}: {source}." for source, names in sources.items()]
+    for r in held:
+        if r.level == 0 and len(held) > 1:
+            notes.append(f"{r.name}: its modes are not held against other levels, for 0 is none.")
         if r.added_damping:
             notes.append(f"{r.name}: {r.added_damping:.3g} 1/s of an exponential window taken off.")
     if gaps:
