@@ -12,6 +12,7 @@ from chladni.effects.registry import families
 from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers, with_doubt
 from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.outcome import BEYOND, TOO_LITTLE
 from chladni.updating.result_parts import laid_on_sheets, remainder, why_not
 from chladni.updating.ties import TIED, simplest_first
 
@@ -72,6 +73,22 @@ def test_what_leads_without_being_named_leaves_calibration_in_doubt(gains, verdi
     assert answer.one_of == (("calibration alone", *tied) if tied else ())
     assert bool(answer.notes) == bool(tied)
     assert not tied or "weigh the structure" in answer.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("refused", "vote", "open_"),
+    [(f"it {TOO_LITTLE}", 1.0, True), (f"it {TOO_LITTLE}", -1.0, False), ("it is odd", 1.0, False)],
+)
+def test_where_calibration_does_not_fit_a_leader_that_gains_little_is_one_of(refused, vote, open_):
+    """It, or what the catalogue does not hold; not where other data are against it."""
+    null = tried("", 0.0)
+    null.data = None
+    heard = SimpleNamespace(votes={"the data held out": vote})
+    hypotheses = (tried("point-mass", -TIED - 1),)
+    answer = with_doubt(
+        Diagnosis(None, null, None, hypotheses, "not in catalogue", heard=heard, refused=refused)
+    )
+    assert answer.one_of == (("point-mass", BEYOND) if open_ else ())
 
 
 @pytest.mark.parametrize(("ln_k", "tied"), [(1.6, ("point-mass", "suspension")), (1.4, ())])

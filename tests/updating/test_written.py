@@ -185,6 +185,7 @@ NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
         (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.4, 0.6), NAMED),
         (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.6, 0.4), NAMED),
         (1.9 * DUE, HeldOutEvidence(9.0, 9.0, 9.0), (0.6, 0.6), LITTLE),
+        (0.9 * DUE, HeldOutEvidence(0.0, 1.0, 1.0), (0.1, 0.1), LITTLE),  # as after a renewed fit
     ],
 )
 def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, left, called):
@@ -212,7 +213,9 @@ def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard
         return
     against = not outcome.carried(ahead, heard, DUE)  # what refused it is said, and nothing else
     worse = not against and (left[1] > outcome.HARM or (ahead < 2 * DUE and left[1] > 1))
-    assert ("data no fit saw worse explained" in judged.refused) == against
+    little = against and min(heard.votes.values()) >= 0
+    assert ("gained too little" in judged.refused) == little
+    assert ("data no fit saw worse explained" in judged.refused) == (against and not little)
     assert ("worse on data no fit saw" in judged.refused) == worse
     assert ("leaves more than it explains" in judged.refused) == (not against and not worse)
     if called == REST and not against:

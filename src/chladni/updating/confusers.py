@@ -6,6 +6,7 @@ from ..effects.registry import family
 from ..ema.odds import evidence_in_words
 from .diagnosis import Diagnosis
 from .leaning import strained
+from .outcome import BEYOND, TOO_LITTLE
 from .ties import TIED, needs_impossible, tied
 
 
@@ -14,11 +15,13 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
 
     That no physics is missing is a claim as well: where an effect leads by more than what is told
     apart, and no data that were not fitted have refused it, the answer is one of both.  So it is
-    where calibration strains a family of joints that stays as it is with the effect.
+    where calibration strains a family of joints that stays as it is with the effect.  Where
+    calibration alone does not fit at all, it is that effect or what the catalogue does not hold.
     """
     plainly, heard = diagnosis.verdict in ("nothing missing", "calibration only"), diagnosis.heard
     against = heard is not None and not all(g > 0 for g in heard.votes.values())
-    if not plainly or not diagnosis.hypotheses or against:
+    unfit = not plainly and diagnosis.refused == f"it {TOO_LITTLE}"
+    if not (plainly or unfit) or not diagnosis.hypotheses or against:
         return diagnosis
     lead = diagnosis.hypotheses[0]
     gain = diagnosis.two_log_bayes_factor(lead)
@@ -36,7 +39,8 @@ def with_doubt(diagnosis: Diagnosis) -> Diagnosis:
     if check := family(lead.effect.name).settled_by:
         note = f"{note}; what would settle it: {check}"
     notes = (*diagnosis.notes, note)
-    return replace(diagnosis, one_of=("calibration alone", *names), notes=notes)
+    one_of = (*names, BEYOND) if unfit else ("calibration alone", *names)
+    return replace(diagnosis, one_of=one_of, notes=notes)
 
 
 def with_confusers(diagnosis: Diagnosis) -> Diagnosis:

@@ -95,6 +95,8 @@ HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibrat
 MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
 AGAINST = "the data that no fit saw speak against it"
 WORSE = "but the deck with it is worse on the data that no fit saw"
+TOO_LITTLE = "gained too little, of all data together"
+LEAVES_MORE = "leaves more than it explains"
 MORE_LEFT = "but with it in place more is left than it explains"
 BEYOND = "something that the catalogue does not hold"
 
@@ -158,8 +160,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
         notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
     why, but = "left the data no fit saw worse explained", AGAINST
+    if not any(g < 0 for g in heard.votes.values()):
+        why, but = TOO_LITTLE, "but all data together do not pay for it"
     if voted:
-        why, but = "leaves more than it explains", MORE_LEFT
+        why, but = LEAVES_MORE, MORE_LEFT
     if voted and (faint or not borne):
         why, but = "made the deck worse on data no fit saw", WORSE
     note = (

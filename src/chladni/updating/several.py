@@ -91,7 +91,7 @@ class Search:
 
 def several(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
-    progress: Say = lambda text, share: None,
+    progress: Say = lambda text, share: None, part: float = 1.0,
 ) -> Search:  # fmt: skip
     """Sets of effects that grow from the best one, every member of which pays.
 
@@ -100,20 +100,21 @@ def several(
     singles : the best hypothesis of every family alone, best first; a set must be ahead of them
     due : gain in -2 ln evidence that one effect needs to be named
     unfit : whether the best of them does not fit
+    part : of its price, that what was fitted must bear; of the rest other data are to be asked
     """
     lead, *others = singles
-    search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4))
+    search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4), part)
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
         if simpler or (unfit and not search.sets):
             say = within(progress, 0.4, 0.8)
-            search = _better(search, _begun_with(problem, other, due, say, lead, search.sets))
+            search = _better(search, _begun_with(problem, other, due, say, part, lead, search.sets))
     if not search.sets and unfit:
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
             search = replace(search, sets=tuple(pairs))
-    ahead = (s for s in search.sets if _gain(lead, s.hypothesis) > s.due)
+    ahead = (s for s in search.sets if _gain(lead, s.hypothesis) > part * s.due)
     return replace(search, sets=tuple(ahead))
 
 
@@ -136,7 +137,7 @@ def _better(one: Search, other: Search) -> Search:
 
 
 def _begun_with(
-    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say, part: float,
     best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
     """The sets that grow from one hypothesis, until none more pays or they stay behind the best.
@@ -150,12 +151,12 @@ def _begun_with(
         if size > MOST:
             break
         try:
-            more, note = _grown(problem, current, price(due, size))
+            more, note = _grown(problem, current, price(due, size), part)
             if more is None:
                 break
             if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
                 break
-            found = _revised(problem, more, current.effects, price(due, size))
+            found = _revised(problem, more, current.effects, price(due, size), part)
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
             break
@@ -220,7 +221,7 @@ class _More:
 
 
 def _grown(
-    problem: UpdatingProblem, current: HypothesisFit, due: float
+    problem: UpdatingProblem, current: HypothesisFit, due: float, part: float
 ) -> tuple[_More | None, str]:
     """The set with the best effect more, if that pays, and how much it gains."""
     held, null = _standing(problem, current)
@@ -232,7 +233,7 @@ def _grown(
         f"with {current.name} in place the best effect more, {found[0].effect.name}, gains "
         f"{gain:.1f} in -2 ln evidence; {due:.0f} are needed"
     )
-    if gain <= due:
+    if gain <= part * due:
         return None, note
     newest = id(found[0].effect)
     others = [t for t in found[1:] if _other(t, found[0].effect)]
@@ -253,12 +254,12 @@ def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
 
 
 def _revised(
-    problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float
+    problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float, part: float = 1.0
 ) -> Several:
     """The set with some of its members sought anew, less what does not pay."""
     for member in members:
         more = _sought_anew(problem, more, member)
-    return _paying(problem, more, due)
+    return _paying(problem, more, due, part)
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
@@ -315,7 +316,7 @@ def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> H
     return min(tries, key=lambda t: t.neg2_log_evidence)
 
 
-def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
+def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> Several:
     """The set less what does not gain its price beside the others."""
     lead, known = more.hypothesis, more.without
     while True:
@@ -324,7 +325,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
         without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
         gain = {key: _gain(t, lead) for key, t in without.items()}
         weakest = min(gain, key=lambda key: gain[key])
-        if gain[weakest] > due:
+        if gain[weakest] > part * due:
             break
         lead, known = without[weakest], {}
     order = sorted(lead.effects, key=lambda e: -gain[id(e)])

@@ -5,6 +5,7 @@ asked beside all others, as the first is beside calibration alone; and all toget
 must be borne by the data held out against calibration alone.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from ..effects.effect import Effect
@@ -13,9 +14,11 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
-from .outcome import carried, judged, said
+from .likelihood import Responses
+from .outcome import GOOD_PART, LEAVES_MORE, carried, judged, said
 from .question import Prepared
-from .several import Rival, Several
+from .renewal import Renewal
+from .several import Rival, Say, Several, several
 from .ties import needs_impossible
 
 PLAINLY = 0.05  # p of a set where one effect alone did not fit
@@ -50,6 +53,35 @@ def named_together(
     if found.found is None:
         return None, f"{_found(more)}; but {found.notes[-1]}"
     return _with_rivals(found, more), ""
+
+
+def named_beside_more(
+    prepared: Prepared, alone: Diagnosis, refused: Diagnosis,
+    renew: Callable[[HypothesisFit], Renewal], progress: Say,
+) -> tuple[Diagnosis, tuple[str, ...]]:  # fmt: skip
+    """The diagnosis with effects beside a leader that is refused for what it leaves.
+
+    Where several things are missing at once, each leaves what the others would explain. What was
+    fitted may then bear an effect more by a good part of its price, if all that no fit saw speaks
+    for it and all data together pay the whole: so much is asked of a name alone as well.
+
+    Parameters
+    ----------
+    alone : with the leader named, as it was before it was judged
+    refused : the same, judged
+    """
+    null, problem = alone.null.data, prepared.problem
+    if not isinstance(null, Responses) or refused.refused != f"it {LEAVES_MORE}":
+        return refused, ()
+    problem = replace(problem, data=null.over(problem.reduced.model))  # as all were compared
+    search = several(problem, alone.hypotheses[:1], alone.due, False, progress, GOOD_PART)
+    for more in reversed(search.sets):
+        whole = renew(more.hypothesis)
+        found, why_not = named_together(prepared, alone, more, whole.hypothesis)
+        if found is not None:
+            return replace(found, notes=(*found.notes, whole.note)), whole.distrust
+        refused = replace(refused, notes=(*refused.notes, why_not))
+    return refused, ()
 
 
 def _fits_beyond(alone: FitTest | None, together: FitTest | None) -> bool:

@@ -59,7 +59,7 @@ from ..updating.result_parts import (
     remainder,
 )
 from ..updating.rivals import heard_of_rivals
-from ..updating.several_judged import named_together
+from ..updating.several_judged import named_beside_more, named_together
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
@@ -125,10 +125,10 @@ def explained(
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
-    found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
+    found = compared(prepared.problem, within(progress, 0.1, 0.8), diagnosing)
     if diagnosing:
         found = withheld(prepared, found)
-    found, distrust = _judged(asked, prepared, found)
+    found, distrust = _judged(asked, prepared, found, within(progress, 0.8, 0.85))
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -157,7 +157,7 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
 
 
 def _judged(
-    asked: Question, prepared: Prepared, found: Diagnosis
+    asked: Question, prepared: Prepared, found: Diagnosis, progress: Progress
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
@@ -169,10 +169,13 @@ def _judged(
             return replace(together, notes=(*together.notes, whole.note)), whole.distrust
         found = replace(found, notes=(*found.notes, why_not))
     if found.found is not None:
-        lead = renewed(asked, prepared, found.found)
+        alone, lead = found, renewed(asked, prepared, found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = judged(prepared, found), lead.distrust
+        renew = partial(renewed, asked, prepared)
+        found, doubts = named_beside_more(prepared, alone, found, renew, progress)
+        distrust = doubts or distrust
     if found.found is None and found.refused and not prepared.too_little:
         found, distrust = heard_of_rivals(prepared, found, partial(renewed, asked, prepared))
     found = with_doubt(with_confusers(found))
