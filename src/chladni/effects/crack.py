@@ -17,7 +17,7 @@ from ..geometry.facets import cell_areas, cell_normals, tangents, unit
 from ..geometry.sampling import farthest_point_sample, nearest_points
 from ..model.assembly import Assembly
 from ..model.properties import Part, ShellSection
-from .effect import WIDER, Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
@@ -178,7 +178,7 @@ class Crack(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of 12I/t³."""
-        value, high, low = (left(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
+        value, high, low = (left(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
         return (Estimate("12I/T3", value, "-", low, high),)
 
 

@@ -317,12 +317,24 @@ class Effect:
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Physical values of the parameters with their 95 % intervals.
 
-        Laplace's intervals are widened by WIDER: model error makes them too narrow.
+        Laplace's intervals are :meth:`widened`: model error makes them too narrow.
         """
+        wide = self.widened(sd)
         return tuple(
-            Estimate(p.name, p.value(x[k]), p.unit, *p.interval(x[k], WIDER * sd[k]))
+            Estimate(p.name, p.value(x[k]), p.unit, *p.interval(x[k], wide[k]))
             for k, p in enumerate(self.parameters)
         )
+
+    def widened(self, sd: np.ndarray) -> np.ndarray:
+        """Standard deviations (n,) of a fit, what the data say of each ``WIDER`` times as wide.
+
+        Data of the precision 1/sd² - 1/sd_0² beside a prior sd_0: model error makes these less
+        certain and leaves the prior what it is, so that nothing is less certain than before.
+        """
+        prior = np.array([p.sd for p in self.parameters])
+        with np.errstate(divide="ignore"):
+            told = np.maximum(1 / np.square(sd) - 1 / prior**2, 0.0)
+        return np.asarray(1 / np.sqrt(1 / prior**2 + told / WIDER**2))
 
     def location(self, x: np.ndarray) -> Location:
         """Where it is once it has been fitted."""

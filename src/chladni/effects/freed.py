@@ -18,7 +18,7 @@ from ..fem.energy import mass_properties
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.properties import Isotropic, Part, ShellSection, SolidSection
-from .effect import WIDER, ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
+from .effect import ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, PointTerm
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
@@ -107,7 +107,7 @@ class Freed(Effect):
         """Value and interval within the bounds; :meth:`on_bound` says whether it leans on one."""
         if len(x) > 1 or not len(self.parameters):
             return self.members[0].reported(x, sd)
-        p, reach = self.parameters[0], 1.96 * WIDER * sd
+        p, reach = self.parameters[0], 1.96 * self.widened(sd)
         low, here, high = (p.value(float(self.y(x + s * reach)[0][0])) for s in (-1, 0, 1))
         return (Estimate(p.name, here, p.unit, low, high),)
 

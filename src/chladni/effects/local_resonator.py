@@ -18,7 +18,7 @@ from ..fem.assemble import structure
 from ..geometry.facets import point_normals, tangents
 from ..model.added_points import with_points
 from ..model.assembly import Assembly, Bushes, Masses
-from .effect import WIDER, Effect, Parameter, PointTerm
+from .effect import Effect, Parameter, PointTerm
 from .estimate import Estimate
 from .family import Article, Family
 from .movable_attachment import MovableAttachment, around, moved, patch, there
@@ -95,7 +95,7 @@ class LocalResonator(MovableAttachment):
 
     def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
         """A lump, where the frequency of its spring may lie above the highest line."""
-        return self.becomes(x + 1.96 * WIDER * sd)
+        return self.becomes(x + 1.96 * self.widened(sd))
 
     def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
         """Its place and the mass that swings."""

@@ -24,7 +24,7 @@ from ..geometry.facets import cell_areas, vector_areas
 from ..geometry.sampling import farthest_point_sample
 from ..model.added_points import next_id
 from ..model.assembly import Assembly, Scalars
-from .effect import WIDER, Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
@@ -77,7 +77,7 @@ class MembranePrestress(Effect):
         """N along and across, each with the other where it is."""
         out = []
         for k, p in enumerate(self.parameters):
-            step = 1.96 * WIDER * sd[k] * np.eye(2)[k]
+            step = 1.96 * self.widened(sd)[k] * np.eye(2)[k]
             low, here, high = (float(self.force(x + s * step)[k]) for s in (-1, 0, 1))
             out.append(Estimate(p.name, here, "N/m", low, high))
         return tuple(out)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Isotropic, Orthotropic, Part, ShellSection
-from .effect import WIDER, Effect, FieldChange, Parameter
+from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
@@ -46,7 +46,10 @@ class OrthotropicMaterial(Effect):
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """E1, E2, G12 and nu12."""
         moduli = super().reported(x, sd)[:3]
-        nu = [self.moduli(np.append(x[:3], x[3] + s * 1.96 * WIDER * sd[3]))[3] for s in (-1, 0, 1)]
+        nu = [
+            self.moduli(np.append(x[:3], x[3] + s * 1.96 * self.widened(sd)[3]))[3]
+            for s in (-1, 0, 1)
+        ]
         return *moduli, Estimate("nu12", nu[1], "-", nu[0], nu[2])
 
     def _logs(self, x: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .effect import WIDER, ChannelChange, Effect, Parameter
+from .effect import ChannelChange, Effect, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
@@ -26,7 +26,7 @@ class SensorFault(Effect):
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """The factor on the channel, negative where its sign is wrong too."""
         (gain,) = self.parameters
-        low, high = sorted(self.sign * v for v in gain.interval(x[0], WIDER * sd[0]))
+        low, high = sorted(self.sign * v for v in gain.interval(x[0], self.widened(sd)[0]))
         return (Estimate(gain.name, self.sign * gain.value(x[0]), gain.unit, low, high),)
 
     def outputs(self, x: np.ndarray) -> ChannelChange:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..model.assembly import Assembly
 from ..model.properties import Part
-from .effect import WIDER, Effect, Parameter
+from .effect import Effect, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
@@ -64,7 +64,7 @@ class StiffnessPatch(SheetPatch):
         """What is left of E where it is least, and the radius R."""
         rows = Effect.reported(self, x, sd)
         q = float(self.bump(x, self.deepest(x)[1][None])[0])
-        here, high, low = (1 - q * lost(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
+        here, high, low = (1 - q * lost(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
         return replace(rows[0], value=here, low=low, high=high), rows[1]
 
 

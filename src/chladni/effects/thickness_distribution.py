@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.assembly import Assembly
-from .effect import WIDER, Effect, Parameter
+from .effect import Effect, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
@@ -52,7 +52,9 @@ class ThicknessDistribution(SheetPatch):
         """The deepest thinning on the sheet and the radius R; the place stands in ``location``."""
         rows = Effect.reported(self, x, sd)
         there = float(self.bump(x, self.deepest(x)[1][None])[0])
-        value, low, high = (there * thinning(x[0] + s * 1.96 * WIDER * sd[0]) for s in (0, -1, 1))
+        value, low, high = (
+            there * thinning(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1)
+        )
         return replace(rows[0], value=value, low=low, high=high), rows[1]
 
 

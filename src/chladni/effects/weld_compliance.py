@@ -17,7 +17,7 @@ from ..errors import ModelError
 from ..fem.assemble import structure
 from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
-from .effect import WIDER, Effect, MatrixTerm, Parameter
+from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
 from .joints import Connection, fasteners, with_factor_on, with_solids
@@ -90,7 +90,7 @@ class WeldCompliance(Effect):
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """What is left of the joint's stiffness."""
-        low, here, high = (self.left(x[0] + k * 1.96 * WIDER * sd[0])[0] for k in (-1, 0, 1))
+        low, here, high = (self.left(x[0] + k * 1.96 * self.widened(sd)[0])[0] for k in (-1, 0, 1))
         return (Estimate("K", here, "of the deck's", low, high),)
 
     def becomes(self, x: np.ndarray) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..effects.effect import WIDER, Effect
+from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
 from .map_fit import MassMeasurement, beside, descend
 from .reduced_model import State, evaluate
@@ -137,16 +137,21 @@ def _of_state(
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
     """The effects with what other states say of them as their prior.
 
-    Laplace's deviations are too narrow by about ``WIDER``; a prior never becomes wider than it was.
+    Laplace's deviations are too narrow and are widened; no prior becomes wider than it was.
     """
     return [_informed(e, posterior) if of_the_object(e) else e for e in effects]
 
 
 def _informed(effect: Effect, posterior: Posterior) -> Effect:
-    own = []
-    for k, p in enumerate(effect.parameters):
-        mean, sd = posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
-        own.append(replace(p, mean=mean, sd=min(WIDER * sd, p.sd)))
+    told = [
+        posterior.get((effect.name, effect.text, k), (p.mean, p.sd))
+        for k, p in enumerate(effect.parameters)
+    ]
+    wide = effect.widened(np.array([sd for _, sd in told]))
+    own = [
+        replace(p, mean=mean, sd=float(sd))
+        for p, (mean, _), sd in zip(effect.parameters, told, wide, strict=True)
+    ]
     return replace(effect, parameters=tuple(own))
 
 
