@@ -75,11 +75,12 @@ def paired(
     matched = np.zeros((n + 1, m + 1), bool)  # the last pole, if any, is paired with the last mode
     skipped = np.zeros((n + 1, m + 1), bool)  # the last mode is unpaired
     skipped[0, 1:] = True
+    joined = np.full(m + 1, np.inf)
     for i in range(n):
-        joined = np.append(np.inf, cost[:-1] + pair[i])
-        here = np.minimum(cost + alone[i], joined)
-        matched[i + 1] = joined < cost + alone[i]
-        ahead = here - skip
+        joined[1:] = cost[:-1] + pair[i]
+        left = cost + alone[i]
+        matched[i + 1] = joined < left
+        ahead = np.minimum(left, joined) - skip
         least = np.minimum.accumulate(ahead)
         skipped[i + 1], cost = least < ahead, least + skip
     at_test, at_model = _backtrack(matched, skipped)
