@@ -8,70 +8,46 @@ import pytest
 
 from chladni.updating import several_judged
 from chladni.updating.diagnosis import Diagnosis
-from chladni.updating.likelihood import Responses
-from chladni.updating.outcome import GOOD_PART, LEAVES_MORE
+from chladni.updating.outcome import LEAVES_MORE
 from chladni.updating.question import Prepared
-from chladni.updating.several import Search
 from chladni.updating.several_judged import named_beside_more
 
 LEFT = f"it {LEAVES_MORE}"
-DATA = object.__new__(Responses)
-NULL = SimpleNamespace(data=DATA, neg2_log_evidence=0.0)
+NULL = SimpleNamespace(data=None, neg2_log_evidence=0.0)
 LEAD = SimpleNamespace(verdict="missing physics", name="sensor-mass")
-ALONE = cast(Diagnosis, Diagnosis(NULL, NULL, NULL, (LEAD,), "missing physics"))
+SETS = tuple(SimpleNamespace(hypothesis=h, pay=h == "paid") for h in ("paid", "pair", "three"))
+ALONE = cast(Diagnosis, Diagnosis(NULL, NULL, NULL, (LEAD,), "missing physics", sets=SETS))
 REFUSED = replace(ALONE, verdict="not in catalogue", refused=LEFT, notes=("it leaves more",))
-PAIR = SimpleNamespace(hypothesis="both")
-RENEWAL = SimpleNamespace(hypothesis="both, renewed", note="renewed", distrust=("far",))
 
 
-@pytest.fixture
-def asked(monkeypatch):
-    """What was searched, with which part of the price; a pair is found."""
-    calls = []
+def answer(monkeypatch, refused, named=""):
+    """What is answered, and the sets that are asked, the last of which is named if it is any."""
+    asked = []
 
-    def several(problem, singles, due, unfit, progress, part):
-        calls.append((singles, part))
-        return Search((PAIR,), "")
+    def named_together(prepared, alone, more, whole):
+        asked.append(whole)
+        found = replace(ALONE, notes=("together",)) if whole == named else None
+        return found, "" if found else f"{whole} is not borne"
 
-    monkeypatch.setattr(Responses, "over", lambda self, model: self)
-    monkeypatch.setattr(several_judged, "replace", replace_)
-    monkeypatch.setattr(several_judged, "several", several)
-    return calls
-
-
-def replace_(of, **changes):
-    """Of what is no dataclass here as well."""
-    if isinstance(of, SimpleNamespace):
-        return SimpleNamespace(**{**vars(of), **changes})
-    return replace(of, **changes)
+    monkeypatch.setattr(several_judged, "named_together", named_together)
+    renew = lambda h: SimpleNamespace(hypothesis=h, note="renewed", distrust=("far",))  # noqa: E731
+    return *named_beside_more(cast(Prepared, None), ALONE, refused, renew), asked
 
 
-def answer(refused):
-    problem = SimpleNamespace(reduced=SimpleNamespace(model=None), data=None)
-    prepared = cast(Prepared, SimpleNamespace(problem=problem))
-    return named_beside_more(
-        prepared, ALONE, refused, lambda hypothesis: RENEWAL, lambda text, share: None
-    )
-
-
-def test_a_pair_that_all_data_bear_is_named(monkeypatch, asked):
-    together = replace(ALONE, notes=("together",))
-    monkeypatch.setattr(several_judged, "named_together", lambda *given: (together, ""))
-    found, doubts = answer(REFUSED)
-    assert asked == [((LEAD,), GOOD_PART)]
+def test_the_largest_set_that_all_data_bear_is_named(monkeypatch):
+    found, doubts, asked = answer(monkeypatch, REFUSED, "pair")
+    assert asked == ["three", "pair"]  # what pays by itself was asked before
     assert found.verdict == "missing physics"
     assert found.notes == ("together", "renewed")
     assert doubts == ("far",)
 
 
-def test_a_pair_that_they_do_not_bear_leaves_the_refusal_and_is_said(monkeypatch, asked):
-    monkeypatch.setattr(several_judged, "named_together", lambda *given: (None, "not borne"))
-    found, doubts = answer(REFUSED)
+def test_sets_that_they_do_not_bear_leave_the_refusal_and_are_said(monkeypatch):
+    found, doubts, _ = answer(monkeypatch, REFUSED)
     assert (found.verdict, found.refused, doubts) == ("not in catalogue", LEFT, ())
-    assert found.notes == ("it leaves more", "not borne")
+    assert found.notes == ("it leaves more", "three is not borne", "pair is not borne")
 
 
 @pytest.mark.parametrize("refused", [ALONE, replace(REFUSED, refused="its damping is odd")])
-def test_nothing_is_searched_where_the_leader_stands_or_other_data_refuse_it(asked, refused):
-    assert answer(refused) == (refused, ())
-    assert not asked
+def test_none_is_asked_where_the_leader_stands_or_other_data_refuse_it(monkeypatch, refused):
+    assert answer(monkeypatch, refused, "pair") == (refused, (), [])

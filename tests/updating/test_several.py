@@ -196,9 +196,7 @@ def test_the_order_in_which_they_are_found_does_not_matter(reduced, two, found):
     for where in (HERE, THERE):
         of, x = lump(reduced, where, 1.5)
         alone = two.fitted_with(of(two.where), x, null.fit.x)
-        ends.append(
-            places(_begun_with(two, alone, DUE, lambda text, share: None, 1.0).sets[-1].own)
-        )
+        ends.append(places(_begun_with(two, alone, DUE, lambda text, share: None).sets[-1].own))
     assert ends[0] == ends[1] == ends[2]
 
 
@@ -206,7 +204,7 @@ def test_a_set_that_is_known_is_not_searched_again(monkeypatch, reduced, two, fo
     """What begins elsewhere and comes upon the same two ends there; two at other places go on."""
     of, x = lump(reduced, THERE, 1.5)
     alone = two.fitted_with(of(two.where), x, null_of(two).fit.x)
-    begun = partial(_begun_with, two, alone, DUE, lambda text, share: None, 1.0)
+    begun = partial(_begun_with, two, alone, DUE, lambda text, share: None)
     assert begun(known=found[1].sets).sets == ()
     (both,) = found[1].sets
     away = replace(both.own, effect=PointMass.near(two.where, at(two.reduced, 0.2, 0.05)))
@@ -249,11 +247,12 @@ def test_a_mass_of_sensors_beside_a_lump(reduced):
 
 
 def test_part_of_the_price_may_do_where_other_data_are_asked_of_the_rest(two, found):
-    singles, due = found[0][:1], 1.5 * min(found[1].sets[-1].gains)
-    assert not several(two, singles, due, False).sets
-    (both,) = several(two, singles, due, False, part=0.5).sets
-    assert min(both.gains) < due < both.due
-    assert places(both.own) == places(found[1].sets[-1].own)
+    (paid,) = found[1].sets
+    (both,) = several(two, found[0][:1], 1.5 * min(paid.gains), False).sets
+    assert paid.pay
+    assert not both.pay
+    assert places(both.own) == places(paid.own)
+    assert not several(two, found[0][:1], 2.5 * min(paid.gains), False).sets
 
 
 def test_what_does_not_pay_goes(two, found):
@@ -263,7 +262,7 @@ def test_what_does_not_pay_goes(two, found):
     held = replace(held, data=both.own.data.over(held.reduced.model))
     idle = masses_of_sensors(two.where)[0]
     three = held.fitted_with(idle, np.array([-6.0]), held.mean())
-    left = _paying(two, _More(three, {}, {}, both.about), both.due, 1.0)
+    left = _paying(two, _More(three, {}, {}, both.about), both.due)
     assert idle not in left.own.effects
     assert places(left.own) == places(both.own)
 

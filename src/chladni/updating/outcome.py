@@ -20,6 +20,7 @@ from .likelihood import Poles
 from .map_fit import fit
 from .question import Prepared, Question
 from .reduced_model import State, evaluate
+from .several import GOOD_PART
 from .ties import tied
 from .written_hypothesis import as_foretold, as_found, as_written, of_mesh
 
@@ -90,7 +91,6 @@ def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
 
 
 CONFLICT = 2.0  # times the gain due: what was fitted refutes calibration, whatever else says
-GOOD_PART = 0.5  # of the gain due, that fitted responses bear where others bear the rest
 HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibration: no better model
 MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
 AGAINST = "the data that no fit saw speak against it"

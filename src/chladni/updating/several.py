@@ -33,6 +33,7 @@ from .ties import TIED
 
 MOST = 3  # effects in one answer
 FITTED = 6  # candidates of a later round that are fitted
+GOOD_PART = 0.5  # of the gain due, that fitted responses bear where others bear the rest
 WORTH = 0.25  # of the gain due, by rough fits: below it none of a round is followed further
 PAIRED = 4  # families in front that are tried in pairs
 BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
@@ -70,6 +71,7 @@ class Several:
     rivals : of each, other families that would do in its place
     due : gain that each had to bring
     about : the model whose state errors of form spread from in ``own``
+    ahead : of the best effect alone, in -2 ln evidence
     """
 
     hypothesis: HypothesisFit
@@ -79,6 +81,12 @@ class Several:
     rivals: tuple[tuple[Rival, ...], ...]
     due: float
     about: Reduced
+    ahead: float = np.inf
+
+    @property
+    def pay(self) -> bool:
+        """Whether what was fitted pays the whole price, of each beside the others and of all."""
+        return min(*self.gains, self.ahead) > self.due
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,31 +99,33 @@ class Search:
 
 def several(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
-    progress: Say = lambda text, share: None, part: float = 1.0,
+    progress: Say = lambda text, share: None,
 ) -> Search:  # fmt: skip
-    """Sets of effects that grow from the best one, every member of which pays.
+    """Sets of effects that grow from the best one, every member of which pays a good part.
+
+    Those that :attr:`Several.pay` stand by what was fitted alone; for others the data that no fit
+    saw are to pay the rest.
 
     Parameters
     ----------
     singles : the best hypothesis of every family alone, best first; a set must be ahead of them
     due : gain in -2 ln evidence that one effect needs to be named
     unfit : whether the best of them does not fit
-    part : of its price, that what was fitted must bear; of the rest other data are to be asked
     """
     lead, *others = singles
-    search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4), part)
+    search = _begun_with(problem, lead, due, within(progress, 0.0, 0.4))
     for other in others[:1]:
         simpler = len(unknowns(other.effects)) < len(unknowns(lead.effects))
-        if simpler or (unfit and not search.sets):
+        if simpler or (unfit and not any(s.pay for s in search.sets)):
             say = within(progress, 0.4, 0.8)
-            search = _better(search, _begun_with(problem, other, due, say, part, lead, search.sets))
-    if not search.sets and unfit:
+            search = _better(search, _begun_with(problem, other, due, say, lead, search.sets))
+    if unfit and not any(s.pay for s in search.sets):
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
             search = replace(search, sets=tuple(pairs))
-    ahead = (s for s in search.sets if _gain(lead, s.hypothesis) > part * s.due)
-    return replace(search, sets=tuple(ahead))
+    sets = (replace(s, ahead=_gain(lead, s.hypothesis)) for s in search.sets)
+    return replace(search, sets=tuple(s for s in sets if s.ahead > GOOD_PART * s.due))
 
 
 def _gain(without: HypothesisFit, hypothesis: HypothesisFit) -> float:
@@ -137,7 +147,7 @@ def _better(one: Search, other: Search) -> Search:
 
 
 def _begun_with(
-    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say, part: float,
+    problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
     best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
     """The sets that grow from one hypothesis, until none more pays or they stay behind the best.
@@ -151,12 +161,12 @@ def _begun_with(
         if size > MOST:
             break
         try:
-            more, note = _grown(problem, current, price(due, size), part)
+            more, note = _grown(problem, current, price(due, size))
             if more is None:
                 break
             if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
                 break
-            found = _revised(problem, more, current.effects, price(due, size), part)
+            found = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
             break
@@ -221,7 +231,7 @@ class _More:
 
 
 def _grown(
-    problem: UpdatingProblem, current: HypothesisFit, due: float, part: float
+    problem: UpdatingProblem, current: HypothesisFit, due: float
 ) -> tuple[_More | None, str]:
     """The set with the best effect more, if that pays, and how much it gains."""
     held, null = _standing(problem, current)
@@ -233,7 +243,7 @@ def _grown(
         f"with {current.name} in place the best effect more, {found[0].effect.name}, gains "
         f"{gain:.1f} in -2 ln evidence; {due:.0f} are needed"
     )
-    if gain <= part * due:
+    if gain <= GOOD_PART * due:
         return None, note
     newest = id(found[0].effect)
     others = [t for t in found[1:] if _other(t, found[0].effect)]
@@ -254,12 +264,12 @@ def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
 
 
 def _revised(
-    problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float, part: float = 1.0
+    problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float
 ) -> Several:
     """The set with some of its members sought anew, less what does not pay."""
     for member in members:
         more = _sought_anew(problem, more, member)
-    return _paying(problem, more, due, part)
+    return _paying(problem, more, due)
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
@@ -316,7 +326,7 @@ def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> H
     return min(tries, key=lambda t: t.neg2_log_evidence)
 
 
-def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> Several:
+def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
     """The set less what does not gain its price beside the others."""
     lead, known = more.hypothesis, more.without
     while True:
@@ -325,7 +335,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> S
         without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
         gain = {key: _gain(t, lead) for key, t in without.items()}
         weakest = min(gain, key=lambda key: gain[key])
-        if gain[weakest] > part * due:
+        if gain[weakest] > GOOD_PART * due:
             break
         lead, known = without[weakest], {}
     order = sorted(lead.effects, key=lambda e: -gain[id(e)])

@@ -14,11 +14,10 @@ from .adequacy import FitTest
 from .diagnosis import Diagnosis, tested
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
-from .likelihood import Responses
-from .outcome import GOOD_PART, LEAVES_MORE, carried, judged, said
+from .outcome import LEAVES_MORE, carried, judged, said
 from .question import Prepared
 from .renewal import Renewal
-from .several import Rival, Say, Several, several
+from .several import Rival, Several
 from .ties import needs_impossible
 
 PLAINLY = 0.05  # p of a set where one effect alone did not fit
@@ -57,7 +56,7 @@ def named_together(
 
 def named_beside_more(
     prepared: Prepared, alone: Diagnosis, refused: Diagnosis,
-    renew: Callable[[HypothesisFit], Renewal], progress: Say,
+    renew: Callable[[HypothesisFit], Renewal],
 ) -> tuple[Diagnosis, tuple[str, ...]]:  # fmt: skip
     """The diagnosis with effects beside a leader that is refused for what it leaves.
 
@@ -70,12 +69,9 @@ def named_beside_more(
     alone : with the leader named, as it was before it was judged
     refused : the same, judged
     """
-    null, problem = alone.null.data, prepared.problem
-    if not isinstance(null, Responses) or refused.refused != f"it {LEAVES_MORE}":
+    if refused.refused != f"it {LEAVES_MORE}":
         return refused, ()
-    problem = replace(problem, data=null.over(problem.reduced.model))  # as all were compared
-    search = several(problem, alone.hypotheses[:1], alone.due, False, progress, GOOD_PART)
-    for more in reversed(search.sets):
+    for more in (s for s in reversed(alone.sets) if not s.pay):
         whole = renew(more.hypothesis)
         found, why_not = named_together(prepared, alone, more, whole.hypothesis)
         if found is not None:

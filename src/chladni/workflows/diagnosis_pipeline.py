@@ -125,10 +125,10 @@ def explained(
         base = tuple(informed(prepared.problem.base, known))
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
-    found = compared(prepared.problem, within(progress, 0.1, 0.8), diagnosing)
+    found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
     if diagnosing:
         found = withheld(prepared, found)
-    found, distrust = _judged(asked, prepared, found, within(progress, 0.8, 0.85))
+    found, distrust = _judged(asked, prepared, found)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -157,12 +157,12 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
 
 
 def _judged(
-    asked: Question, prepared: Prepared, found: Diagnosis, progress: Progress
+    asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
     found = borne_by_all_data(prepared, found)
-    for more in reversed(found.sets):
+    for more in (s for s in reversed(found.sets) if s.pay):
         whole = renewed(asked, prepared, more.hypothesis)
         together, why_not = named_together(prepared, found, more, whole.hypothesis)
         if together is not None:
@@ -174,7 +174,7 @@ def _judged(
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = judged(prepared, found), lead.distrust
         renew = partial(renewed, asked, prepared)
-        found, doubts = named_beside_more(prepared, alone, found, renew, progress)
+        found, doubts = named_beside_more(prepared, alone, found, renew)
         distrust = doubts or distrust
     if found.found is None and found.refused and not prepared.too_little:
         found, distrust = heard_of_rivals(prepared, found, partial(renewed, asked, prepared))
