@@ -22,7 +22,7 @@ ADHESIVE = ModelFamily((Parameter("k", "-", 0.0, 0.5),), "adhesive")
 def tried(name, S, becomes="", implausible="", ln_k=0.0, nearly=""):
     effect = SimpleNamespace(
         name=name, becomes=lambda x: becomes, implausible=lambda x: implausible,
-        nearly=lambda x, sd: nearly,
+        nearly=lambda x, sd: nearly, expected=False,
     )  # fmt: skip
     at = np.array([ln_k])
     fit = SimpleNamespace(effects=(ADHESIVE,), of=lambda e: at, sd=lambda e: 0.1 + 0 * at)

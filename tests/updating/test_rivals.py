@@ -9,20 +9,24 @@ import pytest
 from chladni.updating import rivals
 from chladni.updating.adequacy import FitTest
 from chladni.updating.confusers import with_confusers
-from chladni.updating.diagnosis import UNEXPLAINED, Diagnosis
+from chladni.updating.diagnosis import UNEXPLAINED, Diagnosis, threshold
 from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.outcome import BEYOND, CONFLICT
 from chladni.updating.result_parts import why_not
 from chladni.updating.rivals import heard_of_rivals
 
-DUE = Diagnosis(None, SimpleNamespace(data=None), None, (None,) * 4, "").due
+DUE = threshold(None, 4)
 GAIN = 5 * DUE  # of the leader
 FITS = FitTest(True, 0.5, "all is well", "")
 
 
 def tried(name, gain):
     effect = SimpleNamespace(
-        name=name, becomes=lambda x: "", implausible=lambda x: "", nearly=lambda x, sd: ""
+        name=name,
+        becomes=lambda x: "",
+        implausible=lambda x: "",
+        nearly=lambda x, sd: "",
+        expected=False,
     )
     fit = SimpleNamespace(
         of=lambda e: np.zeros(1), sd=lambda e: np.zeros(1), effects=(), state=name

@@ -32,7 +32,7 @@ from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.rivals import _on_its_own_basis
 from chladni.updating.search_round import _of_the_same_lump, on_common_basis, search_round
-from chladni.updating.several import Rival, _begun_with, _More, _paying, _same, several
+from chladni.updating.several import Rival, _begun_with, _More, _paying, _revised, _same, several
 from chladni.updating.several_judged import named_together
 from chladni.updating.written_hypothesis import as_written
 
@@ -249,9 +249,9 @@ def test_a_mass_of_sensors_beside_a_lump(reduced):
 def test_part_of_the_price_may_do_where_other_data_are_asked_of_the_rest(two, found):
     (paid,) = found[1].sets
     (both,) = several(two, found[0][:1], 1.5 * min(paid.gains), False).sets
-    assert paid.pay
-    assert not both.pay
-    assert places(both.own) == places(paid.own)
+    assert (paid.pay, both.pay, places(both.own)) == (True, False, places(paid.own))
+    whole, of_it = _revised(two, _More(both.own, {}, {}, both.about), (), both.due)
+    assert (len(whole.gains), len(of_it.gains)) == (2, 1)  # the stronger pays in full alone
     assert not several(two, found[0][:1], 2.5 * min(paid.gains), False).sets
 
 
@@ -262,7 +262,7 @@ def test_what_does_not_pay_goes(two, found):
     held = replace(held, data=both.own.data.over(held.reduced.model))
     idle = masses_of_sensors(two.where)[0]
     three = held.fitted_with(idle, np.array([-6.0]), held.mean())
-    left = _paying(two, _More(three, {}, {}, both.about), both.due)
+    left = _paying(two, _More(three, {}, {}, both.about), both.due, 1.0)
     assert idle not in left.own.effects
     assert places(left.own) == places(both.own)
 
@@ -310,7 +310,7 @@ def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monk
     fit = SimpleNamespace(state=SimpleNamespace(dissipated=None))
     null = SimpleNamespace(data=SimpleNamespace(error=1), effects=(), fit=fit)
     fits = SimpleNamespace(passes=True, p=0.5, what="", where="")
-    lead = SimpleNamespace(effect=SimpleNamespace(name="point-mass"))
+    lead = SimpleNamespace(effect=SimpleNamespace(name="point-mass", expected=False))
     monkeypatch.setattr(diagnosing, "several", lambda *given: 1 / 0)
     monkeypatch.setattr(diagnosing, "adequacy", lambda *given, **more: fits)
     quiet = Diagnosis(null, null, null, (lead,), "nothing missing")

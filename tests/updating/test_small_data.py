@@ -175,7 +175,9 @@ def test_least_data(modes: int, channels: int, enough: bool) -> None:
 
 def test_a_name_is_withheld_with_what_it_cannot_be_told_from() -> None:
     def hypothesis(name: str, S: float) -> SimpleNamespace:
-        return SimpleNamespace(effect=SimpleNamespace(name=name), neg2_log_evidence=S)
+        return SimpleNamespace(
+            effect=SimpleNamespace(name=name, expected=False), neg2_log_evidence=S
+        )
 
     ends = {"point-mass": 10.0, "suspension": 90.0, "sensor-fault": 130.0}
     hypotheses = tuple(hypothesis(name, S) for name, S in ends.items())

@@ -199,6 +199,7 @@ class Effect:
     point : (3,) or None  its place in the basic frame [m]
     trials_factor : how many places were tried, this one among them (look-elsewhere)
     replaces : names of ordinary parameters it makes superfluous
+    expected : whether what the deck is made of has it as a rule
     """
 
     name: ClassVar[str] = "nothing"
@@ -221,6 +222,7 @@ class Effect:
     trials_factor: int = 1
     replaces: tuple[str, ...] = ()
     channels: tuple[str, ...] = field(default=())
+    expected: bool = False
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
         """Fields of shells and beams it multiplies."""

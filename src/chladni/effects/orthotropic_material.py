@@ -140,6 +140,7 @@ def orthotropic(
         f"all of {', '.join(names)}, axis 1 along {direction}",
         names,
         replaces=tuple(f"{q} of {n}" for q in ("E" if is_metal(material) else "Et") for n in names),
+        expected=prior.directed,
         E=material.E,
         nu=material.nu,
         positions=positions,

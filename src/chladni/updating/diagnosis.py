@@ -29,6 +29,7 @@ from .lossy_place import heard_of_damping
 from .reduced_model import evaluate
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
+from .ties import TIED
 
 FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
 FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
@@ -97,8 +98,8 @@ class Diagnosis:
 
     @property
     def due(self) -> float:
-        """Gain in -2 ln evidence that is needed to name one of the families that were tried."""
-        return threshold(self.null.data, len(self.hypotheses))
+        """Gain in -2 ln evidence that is needed to name the best of the families tried."""
+        return needed(self.null.data, self.hypotheses)
 
     @property
     def as_the_null(self) -> bool:
@@ -162,7 +163,8 @@ def _searched_beside(problem: UpdatingProblem, alone: Diagnosis, progress: Progr
     many = isinstance(data, Responses) and data.error is not None
     if not (many and alone.hypotheses) or (alone.found is None and not unfit):
         return alone
-    search = several(problem, alone.hypotheses, alone.due, unfit, progress)
+    due = threshold(data, len(alone.hypotheses))
+    search = several(problem, alone.hypotheses, due, unfit, progress)
     notes = (*alone.notes, search.note) if search.note else alone.notes
     return replace(alone, sets=search.sets, notes=notes)
 
@@ -234,11 +236,21 @@ def threshold(data: object, tried: int | None = None) -> float:
     return float(2 * np.log((tried or len(families())) / chance))
 
 
+def needed(data: object, hypotheses: Sequence[HypothesisFit]) -> float:
+    """The gain in -2 ln evidence that is needed to name the first of the families tried.
+
+    What a material has as a rule (wood is stiffer along its grain) is no false alarm where it is
+    named: it has to be told apart from calibration, as two explanations are.
+    """
+    due = threshold(data, len(hypotheses))
+    return min(due, TIED) if hypotheses and hypotheses[0].effect.expected else due
+
+
 def verdict(
     nominal: HypothesisFit, null: HypothesisFit, hypotheses: Sequence[HypothesisFit]
 ) -> str:
     """The public verdict."""
-    best, due = hypotheses[0] if hypotheses else None, threshold(null.data, len(hypotheses))
+    best, due = hypotheses[0] if hypotheses else None, needed(null.data, hypotheses)
     if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > due:
         return best.verdict
     changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED

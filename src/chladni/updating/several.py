@@ -166,7 +166,7 @@ def _begun_with(
                 break
             if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
                 break
-            found = _revised(problem, more, current.effects, price(due, size))
+            found, paid = _revised(problem, more, current.effects, price(due, size))
         except ModelError as error:  # a fit that has left all structures that can be
             note = f"what {current.name} leaves could not be searched: {error}"
             break
@@ -175,8 +175,7 @@ def _begun_with(
             break
         seen.append({id(e) for e in found.own.effects})
         current = found.own
-        if len(found.gains) > 1:
-            out.append(found)
+        out += [s for s in (paid, found) if s is not None and len(s.gains) > 1]
     return Search(tuple(out), note)
 
 
@@ -265,11 +264,19 @@ def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
 
 def _revised(
     problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float
-) -> Several:
-    """The set with some of its members sought anew, less what does not pay."""
+) -> tuple[Several, Several | None]:
+    """The set with some of its members sought anew, less what does not pay a good part.
+
+    Where some of it pay no more than that, those that pay in full are a set as well.
+    """
     for member in members:
         more = _sought_anew(problem, more, member)
-    return _paying(problem, more, due)
+    found = _paying(problem, more, due, GOOD_PART)
+    if found.pay or len(found.gains) < 2:
+        return found, None
+    known = {id(e): t for e, t in zip(found.own.effects, found.without, strict=True)}
+    more = replace(more, hypothesis=found.own, without=known)
+    return found, _paying(problem, more, due, 1.0)
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
@@ -326,8 +333,8 @@ def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> H
     return min(tries, key=lambda t: t.neg2_log_evidence)
 
 
-def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
-    """The set less what does not gain its price beside the others."""
+def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> Several:
+    """The set less what does not gain that part of its price beside the others."""
     lead, known = more.hypothesis, more.without
     while True:
         if len(lead.effects) < 2:
@@ -335,7 +342,7 @@ def _paying(problem: UpdatingProblem, more: _More, due: float) -> Several:
         without = {id(e): known.get(id(e)) or _without(problem, lead, e) for e in lead.effects}
         gain = {key: _gain(t, lead) for key, t in without.items()}
         weakest = min(gain, key=lambda key: gain[key])
-        if gain[weakest] > GOOD_PART * due:
+        if gain[weakest] > part * due:
             break
         lead, known = without[weakest], {}
     order = sorted(lead.effects, key=lambda e: -gain[id(e)])
@@ -384,5 +391,5 @@ def _in_pairs(
     if _gain(alone, best) < WORTH * due:
         return []
     more = _More(best, {}, {}, base.reduced.model)
-    found = _revised(problem, more, best.effects, due)
+    found, _ = _revised(problem, more, best.effects, due)
     return [found] if len(found.gains) > 1 else []

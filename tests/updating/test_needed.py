@@ -1,0 +1,36 @@
+"""What has to be gained before a name: the chance of a false alarm, where naming it may be one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chladni.effects.element_groups import element_groups
+from chladni.effects.orthotropic_material import orthotropic
+from chladni.fem.assemble import structure
+from chladni.model.properties import Isotropic
+from chladni.updating.diagnosis import needed, threshold
+from chladni.updating.likelihood import Poles, Responses
+from chladni.updating.ties import TIED
+from chladni_specimens.plates import plate
+
+DATA = object.__new__(Poles), object.__new__(Responses)
+
+
+def orthotropy_of(E, rho):
+    groups = element_groups(structure(plate(0.4, 0.3, 4, 3, 3e-3, Isotropic(E, 0.3, rho))))
+    return orthotropic(groups, (0,), np.array([1.0, 0, 0]))
+
+
+@pytest.mark.parametrize("data", DATA)
+def test_along_its_grain_wood_is_stiffer_as_a_rule(data):
+    others = [SimpleNamespace(effect=SimpleNamespace(expected=False))] * 12
+    wood, steel = (
+        SimpleNamespace(effect=orthotropy_of(E, rho)) for E, rho in ((5e9, 420.0), (2.1e11, 7850.0))
+    )
+    assert needed(data, [wood, *others]) == TIED < threshold(data, 13)
+    assert needed(data, [steel, *others]) == threshold(data, 13)
+    assert needed(data, [others[0], wood]) == threshold(
+        data, 2
+    )  # another leads
+    assert needed(data, []) == threshold(data)
