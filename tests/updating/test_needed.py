@@ -30,7 +30,5 @@ def test_along_its_grain_wood_is_stiffer_as_a_rule(data):
     )
     assert needed(data, [wood, *others]) == TIED < threshold(data, 13)
     assert needed(data, [steel, *others]) == threshold(data, 13)
-    assert needed(data, [others[0], wood]) == threshold(
-        data, 2
-    )  # another leads
+    assert needed(data, [others[0], wood]) == threshold(data, 2)  # another leads
     assert needed(data, []) == threshold(data)
