@@ -10,7 +10,8 @@ from chladni.updating import several_judged
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.outcome import LEAVES_MORE
 from chladni.updating.question import Prepared
-from chladni.updating.several_judged import named_beside_more
+from chladni.updating.several import Several
+from chladni.updating.several_judged import named_beside_more, perhaps_beside
 
 LEFT = f"it {LEAVES_MORE}"
 NULL = SimpleNamespace(data=None, neg2_log_evidence=0.0)
@@ -51,3 +52,17 @@ def test_sets_that_they_do_not_bear_leave_the_refusal_and_are_said(monkeypatch):
 @pytest.mark.parametrize("refused", [ALONE, replace(REFUSED, refused="its damping is odd")])
 def test_none_is_asked_where_the_leader_stands_or_other_data_refuse_it(monkeypatch, refused):
     assert answer(monkeypatch, refused, "pair") == (refused, (), [])
+
+
+def test_what_pays_in_part_beside_those_that_are_named_is_said():
+    def of(*effects, due=31.0):
+        own = SimpleNamespace(effects=[SimpleNamespace(name=name) for name, _ in effects])
+        own.name = " and ".join(name for name, _ in effects)
+        return cast(Several, SimpleNamespace(own=own, gains=[g for _, g in effects], due=due))
+
+    pair = of(("sensor-mass", 130.0), ("thickness-distribution", 111.0))
+    three = of(("sensor-mass", 145.0), ("thickness-distribution", 118.0), ("hem-contact", 28.0))
+    (said,) = perhaps_beside(pair, (pair, three))
+    assert said.startswith("beside sensor-mass and thickness-distribution hem-contact gains 28 ")
+    assert perhaps_beside(pair, (pair,)) == ()
+    assert perhaps_beside(pair, (of(("sensor-mass", 20.0), ("crack", 40.0)),)) == ()

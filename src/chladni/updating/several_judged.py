@@ -5,7 +5,7 @@ asked beside all others, as the first is beside calibration alone; and all toget
 must be borne by the data held out against calibration alone.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ..effects.effect import Effect
@@ -78,6 +78,22 @@ def named_beside_more(
             return replace(found, notes=(*found.notes, whole.note)), whole.distrust
         refused = replace(refused, notes=(*refused.notes, why_not))
     return refused, ()
+
+
+def perhaps_beside(named: Several, sets: Sequence[Several]) -> tuple[str, ...]:
+    """A sentence an effect that pays a part of its price beside those that are named."""
+    known = {e.name for e in named.own.effects}
+    part = {
+        e.name: (gain, s.due)
+        for s in sets
+        for e, gain in zip(s.own.effects, s.gains, strict=True)
+        if gain <= s.due and e.name not in known
+    }
+    return tuple(
+        f"beside {named.own.name} {name} gains {gain:.0f} in -2 ln evidence of the {due:.0f} that "
+        "are needed: it may be there as well"
+        for name, (gain, due) in part.items()
+    )
 
 
 def _fits_beyond(alone: FitTest | None, together: FitTest | None) -> bool:

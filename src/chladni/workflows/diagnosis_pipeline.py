@@ -59,7 +59,7 @@ from ..updating.result_parts import (
     remainder,
 )
 from ..updating.rivals import heard_of_rivals
-from ..updating.several_judged import named_beside_more, named_together
+from ..updating.several_judged import named_beside_more, named_together, perhaps_beside
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
@@ -166,7 +166,8 @@ def _judged(
         whole = renewed(asked, prepared, more.hypothesis)
         together, why_not = named_together(prepared, found, more, whole.hypothesis)
         if together is not None:
-            return replace(together, notes=(*together.notes, whole.note)), whole.distrust
+            notes = (*together.notes, whole.note, *perhaps_beside(more, found.sets))
+            return replace(together, notes=notes), whole.distrust
         found = replace(found, notes=(*found.notes, why_not))
     if found.found is not None:
         alone, lead = found, renewed(asked, prepared, found.found)
