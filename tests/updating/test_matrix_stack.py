@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from chladni.updating.matrix_stack import Bordered, Whole, weighted
+from chladni.updating.matrix_stack import Bordered, Whole, add_slopes, felt_alike, weighted
 
 G, R, K = 5, 4, 2
 
@@ -43,3 +43,14 @@ def test_what_is_common_is_held_once():
     inner = Whole(np.ones((G, R, R)))
     grown = [Bordered(inner, np.ones((G, R, K)), np.ones((G, K, K))) for _ in range(3)]
     assert all(stack.inner is inner for stack in grown)
+
+
+def test_slopes_are_summed_over_the_groups_that_are_felt():
+    """Parameters of one part, of another, of both and of none."""
+    change = np.zeros((5, 5))
+    change[:2, 0], change[1, 1], change[:, 2], change[[0, 1], 4] = 1.0, 2.0, 3.0, (4.0, 5.0)
+    felt = {(s.start, s.stop): alike for s, alike in felt_alike(change)}
+    assert felt == {(0, 2): [0, 4], (1, 2): [1], (0, 5): [2]}
+    stack, slopes = Whole(np.random.default_rng(2).normal(size=(5, 3, 3))), np.ones((5, 3, 3))
+    add_slopes(stack, change, slopes)
+    assert_allclose(slopes, 1 + np.einsum("gp,gij->pij", change, stack.values), atol=1e-12)

@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.effects.points import with_masses, with_springs
-from chladni.updating.matrix_stack import Whole, weighted
-from chladni.updating.reduced_model import _add, _felt_alike, evaluate, reduce
+from chladni.updating.matrix_stack import weighted
+from chladni.updating.reduced_model import evaluate, reduce
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import folded_panel
 
@@ -97,16 +97,3 @@ def test_an_operator_over_a_longer_basis_is_projected_as_a_whole(reduced):
     for model in (once, twice):
         whole = model.basis.T @ (A @ model.basis)
         assert_allclose(model.operator(A), whole, atol=1e-9 * np.abs(whole).max())
-
-
-def test_slopes_are_summed_over_the_groups_that_are_felt():
-    """Parameters of one part, of another, of both and of none."""
-    change = np.zeros((5, 5))
-    change[:2, 0], change[1, 1], change[:, 2], change[[0, 1], 4] = 1.0, 2.0, 3.0, (4.0, 5.0)
-    felt = {(s.start, s.stop): alike for s, alike in _felt_alike(change)}
-    assert felt == {(0, 2): [0, 4], (1, 2): [1], (0, 5): [2]}
-    stack = Whole(np.random.default_rng(2).normal(size=(5, 3, 3)))
-    K, dK = np.zeros((3, 3)), np.zeros((5, 3, 3))
-    _add(stack, np.ones(5), change, K, dK)
-    assert_allclose(K, stack.values.sum(axis=0))
-    assert_allclose(dK, np.einsum("gp,gij->pij", change, stack.values), atol=1e-12)

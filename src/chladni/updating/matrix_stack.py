@@ -4,7 +4,7 @@ Every hypothesis has a basis of its own: the common one and a few vectors more. 
 the border is its own; what they have in common is held once, however many hypotheses there are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,6 +31,21 @@ def weighted(stack: MatrixStack, weights: np.ndarray) -> np.ndarray:
     out = np.zeros((len(weights), stack.shape[1], stack.shape[1]))
     stack.add_to(tuple(out), weights)
     return out
+
+
+def add_slopes(stack: MatrixStack, change: np.ndarray, slopes: np.ndarray) -> None:
+    """Add Σ_g c_gp A_g to the slope of every parameter p (n_p, r, r), over the groups it moves."""
+    for among, parameters in felt_alike(change):
+        stack.add_to([slopes[p] for p in parameters], change[among, parameters].T, among)
+
+
+def felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
+    """Groups, one after another, that the same parameters move (g, n_p), and these."""
+    felt = change != 0
+    ends = np.stack([felt.argmax(axis=0), len(felt) - felt[::-1].argmax(axis=0)], axis=1)
+    for first, stop in np.unique(ends[felt.any(axis=0)], axis=0):
+        alike = felt.any(axis=0) & (ends == (first, stop)).all(axis=1)
+        yield slice(first, stop), list(np.flatnonzero(alike))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from ..fem.energy import mass_properties
 from .base_participation import BaseParticipation, Participating, participation
 from .effect_dofs import own_part, own_positions, row, with_own
 from .field_factors import mass_log, stiffness_log
-from .matrix_stack import MatrixStack, Whole, bordered
+from .matrix_stack import MatrixStack, Whole, add_slopes, bordered
 from .real_modes import real_modes
 from .rising import Dissipated, Rising
 
@@ -377,19 +377,8 @@ def _add(
     if not len(w):
         return
     stack.add_to([A], w[None])
-    if change is None:
-        return
-    for among, parameters in _felt_alike(change):
-        stack.add_to([dA[p] for p in parameters], change[among, parameters].T, among)
-
-
-def _felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
-    """Groups, one after another, that the same parameters move (g, n_p), and these."""
-    felt = change != 0
-    ends = np.stack([felt.argmax(axis=0), len(felt) - felt[::-1].argmax(axis=0)], axis=1)
-    for first, stop in np.unique(ends[felt.any(axis=0)], axis=0):
-        alike = felt.any(axis=0) & (ends == (first, stop)).all(axis=1)
-        yield slice(first, stop), list(np.flatnonzero(alike))
+    if change is not None:
+        add_slopes(stack, change, dA)
 
 
 def _weight(
