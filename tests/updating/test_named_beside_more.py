@@ -10,13 +10,17 @@ from chladni.updating import several_judged
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.outcome import LEAVES_MORE
 from chladni.updating.question import Prepared
-from chladni.updating.several import Several
+from chladni.updating.several import Search, Several, _better
 from chladni.updating.several_judged import named_beside_more, perhaps_beside
 
 LEFT = f"it {LEAVES_MORE}"
 NULL = SimpleNamespace(data=None, neg2_log_evidence=0.0)
 LEAD = SimpleNamespace(verdict="missing physics", name="sensor-mass")
-SETS = tuple(SimpleNamespace(hypothesis=h, pay=h == "paid") for h in ("paid", "pair", "three"))
+NONE = SimpleNamespace(effects=(), name="")
+SETS = tuple(
+    SimpleNamespace(hypothesis=h, pay=h == "paid", own=NONE, gains=(), due=0.0)
+    for h in ("paid", "pair", "three")
+)
 ALONE = cast(Diagnosis, Diagnosis(NULL, NULL, NULL, (LEAD,), "missing physics", sets=SETS))
 REFUSED = replace(ALONE, verdict="not in catalogue", refused=LEFT, notes=("it leaves more",))
 
@@ -66,3 +70,24 @@ def test_what_pays_in_part_beside_those_that_are_named_is_said():
     assert said.startswith("beside sensor-mass and thickness-distribution hem-contact gains 28 ")
     assert perhaps_beside(pair, (pair,)) == ()
     assert perhaps_beside(pair, (of(("sensor-mass", 20.0), ("crack", 40.0)),)) == ()
+
+
+def test_of_two_searches_the_one_whose_set_pays_in_full_is_the_better():
+    def search(*sets):
+        each = (
+            SimpleNamespace(pay=pay, hypothesis=SimpleNamespace(neg2_log_evidence=S))
+            for pay, S in sets
+        )
+        return Search(cast(tuple[Several, ...], tuple(each)), "")
+
+    none, part, paid, more = (
+        search(),
+        search((False, -90)),
+        search((True, -50)),
+        search((True, -60)),
+    )
+    assert _better(part, paid) is _better(paid, part) is paid
+    assert _better(paid, more) is more
+    assert _better(paid, search((True, -60), (False, -99))).sets[0].pay
+    assert _better(none, part) is _better(part, none) is part
+    assert _better(none, search()) is none

@@ -9,7 +9,7 @@ from chladni.effects.element_groups import element_groups
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
-from chladni.updating.diagnosis import needed, threshold
+from chladni.updating.diagnosis import Diagnosis, needed, threshold
 from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.ties import TIED
 from chladni_specimens.plates import plate
@@ -32,3 +32,12 @@ def test_along_its_grain_wood_is_stiffer_as_a_rule(data):
     assert needed(data, [steel, *others]) == threshold(data, 13)
     assert needed(data, [others[0], wood]) == threshold(data, 2)  # another leads
     assert needed(data, []) == threshold(data)
+
+
+@pytest.mark.parametrize("data", DATA)
+def test_what_is_told_of_another_is_what_it_needs(data):
+    wood, other = (SimpleNamespace(effect=SimpleNamespace(expected=e)) for e in (True, False))
+    null = SimpleNamespace(data=data)
+    found = Diagnosis(null, null, null, (wood, other), "calibration only")
+    assert found.due == found.due_of(wood) == TIED
+    assert found.due_of(other) == threshold(data, 2)

@@ -173,7 +173,7 @@ def _lead(recordings: Sequence[RecordingModes]) -> str:
     many = " to ".join(str(n) for n in dict.fromkeys((counts[0], counts[-1])))
     said = f"{len(recordings)} recordings of {many} {'mode' if many == '1' else 'modes'} each{span}"
     bad = of_all([r.screening for r in recordings])
-    return "; ".join([said, *([bad] if bad else [])])
+    return "; ".join(filter(None, (said, bad)))
 
 
 def _sentence(r: RecordingModes) -> str:

@@ -101,6 +101,11 @@ class Diagnosis:
         """Gain in -2 ln evidence that is needed to name the best of the families tried."""
         return needed(self.null.data, self.hypotheses)
 
+    def due_of(self, hypothesis: HypothesisFit) -> float:
+        """The same of any of them."""
+        others = (t for t in self.hypotheses if t is not hypothesis)
+        return needed(self.null.data, (hypothesis, *others))
+
     @property
     def as_the_null(self) -> bool:
         """Whether the calibration has its numbers as the null found them."""

@@ -17,6 +17,7 @@ from typing import Protocol, Self
 import numpy as np
 import scipy.linalg as sl
 
+from ..dynamics.modal_sum import modal_sum
 from .reduced_model import Reduced, State
 
 MEDIAN, LOG_SD = 0.01, 0.7  # prior of δ: two formulations of one sheet differ by 0.3 to 4 %
@@ -189,8 +190,7 @@ def columns(data: Lines, state: State, about: Form) -> np.ndarray:
     phi_o, phi_i, d = data.modal(state)
     H, sd = data.model(state), data.std()
     T = about.rows @ state.vectors
-    a_o = np.einsum("kr,fr,or->kfo", T, d, phi_o, optimize=True)
-    a_i = np.einsum("kr,fr,pr->kfp", T, d, phi_i, optimize=True)
+    a_o, a_i = (modal_sum(T, d, phi).transpose(1, 0, 2) for phi in (phi_o, phi_i))
     a_o = a_o * (data.s**data.power)[:, None]
     std = np.where(i == j, 0.5, np.sqrt(0.5))  # half, for i = j counts twice below
     root = np.sqrt(about.lam[i] * about.lam[j])

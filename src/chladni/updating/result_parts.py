@@ -136,7 +136,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
 
 def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
     """Why a hypothesis was not named, with a number."""
-    gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due
+    gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due_of(hypothesis)
     if refused := dict(diagnosis.passed_over).get(hypothesis.effect.name):
         return f"gains {gain:.1f} in -2 ln evidence, but {refused}"
     if diagnosis.found is None and gain > due:

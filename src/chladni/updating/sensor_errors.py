@@ -162,8 +162,8 @@ def _of_inputs(
         one = np.arange(len(phi_i)) == i
         out.append(errors.gain / scale * one)
         for modal in errors.modal[:, i] if state.drive is None else ():
-            G = np.einsum("or,fr,r->fo", phi_o, d, modal @ state.phi, optimize=True)
-            z = (data.s[:, None] ** data.power * G)[..., None] / (H * scale)
+            G = modal_sum(phi_o, d, (modal @ state.phi)[None])
+            z = data.s[:, None, None] ** data.power * G / (H * scale)
             out.append(z * one)
     return np.stack(out)
 

@@ -123,7 +123,7 @@ def several(
         progress("effects in pairs", 0.8)
         with suppress(ModelError):
             pairs = _in_pairs(problem, singles[:PAIRED], price(due, 2))
-            search = replace(search, sets=tuple(pairs))
+            search = replace(search, sets=(*search.sets, *pairs))
     sets = (replace(s, ahead=_gain(lead, s.hypothesis)) for s in search.sets)
     return replace(search, sets=tuple(s for s in sets if s.ahead > GOOD_PART * s.due))
 
@@ -139,11 +139,13 @@ def price(due: float, size: int) -> float:
 
 
 def _better(one: Search, other: Search) -> Search:
-    """The search that ended with the better set."""
-    if not (one.sets and other.sets):
-        return other if other.sets else one
-    ends = (s.sets[-1].hypothesis.neg2_log_evidence for s in (one, other))
-    return one if next(ends) <= next(ends) else other
+    """The search that ended with the better set; what pays in full is before what pays in part."""
+
+    def end(search: Search) -> tuple[bool, float]:
+        last = next((s for s in reversed(search.sets) if s.pay), search.sets[-1])
+        return not last.pay, last.hypothesis.neg2_log_evidence
+
+    return min((s for s in (one, other) if s.sets), key=end, default=one)
 
 
 def _begun_with(

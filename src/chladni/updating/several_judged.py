@@ -54,6 +54,25 @@ def named_together(
     return _with_rivals(found, more), ""
 
 
+def largest_named(
+    prepared: Prepared, alone: Diagnosis, sets: Sequence[Several],
+    renew: Callable[[HypothesisFit], Renewal],
+) -> tuple[Diagnosis | None, tuple[str, ...]]:  # fmt: skip
+    """The diagnosis with the last of some sets named that may be, and reasons not to trust it.
+
+    None where none may be, and what refused each.
+    """
+    refusals: list[str] = []
+    for more in reversed(sets):
+        whole = renew(more.hypothesis)
+        found, why_not = named_together(prepared, alone, more, whole.hypothesis)
+        if found is not None:
+            notes = (*found.notes, whole.note, *perhaps_beside(more, alone.sets))
+            return replace(found, notes=notes), whole.distrust
+        refusals.append(why_not)
+    return None, tuple(refusals)
+
+
 def named_beside_more(
     prepared: Prepared, alone: Diagnosis, refused: Diagnosis,
     renew: Callable[[HypothesisFit], Renewal],
@@ -71,13 +90,11 @@ def named_beside_more(
     """
     if refused.refused != f"it {LEAVES_MORE}":
         return refused, ()
-    for more in (s for s in reversed(alone.sets) if not s.pay):
-        whole = renew(more.hypothesis)
-        found, why_not = named_together(prepared, alone, more, whole.hypothesis)
-        if found is not None:
-            return replace(found, notes=(*found.notes, whole.note)), whole.distrust
-        refused = replace(refused, notes=(*refused.notes, why_not))
-    return refused, ()
+    in_part = [s for s in alone.sets if not s.pay]
+    found, said = largest_named(prepared, alone, in_part, renew)
+    if found is not None:
+        return found, said
+    return replace(refused, notes=(*refused.notes, *said)), ()
 
 
 def perhaps_beside(named: Several, sets: Sequence[Several]) -> tuple[str, ...]:

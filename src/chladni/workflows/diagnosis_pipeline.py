@@ -59,7 +59,7 @@ from ..updating.result_parts import (
     remainder,
 )
 from ..updating.rivals import heard_of_rivals
-from ..updating.several_judged import named_beside_more, named_together, perhaps_beside
+from ..updating.several_judged import largest_named, named_beside_more
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
@@ -161,24 +161,23 @@ def _judged(
 ) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict after renewal and the held-out data, and reasons not to trust it."""
     distrust: tuple[str, ...] = ()
+    renew = partial(renewed, asked, prepared)
     found = borne_by_all_data(prepared, found)
-    for more in (s for s in reversed(found.sets) if s.pay):
-        whole = renewed(asked, prepared, more.hypothesis)
-        together, why_not = named_together(prepared, found, more, whole.hypothesis)
-        if together is not None:
-            notes = (*together.notes, whole.note, *perhaps_beside(more, found.sets))
-            return replace(together, notes=notes), whole.distrust
-        found = replace(found, notes=(*found.notes, why_not))
+    together, said = largest_named(prepared, found, [s for s in found.sets if s.pay], renew)
+    if together is not None:
+        return together, said
+    found = replace(found, notes=(*found.notes, *said))
     if found.found is not None:
-        alone, lead = found, renewed(asked, prepared, found.found)
+        alone, lead = found, renew(found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
         found, distrust = judged(prepared, found), lead.distrust
-        renew = partial(renewed, asked, prepared)
-        found, doubts = named_beside_more(prepared, alone, found, renew)
-        distrust = doubts or distrust
+        together, said = named_beside_more(prepared, alone, found, renew)
+        if together.found is not None and found.found is None:
+            return together, said
+        found = together
     if found.found is None and found.refused and not prepared.too_little:
-        found, distrust = heard_of_rivals(prepared, found, partial(renewed, asked, prepared))
+        found, distrust = heard_of_rivals(prepared, found, renew)
     found = with_doubt(with_confusers(found))
     if found.found is None:
         found = prudently_calibrated(prepared, found)
