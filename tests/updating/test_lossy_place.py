@@ -10,7 +10,7 @@ from chladni.effects.crack import LineFinder, crack
 from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.lossy_place import heard_of_damping, softened
+from chladni.updating.lossy_place import heard_of_damping, shifted
 from chladni.updating.reduced_model import evaluate
 
 FLEXIBLE = 20.0  # Hz, below all modes of the plate that bend it
@@ -23,7 +23,9 @@ def cracked(reduced, x):
     middle = int(np.argmin(np.linalg.norm(lines.middle - [0.13, 0.12, 0], axis=1)))
     effect, x = crack(reduced.groups, lines.drawn(np.array([middle]), (3.0,))[0], 1), np.array([x])
     model = reduced.model_for(effect, x)
-    fitted = SimpleNamespace(effects=(effect,), x=x, state=evaluate(model, [effect], x, False))
+    fitted = SimpleNamespace(
+        effects=(effect,), x=x, state=evaluate(model, [effect], x, False), of=lambda _: x
+    )
     return HypothesisFit(effect, fitted, model)
 
 
@@ -39,7 +41,7 @@ def damping(frequency, ratio, sd=0.03):
 def test_a_small_fall_is_that_of_the_eigenvalues(reduced):
     """To first order φᵀK₀φ / λ - 1 is λ₀ / λ - 1 (Rayleigh); the rest is of second order."""
     slight = cracked(reduced, -7.0)
-    frequency, fall = softened(slight, FLEXIBLE)
+    frequency, fall = shifted(slight, FLEXIBLE)
     idle = evaluate(slight.model, slight.effects, np.array([slight.effect.parameters[0].nominal]))
     due = idle.lam[-len(frequency) :] / (2 * np.pi * frequency) ** 2 - 1
     assert due.max() > 1e-4
@@ -47,7 +49,7 @@ def test_a_small_fall_is_that_of_the_eigenvalues(reduced):
 
 
 def test_modes_damped_as_much_as_they_give_are_said(deep):
-    frequency, fall = softened(deep, FLEXIBLE)
+    frequency, fall = shifted(deep, FLEXIBLE)
     n = int((frequency < 400).sum())
     lossy = damping(frequency[:n], 0.005 + 0.5 * 0.6 * fall[:n])
     found = heard_of_damping(FITS, deep, lossy)
@@ -62,7 +64,7 @@ def test_modes_damped_as_much_as_they_give_are_said(deep):
 
 
 def test_evenly_or_elsewhere_damped_modes_are_not(deep):
-    frequency, fall = softened(deep, FLEXIBLE)
+    frequency, fall = shifted(deep, FLEXIBLE)
     n = int((frequency < 400).sum())
     rng = np.random.default_rng(5)
     scattered = 0.005 * np.exp(SCATTER * rng.normal(size=n))
@@ -74,7 +76,7 @@ def test_evenly_or_elsewhere_damped_modes_are_not(deep):
 def test_low_modes_are_heard_however_far_a_basis_reaches(deep):
     """A reduced model has modes far above the band; they are no measure of what is rigid."""
     lam = np.sort(deep.fit.state.lam)
-    frequency, fall = softened(deep, FLEXIBLE)
+    frequency, fall = shifted(deep, FLEXIBLE)
     assert len(frequency) == len(fall) == len(lam) - 6
     assert frequency.min() == pytest.approx(np.sqrt(lam[6]) / (2 * np.pi))
 

@@ -207,7 +207,7 @@ class Effect:
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
     writable: ClassVar[bool] = True  # whether a deck could hold it
     remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
-    elastic: ClassVar[bool] = False  # gives and nothing else: what rubs there as well is not it
+    elastic: ClassVar[bool] = False  # gives or holds, no more: what rubs there as well is not it
     lone: ClassVar[bool] = False  # a second one beside it would be no finding
     rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
     lets_go: ClassVar[bool] = False  # of clamps: its rows reach beyond the dofs of the deck

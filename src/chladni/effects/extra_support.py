@@ -33,6 +33,7 @@ class ExtraSupport(MovableAttachment):
 
     name = "extra-support"
     claim = "the structure touches something stiff that the model does not have"
+    elastic = True
 
     @classmethod
     def near(cls, where: Surroundings, k: int) -> Self:

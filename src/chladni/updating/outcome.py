@@ -95,6 +95,8 @@ HARM = 1.5  # held-out Q of the deck with the effect over that of plain calibrat
 MOST_LEFT = 0.5  # of the Q of plain calibration: beyond it more is left than was explained
 AGAINST = "the data that no fit saw speak against it"
 WORSE = "but the deck with it is worse on the data that no fit saw"
+USUAL = 0.9  # p of the absolute test, above which what is left is what the model's form errs by:
+MOST_USUAL_LEFT = 0.8  # then this much may be left of the smaller: scatter of articles leaves it
 TOO_LITTLE = "gained too little, of all data together"
 LEAVES_MORE = "leaves more than it explains"
 MORE_LEFT = "but with it in place more is left than it explains"
@@ -130,7 +132,7 @@ def borne_by_all_data(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     return tested(named, prepared.problem)
 
 
-def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
+def judged(prepared: Prepared, diagnosis: Diagnosis, most_left: float = MOST_LEFT) -> Diagnosis:
     """The verdict once data that no fit saw have been heard, and the named effect as written.
 
     The fitted data must carry a name after the fit was renewed.  The others refuse it as surely:
@@ -145,7 +147,9 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     if diagnosis.found is None:
         return diagnosis
     lead, problem = diagnosis.hypotheses[0], prepared.problem
-    heard = held_out_evidence(problem, prepared.unseen, diagnosis.null, lead)
+    heard = diagnosis.heard
+    if heard is None:
+        heard = held_out_evidence(problem, prepared.unseen, diagnosis.null, lead)
     gain = diagnosis.two_log_bayes_factor(lead)
     diagnosis = replace(diagnosis, written=as_written(lead, problem.mass_measurement), heard=heard)
     seen, held = fitted_scores(prepared, diagnosis)
@@ -155,7 +159,7 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     voted = carried(gain, heard, due, poles)
     borne = voted and not held.effect > HARM * held.calibrated
     faint = gain < CONFLICT * due and held.effect > held.calibrated
-    left = all(q.effect > MOST_LEFT * q.calibrated for q in (seen, held)) and lead.physics
+    left = _leaves_more(lead, (seen, held), most_left)
     if borne and not (faint or left):
         notes = (*diagnosis.notes, f"asked of {lead.name}: {said(heard)}")
         return replace(diagnosis, notes=notes)
@@ -180,6 +184,44 @@ def judged(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
     if gain > CONFLICT * due:
         return _unexplained(replace(refused, one_of=one_of), lead, gain, "what was fitted", but)
     return tested(refused, problem)
+
+
+def named_with_what_is_usual(prepared: Prepared, named: Diagnosis, refused: Diagnosis) -> Diagnosis:
+    """The diagnosis, its leader named though it leaves more than it explains, where that is usual.
+
+    Beside a small effect the scatter of an article leaves much, as errors of the model's form do.
+    That much may stay where the absolute test all but surely passes, where all that was asked
+    speaks for the name, and where a fifth of Q goes of what was fitted or of what was not.
+
+    Parameters
+    ----------
+    named : as it was before it was judged
+    refused : the same, judged
+    """
+    fits, heard = named.adequacy, refused.heard
+    if refused.refused != f"it {LEAVES_MORE}" or fits is None or heard is None:
+        return refused
+    if not (fits.passes and fits.p > USUAL and all(g > 0 for g in heard.votes.values())):
+        return refused
+    found = judged(prepared, replace(named, heard=heard), MOST_USUAL_LEFT)
+    if found.found is None:
+        return refused
+    note = (
+        f"more is left than {found.found.name} explains, but no more than errors of the model's "
+        "form leave: something less may be missing beside it"
+    )
+    return replace(found, notes=(*found.notes, note))
+
+
+def _leaves_more(lead: HypothesisFit, of: Sequence[FittedScores], most: float) -> bool:
+    """Whether a name leaves more of Q than may be left, fitted and held out.
+
+    A fault of a few channels is asked of what they recorded and no fit saw: of all it is little.
+    """
+    if not (lead.physics or lead.channels):
+        return False
+    asked = of[-1:] if lead.channels else of
+    return all(q.effect > most * q.calibrated for q in asked)
 
 
 def with_deck(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:

@@ -41,6 +41,7 @@ from ..updating.outcome import (
     held_out,
     judged,
     models,
+    named_with_what_is_usual,
     prudently_calibrated,
     real_poles,
     with_deck,
@@ -171,11 +172,12 @@ def _judged(
         alone, lead = found, renew(found.found)
         hypotheses = (lead.hypothesis, *found.hypotheses[1:])
         found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
-        found, distrust = judged(prepared, found), lead.distrust
+        named, distrust = found, lead.distrust
+        found = judged(prepared, named)
         together, said = named_beside_more(prepared, alone, found, renew)
         if together.found is not None and found.found is None:
             return together, said
-        found = together
+        found = named_with_what_is_usual(prepared, named, together)
     if found.found is None and found.refused and not prepared.too_little:
         found, distrust = heard_of_rivals(prepared, found, renew)
     found = with_doubt(with_confusers(found))
