@@ -7,6 +7,8 @@ import pytest
 from scipy.stats import kstest
 
 from chladni.effects.crack import LineFinder, crack
+from chladni.effects.extra_support import ExtraSupport
+from chladni.effects.surroundings import Setup, Surroundings
 from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.updating.hypothesis_fit import HypothesisFit
@@ -32,6 +34,20 @@ def cracked(reduced, x):
 @pytest.fixture(scope="module")
 def deep(reduced):
     return cracked(reduced, 3.0)
+
+
+@pytest.fixture(scope="module")
+def supported(reduced):
+    """A spring to ground, as if fitted."""
+    setup = Setup((), (), float(reduced.groups.weight.sum()), 400.0)
+    where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+    effect = ExtraSupport.near(where, 5)
+    x = np.array([2.0, 0.0, 0.0, 0.0, 0.0])
+    model = reduced.model_for(effect, x)
+    fitted = SimpleNamespace(
+        effects=(effect,), x=x, state=evaluate(model, [effect], x, False), of=lambda _: x
+    )
+    return HypothesisFit(effect, fitted, model)
 
 
 def damping(frequency, ratio, sd=0.03):
@@ -61,6 +77,22 @@ def test_modes_damped_as_much_as_they_give_are_said(deep):
     assert row.value > row.high
     assert row.median == pytest.approx(1.0, abs=0.05)  # a factor, drawn as a multiple of its median
     assert 0 < row.low < 1 < row.high
+
+
+def test_what_holds_and_dissipates_is_no_spring(supported):
+    """Foam to ground: the shares are those of the energy in the spring, of low modes nearly all."""
+    frequency, shift = shifted(supported, 0.0)
+    kept = np.flatnonzero((frequency > 1.0) & (frequency < 400))
+    share = -shift[kept]
+    assert (share > -1e-9).all()  # Rayleigh: without a spring no mode has more energy than with it
+    assert 0.5 < share.max() <= 1
+    found = heard_of_damping(FITS, supported, damping(frequency[kept], 0.005 + 0.5 * 0.8 * share))
+    assert not found.passes
+    assert "extra-support" in found.what
+    assert "foam or rubber" in found.what
+    assert heard_of_damping(
+        FITS, supported, damping(frequency[kept], np.full(len(kept), 0.005))
+    ).passes
 
 
 def test_evenly_or_elsewhere_damped_modes_are_not(deep):
