@@ -7,7 +7,7 @@ there and stays at its prior. Nothing sits beside the grids: a fit that goes on 
 place where they end.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -211,7 +211,7 @@ TRIED = 40  # places that are evaluated one by one where only natural frequencie
 
 def attachments(
     context: SearchContext, near: Callable[[Surroundings, int], MovableAttachment], matrix: str,
-    strengths: np.ndarray,
+    strengths: np.ndarray, known: Sequence[float] = (),
 ) -> list[Candidate]:  # fmt: skip
     """The two best places about each baseline, by exact re-analysis at every place.
 
@@ -219,6 +219,7 @@ def attachments(
     ----------
     near : makes the effect at a grid
     strengths : [kg] of "M" or [N/m] of "K"
+    known : what the strength is if something else is right; the best place of each is followed too
     """
     where = context.where
     grids, places = where.grids, where.places
@@ -226,20 +227,28 @@ def attachments(
         some = places.spread(TRIED)
         effects = [near(where, grids.position(places.grids[k], places.normal[k])) for k in some]
         return best_places(context, effects, places.point[some])
+    scan, out = context.scan, []
+
+    def follow(about: int, levels: np.ndarray, k: int) -> None:
+        """The best grid round a place, with the strength that is best there."""
+        closer = around(grids, places, k)
+        finer = scan.point_scores(about, matrix, levels, closer)
+        best, level = np.unravel_index(np.argmin(finer), finer.shape)
+        k_best = grids.position(closer.grids[best], closer.normal[best])
+        effect, c = near(where, k_best), levels[level]
+        start = np.array([p.mean for p in effect.parameters])
+        start[0] = np.log(c / effect.parameters[0].scale)
+        out.append(Candidate(effect, start, context.bases[about]))
+
     chosen: list[int] = []
-    out: list[Candidate] = []
-    for about, base in enumerate(context.bases):
-        score = context.scan.point_scores(about, matrix, strengths)
+    for about in range(len(context.bases)):
+        score = scan.point_scores(about, matrix, strengths)
         for k in distinct(score.min(axis=1), places.point, chosen, 2):
             chosen.append(k)
-            closer = around(grids, places, k)
-            finer = context.scan.point_scores(about, matrix, strengths, closer)
-            best, level = np.unravel_index(np.argmin(finer), finer.shape)
-            k_best = grids.position(closer.grids[best], closer.normal[best])
-            effect, c = near(where, k_best), strengths[level]
-            start = np.array([p.mean for p in effect.parameters])
-            start[0] = np.log(c / effect.parameters[0].scale)
-            out.append(Candidate(effect, start, base))
+            follow(about, strengths, k)
+        for c in known:
+            one = np.array([c])
+            follow(about, one, int(scan.point_scores(about, matrix, one).argmin()))
     return out
 
 

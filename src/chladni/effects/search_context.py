@@ -93,6 +93,10 @@ class SearchContext(Protocol):
         """Base parameters of the best fit without any effect."""
 
     @property
+    def weighs_more(self) -> float:
+        """What the scales tell beyond the nominal model [kg]; 0 where nothing was weighed."""
+
+    @property
     def scan(self) -> ResponseScan | None:
         """Fast scores; None where only natural frequencies are known."""
 

@@ -150,6 +150,14 @@ class UpdatingContext:
             baseline(s.reduced.model, s.base, s.data, s.mass_measurement, x) for x in self.bases
         )
 
+    @property
+    def weighs_more(self) -> float:
+        """What the scales tell beyond the nominal model [kg]; 0 where nothing was weighed."""
+        weighed = self.problem.mass_measurement
+        if weighed is None or self.scan is None:
+            return 0.0
+        return weighed.mass - self.baselines[0].state.weight
+
     @cached_property
     def scan(self) -> "Scan | None":
         """Fast scores; None where only natural frequencies are known."""

@@ -1,0 +1,55 @@
+"""What is attached is sought at the best places, and at the best for what the scales ask for."""
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from chladni.effects import point_mass
+from chladni.effects.point_mass import SHARE, TRIED
+from chladni.effects.search_context import SearchContext
+from chladni.effects.surroundings import Setup, Surroundings
+from chladni.updating.reduced_problem import reduced_problem
+from chladni_specimens.plates import plate
+
+
+@pytest.fixture(scope="module")
+def where():
+    reduced = reduced_problem(plate(0.4, 0.3, 16, 12, 1.5e-3), 250.0)
+    setup = Setup((), (), float(reduced.groups.weight.sum()), 200.0)
+    return Surroundings(reduced.groups, reduced.grids, reduced.candidates, setup)
+
+
+def proposed(where, more):
+    """Masses that are followed where a light one explains most at the left, a heavy one right."""
+    heavy = 1.5 * SHARE * where.setup.weight
+
+    def point_scores(about, matrix, strengths, places=None):
+        assert matrix == "M"
+        x = (where.places if places is None else places).point[:, 0]
+        return np.where(np.asarray(strengths) < heavy, x[:, None], 1.0 - x[:, None])
+
+    context = SimpleNamespace(
+        where=where,
+        bases=(np.zeros(1), np.ones(1)),
+        weighs_more=more,
+        scan=SimpleNamespace(point_scores=point_scores),
+    )
+    return point_mass.candidates(cast(SearchContext, context))
+
+
+def test_the_mass_that_the_scales_ask_for_is_sought_by_itself(where):
+    more = 2.0 * SHARE * where.setup.weight
+    found = proposed(where, more)
+    asked = [c for c in found if c.effect.parameters[0].value(c.start[0]) == pytest.approx(more)]
+    assert [c.base[0] for c in asked] == [0.0, 1.0]  # about the nominal model and the calibrated
+    assert all(c.effect.at(c.start)[0] > 0.35 for c in asked)
+    others = [c for c in found if c not in asked]
+    assert len(others) == 4
+    assert min(c.effect.at(c.start)[0] for c in others) < 0.05
+
+
+@pytest.mark.parametrize("share", [0.0, -2.0, 0.5 * TRIED.min()])
+def test_none_is_asked_for_that_is_less_than_the_least_tried(where, share):
+    assert len(proposed(where, share * SHARE * where.setup.weight)) == 4
