@@ -139,10 +139,10 @@ def judged(prepared: Prepared, diagnosis: Diagnosis, most_left: float = MOST_LEF
     where they speak against it by the gain that would be needed to name it, where less than that is
     left of all data together, or where the deck with the effect does harm: by far, or at all where
     the fitted data bear the name by less than twice the gain due.  Nor is named what leaves more
-    than it explains, of what was fitted and of what was not.  Data that cannot feel the effect are
-    predicted alike without it and have no vote.  Where all data together, or what was fitted by
-    far, still want more than calibration, what is missing is not in the catalogue; or it is the
-    leader with more beside it, where no data speak against that.
+    than ``most_left`` of the Q of plain calibration, of what was fitted and of what was not.  Data
+    that cannot feel the effect are predicted alike without it and have no vote.  Where all data
+    together, or what was fitted by far, still want more than calibration, what is missing is not in
+    the catalogue; or it is the leader with more beside it, where no data speak against that.
     """
     if diagnosis.found is None:
         return diagnosis
@@ -186,7 +186,9 @@ def judged(prepared: Prepared, diagnosis: Diagnosis, most_left: float = MOST_LEF
     return tested(refused, problem)
 
 
-def named_with_what_is_usual(prepared: Prepared, named: Diagnosis, refused: Diagnosis) -> Diagnosis:
+def named_with_what_is_usual(
+    prepared: Prepared, named: Diagnosis, refused: Diagnosis, beside: Sequence[str] = ()
+) -> Diagnosis:
     """The diagnosis, its leader named though it leaves more than it explains, where that is usual.
 
     Beside a small effect the scatter of an article leaves much, as errors of the model's form do.
@@ -197,6 +199,7 @@ def named_with_what_is_usual(prepared: Prepared, named: Diagnosis, refused: Diag
     ----------
     named : as it was before it was judged
     refused : the same, judged
+    beside : why effects beside it are not named either
     """
     fits, heard = named.adequacy, refused.heard
     if refused.refused != f"it {LEAVES_MORE}" or fits is None or heard is None:
@@ -210,7 +213,7 @@ def named_with_what_is_usual(prepared: Prepared, named: Diagnosis, refused: Diag
         f"more is left than {found.found.name} explains, but no more than errors of the model's "
         "form leave: something less may be missing beside it"
     )
-    return replace(found, notes=(*found.notes, note))
+    return replace(found, notes=(*found.notes, note, *beside))
 
 
 def _leaves_more(lead: HypothesisFit, of: Sequence[FittedScores], most: float) -> bool:

@@ -177,7 +177,8 @@ def _judged(
         together, said = named_beside_more(prepared, alone, found, renew)
         if together.found is not None and found.found is None:
             return together, said
-        found = named_with_what_is_usual(prepared, named, together)
+        beside = together.notes[len(found.notes) :]
+        found = named_with_what_is_usual(prepared, named, together, beside)
     if found.found is None and found.refused and not prepared.too_little:
         found, distrust = heard_of_rivals(prepared, found, renew)
     found = with_doubt(with_confusers(found))
