@@ -86,3 +86,10 @@ def hypothesis_at(name, evidence):
     effect = SimpleNamespace(name=name, recentred=lambda x, where: None)
     fit = SimpleNamespace(effects=(), of=lambda effect: np.zeros(1))
     return SimpleNamespace(effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence)
+
+
+def test_what_is_one_answer_with_the_best_is_in_the_running():
+    """A lump that gained 7 beside a weld's 11 was fifth, and was never closed in on."""
+    fits = [SimpleNamespace(neg2_log_evidence=v) for v in (88.6, 91.0, 92.8, 93.2, 93.0, 98.7)]
+    assert search_round._in_the_running(fits) == 5
+    assert search_round._in_the_running([]) == 0

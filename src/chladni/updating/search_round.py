@@ -20,10 +20,10 @@ from .candidates import UpdatingContext, already_there
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
-from .ties import simplest_first
+from .ties import TIED, simplest_first
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
-RUNNING = 3  # families that are fitted to the end, at rest or not
+RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
 LATER = 2  # of them in later rounds
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
 
@@ -53,6 +53,7 @@ def search_round(
     if least is not None and not _gained(null, hypotheses, least):
         return simplest_first(hypotheses, null.neg2_log_evidence)
     progress("closing in on the place", 0.8)
+    running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
     finished = list(side_by_side(lambda t: _finished(problem, t, True), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
@@ -62,6 +63,12 @@ def search_round(
     best = by_family([*hypotheses, *(t for fits in closer for t in fits)])
     best = by_family([*best, *_of_the_same_lump(problem, best)])
     return simplest_first(best, null.neg2_log_evidence)
+
+
+def _in_the_running(hypotheses: Sequence[HypothesisFit]) -> int:
+    """How many are one answer with the best of them by rough fits."""
+    least = min((t.neg2_log_evidence for t in hypotheses), default=0.0)
+    return sum(t.neg2_log_evidence < least + TIED for t in hypotheses)
 
 
 def _gained(null: HypothesisFit, hypotheses: Sequence[HypothesisFit], least: float) -> bool:
