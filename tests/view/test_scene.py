@@ -53,6 +53,21 @@ def test_every_picture_is_written(tmp_path, back_end):
     assert [p for p in tmp_path.iterdir() if p not in written] == []
 
 
+def test_every_place_has_its_cross(tmp_path, back_end):
+    """Thirty sensors are not one cross in their middle."""
+
+    def red(places):
+        path = scene.location(tmp_path / "w.png", SEEN, np.array(places), 0.0)
+        with Image.open(path) as image:
+            r, g, b = np.moveaxis(np.asarray(image.convert("RGB")).astype(int), -1, 0)
+        return int(((r > 150) & (g < 90) & (b < 90)).sum())
+
+    apart = [[0.05, 0.05, 0.0], [0.3, 0.05, 0.0], [0.3, 0.25, 0.0]]
+    one = red(apart[0])
+    assert one > 10
+    assert 2.5 * one < red(apart) < 3.5 * one
+
+
 def test_animation_has_its_frames_and_a_white_ground(tmp_path, back_end):
     path = scene.mode_gif(tmp_path / "m.gif", SEEN, SHAPE, 27.18, frames=6)
     with Image.open(path) as gif:

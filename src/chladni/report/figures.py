@@ -82,12 +82,12 @@ def setup(folder: Path, shown: Shown) -> dict[str, Path]:
 
 
 def _where(path: Path, effect: NamedEffect, shown: Shown) -> Path | None:
-    """A marked point, else the middle of the grids, else the parts in colour."""
+    """A marked point, else the grids, else the parts in colour."""
     where, place = effect.where, None
     if where.point_m is not None:
         place = np.array(where.point_m, dtype=float)
-    elif where.grids and len(shown.ids):
-        place = shown.seen.points[np.isin(shown.ids, where.grids)].mean(axis=0)  # rows as ids
+    elif len(shown.ids) and (marked := np.isin(shown.ids, where.grids)).any():
+        place = shown.seen.points[marked]  # rows as ids
     faces = None if place is not None else _of_parts(where, shown)
     if place is None and faces is None:
         return None

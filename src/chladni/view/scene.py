@@ -216,19 +216,20 @@ def location(
     text: str = "",
     faces: np.ndarray | None = None,
 ) -> Path:
-    """A place on the structure: a cross, the circle of its uncertainty [m], a sentence.
+    """Places on the structure: a cross each, the circle of its uncertainty [m], a sentence.
 
-    ``faces`` (m,) bool are coloured: the parts or elements that are meant.
+    ``point`` is (3,) or (k, 3); ``faces`` (m,) bool are coloured: the parts or elements meant.
     """
     meant = seen.points[seen.faces[faces]].mean(axis=1) if faces is not None else np.zeros((0, 3))
-    focus = meant if point is None else np.asarray(point, dtype=float)[None]
+    places = np.zeros((0, 3)) if point is None else np.atleast_2d(np.asarray(point, dtype=float))
+    focus = places if len(places) else meant
     figure, (ax,) = _sheets([camera := best_view(seen, focus)])
     values = None if faces is None else np.where(faces, 0.55, np.nan)
     draw(ax, seen, camera, Paint(values, (0.0, 1.0), "Reds", len(seen.faces) < _MANY))
-    if point is not None:
-        circle(ax, camera, np.asarray(point), radius)
+    for place in places:
+        circle(ax, camera, place, radius)
     if text:
-        top = 0.0 if point is None else camera.project(np.asarray(point)[None])[0][1] + radius
+        top = (camera.project(places)[:, 1] + radius).max(initial=0.0)
         low, high = camera.window[2], camera.window[3]
         above = max(1.0, (top - low) / (high - low))  # clear of the circle
         ax.set_title(fill(text, 72), y=above, **paper.TITLE)
