@@ -1,5 +1,7 @@
 """Pictures: something is drawn, where it should be, and alike with and without VTK."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -66,6 +68,19 @@ def test_every_place_has_its_cross(tmp_path, back_end):
     one = red(apart[0])
     assert one > 10
     assert 2.5 * one < red(apart) < 3.5 * one
+
+
+@pytest.mark.parametrize("point", [None, (0.3, 0.1, 0.0)])
+def test_a_place_is_drawn_alike_wherever_the_origin_is(tmp_path, back_end, point):
+    """A deck in the coordinates of a vehicle lies metres off: its title stays where it is."""
+    faces, sizes = np.ones(len(SEEN.faces), bool), set()
+    for off in (0.0, -5.0, 5.0):
+        place = None if point is None else np.array(point) + off
+        moved = replace(SEEN, points=SEEN.points + off)
+        path = scene.location(tmp_path / "w.png", moved, place, 0.0, "here", faces)
+        with Image.open(path) as image:
+            sizes.add(image.size)
+    assert len(sizes) == 1
 
 
 def test_animation_has_its_frames_and_a_white_ground(tmp_path, back_end):

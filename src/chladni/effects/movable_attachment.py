@@ -241,14 +241,14 @@ def attachments(
         out.append(Candidate(effect, start, context.bases[about]))
 
     chosen: list[int] = []
+    unknown = len(strengths)
     for about in range(len(context.bases)):
-        score = scan.point_scores(about, matrix, strengths)
-        for k in distinct(score.min(axis=1), places.point, chosen, 2):
+        score = scan.point_scores(about, matrix, np.append(strengths, known))
+        for k in distinct(score[:, :unknown].min(axis=1), places.point, chosen, 2):
             chosen.append(k)
             follow(about, strengths, k)
-        for c in known:
-            one = np.array([c])
-            follow(about, one, int(scan.point_scores(about, matrix, one).argmin()))
+        for c, at in zip(known, score[:, unknown:].argmin(axis=0), strict=True):
+            follow(about, np.array([c]), int(at))
     return out
 
 

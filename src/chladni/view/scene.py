@@ -229,7 +229,7 @@ def location(
     for place in places:
         circle(ax, camera, place, radius)
     if text:
-        top = (camera.project(places)[:, 1] + radius).max(initial=0.0)
+        top = (camera.project(places)[:, 1] + radius).max(initial=-np.inf)
         low, high = camera.window[2], camera.window[3]
         above = max(1.0, (top - low) / (high - low))  # clear of the circle
         ax.set_title(fill(text, 72), y=above, **paper.TITLE)
