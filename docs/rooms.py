@@ -7,7 +7,16 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).parents[1]
-GROUND = {"errors", "arrays", "dofs", "units", "output", "progress", "side_by_side"}
+GROUND = {
+    "address_space",
+    "errors",
+    "arrays",
+    "dofs",
+    "units",
+    "output",
+    "progress",
+    "side_by_side",
+}
 
 
 def room(name: tuple[str, ...]) -> str | None:

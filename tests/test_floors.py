@@ -18,7 +18,9 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_evidence": ROOT / "src",
     "chladni_envs": ROOT / "envs",
 }
-GROUND = {"errors", "arrays", "dofs", "units", "output", "progress", "side_by_side"}
+GROUND = {
+    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "side_by_side"
+}  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
     "model": GROUND,

@@ -15,6 +15,7 @@ an ``FRF`` to and from xarray by ``to_xarray`` and ``from_xarray``.
 What is wrong with an input is told by a ``chladni.errors.ChladniError`` in one sentence.
 """
 
+from . import address_space as address_space  # first: NumPy does not start below its limit
 from .model.assembly import Assembly as Assembly
 from .dynamics.eigen import normal_modes as normal_modes
 from .dynamics.frf import FRF as FRF

@@ -186,6 +186,12 @@ def change(folder: Path, old: str, new: str, name: str = "case.toml") -> None:
         ('field = "t"', "", r"line 26: \[parameter\] needs a key field"),
         ('mass_sd = 0.002', 'quantity = "acceleration"', "did you mean 'accelerance'"),
         ('mass_sd = 0.002', 'gain = "free"', "there are known, unknown"),
+        ("mass_sd = 0.002", "delay = 1e9", "line 10: .* delay = 1e.09; .* between -2 and 2"),
+        ("mass_sd = 0.002", "mass_sd = 2", "line 10: .* mass_sd = 2; .* and 1.413"),
+        ("mass_sd = 0.002", "direction_sd = 1e9", "line 10: .* between 0 and 90"),
+        ("mass_sd = 0.002", "position_sd = 1", "line 10: .* between 0 and 0.6"),
+        ("mass_sd = 0.002", "gain_sd = 7", "line 10: .* between 0 and 1"),
+        ('field = "t"', 'field = "E"', r"line 27: .* frees the same numbers .* of line 21;"),
         ("fit = [", "fit = [[", "case.toml is no TOML: .*line 15"),
     ],
 )  # fmt: skip

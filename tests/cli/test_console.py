@@ -50,11 +50,14 @@ def test_tables_are_said_with_all_their_numbers():
     table = Table(("part", "Hz"), [("a", "1.5"), ("longer", "22")], words=("part",))
     assert table_lines(table) == ["part     Hz", "a       1.5", "longer   22"]
     rows = [(str(k), "1") for k in range(60)]
-    why = Table(("what", "why"), [("x" * 60, "because " + "y" * 90)], words=("what", "why"))
-    assert table_lines(why)[1] == f"{'x' * 53}...  because {'y' * 90}"  # the sentence is whole
+    said = ("x" * 60, " ".join(["because"] * 30))
+    lines = table_lines(Table(("what", "why"), [said], words=("what", "why")))[1:]
+    assert lines[0].startswith(f"{said[0]}  because because")
+    assert " ".join(" ".join(lines).split()) == " ".join(said)  # both cells are whole
+    assert max(map(len, lines)) <= 60 + 2 + 110
     lines = table_lines(Table(("mode", "Hz"), rows), most=10)
     assert len(lines) == 12
-    assert lines[-1] == "... 50 more rows in report.html"
+    assert lines[-1] == "50 more rows are in report.html"
 
 
 def test_energy_that_is_in_no_part_has_a_column_of_its_own(tmp_path, deck):
@@ -143,6 +146,48 @@ def test_a_log_that_cannot_be_written_is_a_sentence(deck, tmp_path):
     assert done.exit_code == 2
     assert done.stderr.startswith("chladni: --log ")
     assert not (tmp_path / "o").exists()
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
+def test_a_log_on_a_full_disk_is_refused_at_once_and_ends_no_run(deck, tmp_path, capsys):
+    done = call("modes", deck, "--log", FULL, "--out", tmp_path / "o")
+    assert done.exit_code == 2
+    assert done.stderr == f"chladni: --log {FULL} cannot be written: No space left on device\n"
+    with opened_console(log=tmp_path / "log") as one:
+        one.log.close()
+        one.log = FULL.open("a", encoding="utf-8")  # from here on the disk is full
+        say("worth a word")
+        say("and another")
+    found = capsys.readouterr()
+    assert found.out == "worth a word\nand another\n"
+    assert found.err == f"--log {FULL} ends here: No space left on device\n"
+
+
+def test_memory_that_a_library_lacks_is_no_fault_of_ours(capsys):
+    """A library that finds no room for itself is reported by an ImportError."""
+
+    def command():
+        raise ImportError("libx.so: failed to map segment from shared object")
+
+    assert code_of(command) == 2
+    assert capsys.readouterr().err == "chladni: the memory is not enough for it\n"
+
+
+@pytest.mark.parametrize("words", [["--out", ""], ["--out="]])
+def test_an_empty_folder_is_not_the_current_one(words, deck, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = call("modes", deck, *words)
+    assert done.exit_code == 2
+    assert "'--out': the name is empty" in done.stderr
+    assert list(tmp_path.iterdir()) == [deck]
+
+
+@pytest.mark.parametrize("words", [[], ["blind"]])
+def test_the_list_of_commands_is_whole(words):
+    assert "..." not in call(*words, "--help").stdout.split("Commands:")[1]
 
 
 def test_warnings_of_libraries_go_aside(capsys, tmp_path):

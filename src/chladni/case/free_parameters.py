@@ -1,6 +1,8 @@
 """Which numbers a case frees: a field of parts, of joints by their cards, or an effect by name."""
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +26,30 @@ _CARD = re.compile(r"^\s*([A-Z]+[0-9]?)\s+(\d{1,8})\s*$")
 _LUMPS = {"PBUSH": "bushes", "PELAS": "springs", "CELAS2": "springs", "CONM2": "masses"}
 _OF_LUMPS = {"springs": "K", "bushes": "K", "masses": "M"}
 _WORDS = {"springs": "a spring", "bushes": "a bush", "masses": "a mass"}
+
+
+def free_parameters(
+    sections: Sequence[TomlSection], made: Assembly, deck: Deck | None
+) -> tuple[FreeParameter, ...]:
+    """Every [[parameter]], resolved.
+
+    Raises
+    ------
+    FileError, LabelError
+        As :func:`free_parameter`, and where two free the same numbers: a fit could not tell them
+        apart.
+    """
+    found = tuple(free_parameter(s, made, deck) for s in sections)
+    lines: dict[FreeParameter, int] = {}
+    for section, one in zip(sections, found, strict=True):
+        same = replace(one, name="", parts=(), sd=None, low=None, high=None)
+        if same in lines:
+            raise FileError(
+                f"{section.at('field')} = {section.values['field']!r} frees the same numbers as "
+                f"the [[parameter]] of line {lines[same]}; leave one of them out"
+            )
+        lines[same] = section.line
+    return found
 
 
 def free_parameter(section: TomlSection, made: Assembly, deck: Deck | None) -> FreeParameter:

@@ -24,9 +24,9 @@ from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
 from ..units import UNITS, Units
-from .free_parameters import free_parameter
+from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
-from .mended_recordings import mended, with_frf
+from .mended_recordings import mended, record_length, with_frf
 from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
@@ -176,9 +176,7 @@ def load_case(path: str | Path) -> Case:
         exclude=exclude,
         held_sensors=held_sensors,
         held_band=held_band,
-        parameters=tuple(
-            free_parameter(s, made, deck) for s in keys.sections("parameter", known("parameter"))
-        ),
+        parameters=free_parameters(keys.sections("parameter", known("parameter")), made, deck),
         gain_known=test.text("gain", among=key("test", "gain").choices) != "unknown",
         notes=tuple(notes),
         given=keys.given(),
@@ -231,7 +229,7 @@ def _recordings(
 ) -> tuple[Recording, ...]:
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
-    factor, delay = test.number("factor"), test.number("delay")
+    factor = test.number("factor")
     if factor == 0:
         raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
@@ -245,8 +243,9 @@ def _recordings(
     for section, word, name in listed:
         found = read_recordings(_file(section, word, name, outside), quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
-            alive = without_dead_channels(r)
-            read.append(mended(alive, 1.0 if factor is None else factor, delay or 0.0, sensors))
+            alive, most = without_dead_channels(r), record_length(r)
+            delay = test.number("delay", low=-most, high=most) or 0.0
+            read.append(mended(alive, 1.0 if factor is None else factor, delay, sensors))
     ranked = compared_first(test, stacked(read))
     held = [r for r in ranked if r.frf is not None]
     return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
@@ -276,7 +275,7 @@ def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
     name = test.text("sensors")
     sensors = read_sensors(_file(test, "sensors", name, outside)) if name else ()
     mass = test.number("mass", low=1e-9)
-    mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0))
+    mass_sd = test.number("mass_sd", low=1e-6 * (mass or 0.0), high=mass or 1e300)
     if mass is None and mass_sd is not None:
         raise FileError(f"{test.at('mass_sd')} says how far a mass is known, but there is no mass")
     hangers = test.list("hangers", int) or []
@@ -288,16 +287,15 @@ def _setup(test: TomlSection, made: Assembly, outside: bool) -> TestSetup:
         hangers=tuple(hangers),
         mass=mass,
         mass_sd=_MASS_SD * (mass or 0.0) if mass_sd is None else mass_sd,
-        accuracy=_accuracy(test),
+        accuracy=_accuracy(test, float(np.ptp(made.points, axis=0).max())),
     )
 
 
-def _accuracy(test: TomlSection) -> SensorAccuracy:
-    """How well sensors are known, the usual where nothing is said."""
+def _accuracy(test: TomlSection, size: float) -> SensorAccuracy:
+    """How well sensors are known on a structure of this size, the usual where nothing is said."""
     usual = SensorAccuracy()
-    gain, turn, place = (
-        test.number(key, low=0.0) for key in ("gain_sd", "direction_sd", "position_sd")
-    )
+    most = {"gain_sd": 1.0, "direction_sd": 90.0, "position_sd": size}
+    gain, turn, place = (test.number(key, low=0.0, high=high) for key, high in most.items())
     return SensorAccuracy(
         usual.gain if gain is None else gain,
         usual.direction if turn is None else float(np.radians(turn)),

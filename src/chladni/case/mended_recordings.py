@@ -41,6 +41,16 @@ def with_frf(
     return with_it, found
 
 
+def record_length(r: Recording) -> float:
+    """1 / Δf of the closest spectral lines [s]: no longer delay can be told from a shorter one.
+
+    A recording without lines has no such length: infinite.
+    """
+    if r.frf is None or len(r.frf.frequency) < 2:
+        return float("inf")
+    return float(1 / np.diff(r.frf.frequency).min())
+
+
 def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor]) -> Recording:
     """The FRFs as the case says they are to be read.
 

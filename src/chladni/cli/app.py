@@ -106,9 +106,9 @@ def application() -> typer.Typer:
     for name in COMMANDS:
         module = import_module(f".{name}", __package__)
         if hasattr(module, "STEPS"):
-            app.add_typer(_stepped(module), name=name)
+            app.add_typer(_stepped(module), name=name, short_help=module.HELP)
         else:
-            app.command(name)(guarded(module.run))
+            app.command(name, short_help=_first_sentence(module.run))(guarded(module.run))
     return app
 
 
@@ -116,8 +116,13 @@ def _stepped(module: ModuleType) -> typer.Typer:
     """A command of several steps, each with options of its own."""
     group = typer.Typer(help=module.HELP, no_args_is_help=True, rich_markup_mode=None)
     for step in module.STEPS:
-        group.command(step.__name__)(guarded(step))
+        group.command(step.__name__, short_help=_first_sentence(step))(guarded(step))
     return group
+
+
+def _first_sentence(command: Callable[..., Any]) -> str:
+    """The first paragraph of a docstring, whole: the list of commands would cut what is long."""
+    return " ".join(inspect.cleandoc(command.__doc__ or "").split("\n\n")[0].split())
 
 
 def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -161,11 +166,11 @@ def _run(command: Callable[[], Any]) -> int:
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
         return _said(f"{name}{error.strerror or error}", AT_FAULT)
-    except MemoryError:
-        return _said("the memory is not enough for it", AT_FAULT)
     except KeyboardInterrupt as error:
         return _said(str(error) or "interrupted; nothing was written", INTERRUPTED)
     except Exception as error:  # noqa: BLE001  a fault of ours is said as one, too
+        if _is_short_of_memory(error):
+            return _said("the memory is not enough for it", AT_FAULT)
         for line in traceback.format_exception(error):
             console().aside(line.rstrip())
         at = traceback.extract_tb(error.__traceback__)[-1]
@@ -174,6 +179,12 @@ def _run(command: Callable[[], Any]) -> int:
             f"({Path(at.filename).name}, line {at.lineno}); --verbose shows the whole of it",
             FAILED,
         )
+
+
+def _is_short_of_memory(error: Exception) -> bool:
+    """True also where a library could not be loaded for it."""
+    unloaded = isinstance(error, ImportError) and re.search("failed to map|allocate", str(error))
+    return isinstance(error, MemoryError) or bool(unloaded)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import typer
 
 from ..errors import LabelError, did_you_mean
 from .console import say
+from .run import folder_named
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="What `blind make` wrote.")]
 Word = TypeVar("Word", bound=str)
@@ -21,7 +22,9 @@ def make(
         str, typer.Option("--set", help="As panels, forms, tailgate, outside (of the catalogue).")
     ],
     seeds: Annotated[str, typer.Option(help="First and last, as 500-504.")],
-    out: Annotated[Path, typer.Option("--out", help="A folder of its own.", metavar="DIR")],
+    out: Annotated[
+        Path, typer.Option("--out", help="A folder of its own.", metavar="DIR", parser=folder_named)
+    ],
     purpose: Annotated[
         str, typer.Option(help="tune (seeds below 600) or report (from 600 on).")
     ] = "tune",

@@ -1,15 +1,18 @@
 """What a command says, to the terminal and if asked to a log; a reader may leave at any time."""
 
 import os
+import shlex
 import sys
+import textwrap
 import threading
 import time
 import unicodedata
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import zip_longest
 from pathlib import Path
 from typing import IO
 
@@ -22,7 +25,7 @@ from ..report.blocks import Table
 QUIET = 10.0  # seconds after which a run without a terminal says what it does
 AGAIN = 60.0  # and how often from then on
 ROWS = 24  # of a table on the terminal; the page has them all
-_CELL, _LAST = 56, 110  # characters of a cell, and of a sentence at the end of a row
+_CELL, _LAST = 56, 110  # characters of a cell's line, and of a sentence's at the end of a row
 
 
 @dataclass
@@ -46,10 +49,20 @@ class Console:
         self.logged(text)
 
     def logged(self, text: str) -> None:
-        """A line of the log."""
-        if self.log is not None:
-            self.log.write(f"{datetime.now().isoformat(timespec='seconds')} {plain_line(text)}\n")
-            self.log.flush()
+        """A line of the log; a log that can no longer be written ends, the work goes on."""
+        if self.log is None:
+            return
+        try:
+            self._append(text)
+        except OSError as error:
+            full, self.log = self.log, None
+            _close(full)
+            _echo(f"--log {full.name} ends here: {error.strerror}", True)
+
+    def _append(self, text: str) -> None:
+        assert self.log is not None
+        self.log.write(f"{datetime.now().isoformat(timespec='seconds')} {plain_line(text)}\n")
+        self.log.flush()
 
 
 _used: list[Console] = [Console()]  # the last one speaks
@@ -64,10 +77,7 @@ def opened_console(verbose: bool = False, log: Path | None = None) -> Iterator[C
     FileError
         If the log cannot be written.
     """
-    try:
-        file = None if log is None else log.open("a", encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise FileError(f"--log {log} cannot be written: {error.strerror}") from error
+    file = None if log is None else _opened_log(log)
     one = Console(verbose, file)
     _used.append(one)
     try:
@@ -79,7 +89,25 @@ def opened_console(verbose: bool = False, log: Path | None = None) -> Iterator[C
     finally:
         _used.pop()
         if file is not None:
-            file.close()
+            _close(file)
+
+
+def _close(file: IO[str]) -> None:
+    with suppress(OSError):  # what it could not write was reported
+        file.close()
+
+
+def _opened_log(path: Path) -> IO[str]:
+    """The log with its first line, so that a place that takes no line is refused at once."""
+    file = None
+    try:
+        file = path.open("a", encoding="utf-8", errors="replace")
+        Console(log=file)._append(shlex.join(["chladni", *sys.argv[1:]]))
+    except OSError as error:
+        if file is not None:
+            _close(file)
+        raise FileError(f"--log {path} cannot be written: {error.strerror}") from error
+    return file
 
 
 def console() -> Console:
@@ -121,24 +149,30 @@ def say_table(table: Table) -> None:
 
 
 def table_lines(table: Table, most: int = ROWS) -> list[str]:
-    """The lines of a table: words to the left, numbers to the right.
+    """The lines of a table: words to the left, numbers to the right, long words over several lines.
 
     >>> table_lines(Table(("mode", "Hz"), [("1", "5.2"), ("2", "11.4")]))
     ['mode    Hz', '   1   5.2', '   2  11.4']
     """
     shown = [tuple(table.columns), *(tuple(row) for row in table.rows[:most])]
     cells = [[*map(_cell, row[:-1]), *(_cell(text, _LAST) for text in row[-1:])] for row in shown]
-    width = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    width = [
+        max(len(line) for cell in column for line in cell) for column in zip(*cells, strict=True)
+    ]
     left = [name in table.words for name in table.columns]
-    lines = ["  ".join(_aligned(row, width, left)).rstrip() for row in cells]
+    lines = [
+        "  ".join(_aligned(line, width, left)).rstrip()
+        for row in cells
+        for line in zip_longest(*row, fillvalue="")
+    ]
     if (more := len(table.rows) - most) > 0:
-        lines.append(f"... {more} more rows in report.html")
+        lines.append(f"{more} more rows are in report.html")
     return lines
 
 
-def _cell(text: object, most: int = _CELL) -> str:
-    said = " ".join(str(text).split())
-    return said if len(said) <= most else f"{said[: most - 3]}..."
+def _cell(text: object, most: int = _CELL) -> list[str]:
+    """The lines of a cell; a word is never cut."""
+    return textwrap.wrap(str(text), most, break_long_words=False, break_on_hyphens=False) or [""]
 
 
 def _aligned(row: Sequence[str], width: Sequence[int], left: Sequence[bool]) -> Iterator[str]:

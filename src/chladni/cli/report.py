@@ -10,12 +10,14 @@ from ..report.blocks import Links, Section
 from ..report.diagnosis_json import read_diagnosis
 from ..report.page import write_page
 from .console import say
+from .run import folder_named
 
 
 def run(
     folder: Annotated[Path, typer.Argument(metavar="RUN_FOLDER")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the page goes.", metavar="DIR")
+        Path | None,
+        typer.Option("--out", help="Where the page goes.", metavar="DIR", parser=folder_named),
     ] = None,
     title: Annotated[str, typer.Option(help="Title of the page.")] = "",
 ) -> None:

@@ -21,11 +21,25 @@ from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.loaded_model import is_case
 from .console import console, say, say_table, watched
 
+
+def folder_named(text: str) -> Path:
+    """A folder by its name; an empty one would be the current folder.
+
+    Raises
+    ------
+    typer.BadParameter
+        If the name is empty.
+    """
+    if not text.strip():
+        raise typer.BadParameter("the name is empty; give a folder")
+    return Path(text)
+
+
 Out = Annotated[
     Path | None,
     typer.Option(
         "--out", help="Folder for the results (made if needed); else runs/COMMAND-NAME.",
-        metavar="DIR",
+        metavar="DIR", parser=folder_named,
     ),
 ]  # fmt: skip
 CaseFolder = Annotated[

@@ -244,7 +244,9 @@ def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, 
     modal = normal_modes(built.system, min(n, due + SPARE + 6), points=where)
     rigid = int(rigid_modes(modal).sum())
     above = modal.sel(slice(rigid, None)).with_damping(settings.damping)
-    below = np.flatnonzero(above.frequency <= (settings.f_max or np.inf))
+    below = np.flatnonzero(
+        above.frequency <= (np.inf if settings.f_max is None else settings.f_max)
+    )
     if not len(below):
         raise ModelError(
             f"no flexible mode below {settings.f_max:g} Hz; the first is at "

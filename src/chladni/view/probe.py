@@ -16,6 +16,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ..address_space import address_space_left
 from ..errors import FileError
 from ..output import write_json
 
@@ -57,18 +58,6 @@ def window() -> str | None:
             return None  # a busy machine is no reason to remember "nothing works"
         _keep(store, known)
     return known[key]
-
-
-def address_space_left() -> float:
-    """Bytes that a limit (``ulimit -v``) leaves this process; infinite where there is none."""
-    try:
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    except (ImportError, OSError):  # not on this system
-        return float("inf")
-    return float("inf") if limit == resource.RLIM_INFINITY else float(limit - taken)
 
 
 def opens(window_class: str, seconds: float = 60.0) -> bool:
