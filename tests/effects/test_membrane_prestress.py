@@ -18,6 +18,7 @@ from chladni.effects.membrane_prestress import (
 )
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
+from chladni.model.assembly import Scalars
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
@@ -93,6 +94,31 @@ def test_a_pull_stiffens_a_press_softens_and_both_leave_it_free(sheet):
     assert np.all(pulled[6:] > plain[6:])
     assert np.all(pressed[6:] < plain[6:])
     assert max(pulled[:6].max(), pressed[:6].max()) < 0.01 * plain[6]
+
+
+def test_one_spring_a_pair_of_motions_holds_the_forces_both_ways(sheet):
+    """K is linear in springs: those between the same two motions are one of their sum."""
+    effect, x = prestress(structure(sheet), 0), np.array([0.5, 0.2])
+    both, one_by_one = effect.apply(sheet, x), sheet
+    for tensor, N in zip(effect.tensors, effect.force(x), strict=True):
+        one_by_one = prestressed(one_by_one, 0, tensor, float(N))
+    K, due = (structure(made).system.K for made in (both, one_by_one))
+    assert abs(K - due).max() < 1e-12 * abs(due).max()
+    s = both.springs
+    ends = {
+        frozenset(zip(n, c, strict=True))
+        for n, c in zip(s.nodes.tolist(), s.component.tolist(), strict=True)
+    }
+    assert len(ends) == len(s) < len(one_by_one.springs)
+
+
+def test_springs_of_a_deck_are_not_summed_with_those_of_a_force(sheet):
+    own = Scalars(np.array([900, 901]), np.array([[0, -1]] * 2), np.array([[3, 3]] * 2),
+                  np.array([5.0, 7.0]), np.zeros(2))  # fmt: skip
+    held = replace(sheet, springs=own)
+    made = prestress(structure(held), 0).apply(held, np.array([0.5, 0.2])).springs
+    assert made.ids[:2].tolist() == [900, 901]
+    assert made.value[:2].tolist() == [5.0, 7.0]
 
 
 def test_only_its_part_is_pulled():

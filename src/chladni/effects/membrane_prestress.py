@@ -69,9 +69,10 @@ class MembranePrestress(Effect):
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
         """CELAS2 between the grids of the part, and on the mean turn of its rim."""
+        own = len(assembly.springs)
         for tensor, N in zip(self.tensors, self.force(x), strict=True):
             assembly = prestressed(assembly, self.part, tensor, float(N))
-        return assembly
+        return with_summed_springs(assembly, own)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """N along and across, each with the other where it is."""
@@ -159,6 +160,20 @@ def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> 
     three = np.repeat(np.arange(1, 4), len(k))
     ends = np.column_stack([three, three])
     return _with_springs(made, np.tile(pairs, (3, 1)), ends, np.tile(N * k, 3))
+
+
+def with_summed_springs(assembly: Assembly, own: int) -> Assembly:
+    """The assembly with one spring in place of several between two motions, from row ``own`` on.
+
+    What has no stiffness is left out. The springs must be elastic, as a membrane force's are.
+    """
+    s = assembly.springs
+    motions = np.sort(8 * s.nodes[own:] + s.component[own:], axis=1)[:, ::-1]  # ground is last
+    key, back = np.unique(motions, axis=0, return_inverse=True)
+    value = np.bincount(back.reshape(-1), s.value[own:], len(key))
+    key, value = key[value != 0], value[value != 0]
+    kept = Scalars(s.ids[:own], s.nodes[:own], s.component[:own], s.value[:own], s.damping[:own])
+    return _with_springs(replace(assembly, springs=kept), key // 8, key % 8, value)
 
 
 def pulled_rim(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:

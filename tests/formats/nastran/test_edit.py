@@ -242,3 +242,23 @@ def test_a_folder_the_deck_is_moved_to_decides_names_and_ways(tmp_path):
     assert read_deck(home / "d.bdf")["GRID"].block(3, 1)[:, 0].tolist() == [0.0, 1.0]
     with pytest.raises(FileError, match="is a file the deck was read from"):
         write_deck(deck, scratch / "d.bdf", [SetField("GRID", 1, "X1", 5.0)], home)
+
+
+def test_more_lines_than_the_deck_has_go_to_a_file_of_their_own(bulk):
+    """The deck includes them, keeps its own lines and is read as if they stood in it."""
+    deck = bulk(PLATE, before=CASE)
+    springs = [["CELAS2", 1000 + k, 5.0 + k, 1, 1 + k % 3] for k in range(200)]
+    few, many = Add(springs[:1], "a spring"), Add(springs, "many springs")
+    path = write_deck(deck, deck.path.parent / "out" / "few.bdf", [few])
+    assert "CELAS2" in path.read_text()
+    assert [p.name for p in path.parent.iterdir()] == ["few.bdf"]
+    found, (gone, fresh) = rewritten(deck, many, name="many.bdf")
+    assert not gone
+    assert fresh == [
+        "$ many springs",
+        "$ 201 lines were added, more than this deck has; they are in many_added.bdf",
+        "INCLUDE 'many_added.bdf'",
+    ]
+    assert assembly(found).springs.value.tolist() == [5.0 + k for k in range(200)]
+    again = write_deck(found, found.path.parent / "many.2.bdf", [many])  # nothing read is replaced
+    assert len(read_deck(again)["CELAS2"].words(1)) == 400

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
 from ....errors import FileError
@@ -23,7 +24,9 @@ def write_deck(
     """Write the deck with changes; included files that change are written beside it.
 
     An included file keeps its relative name where it can; INCLUDE statements are adapted where
-    they would no longer find their file. The files that were read are never written to.
+    they would no longer find their file. The files that were read are never written to. Where more
+    lines are added than the deck has, they go to a file of their own, which the deck includes:
+    the deck stays one that a person reads.
 
     Parameters
     ----------
@@ -40,12 +43,14 @@ def write_deck(
     final = Path(home or path.parent) / path.name
     if final.resolve() in {s.path.resolve() for s in deck.sources}:
         raise FileError(f"{final} is a file the deck was read from; choose another name")
-    edits = _edits(deck, changes)
+    edits, footer = _edits(deck, changes), _footer(deck, changes)
+    if len(footer) > sum(len(s.lines) for s in deck.sources):
+        footer = _apart(deck, path, final, footer)
     places = _places(deck, final, set(edits))
     for k in sorted(places, reverse=True):
         source = deck.sources[k]
         new = {**edits.get(k, {}), **_includes(deck, source, places[k], places)}
-        text = _text(source, new, _footer(deck, changes) if k == 0 else [])
+        text = _text(source, new, footer if k == 0 else [])
         target = path.parent / places[k].relative_to(final.parent)
         atomic(target, lambda part, text=text: part.write_bytes(text))  # type: ignore[misc]
     return path
@@ -88,6 +93,17 @@ def _footer(deck: Deck, changes: Sequence[Change]) -> list[str]:
         for values in change.cards:
             out += card(str(values[0]), values[1:])
     return out
+
+
+def _apart(deck: Deck, path: Path, final: Path, footer: list[str]) -> list[str]:
+    """Write the added lines beside the deck; what stands in the deck in their place."""
+    originals = {s.path.resolve() for s in deck.sources}
+    stems = (f"{path.stem}_added{k or ''}.bdf" for k in count())
+    name = next(n for n in stems if final.with_name(n).resolve() not in originals)
+    atomic(path.with_name(name), lambda part: part.write_bytes(b"".join(_ended(footer, b"\n"))))
+    said = f"$ {len(footer)} lines were added, more than this deck has; they are in {name}"
+    comments = [line for line in footer if line.startswith("$")]
+    return [*comments, said, *_statement(name)]
 
 
 def _text(source: Source, new: Lines, footer: list[str]) -> bytes:
