@@ -185,6 +185,25 @@ def test_an_empty_folder_is_not_the_current_one(words, deck, tmp_path, monkeypat
     assert list(tmp_path.iterdir()) == [deck]
 
 
+@pytest.mark.parametrize("x", ["nan", "inf", "1e400"])
+def test_numbers_of_options_are_finite(deck, tmp_path, x):
+    done = call("identify", deck, "--pick", 3.0, "--pick", x, "--out", tmp_path / "o")
+    assert done.exit_code == 2
+    assert done.stderr == f"chladni: --pick {float(x):g} is not a finite number\n"
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="names of files are UTF-8 there")
+def test_a_deck_whose_name_is_no_text(deck, tmp_path):
+    odd = deck.rename(os.fsdecode(os.fsencode(tmp_path) + b"/d\xff.bdf"))
+    for k, words in enumerate((["modes", odd], ["frf", odd])):
+        done = call(*words, "--out", tmp_path / f"o{k}")
+        assert done.exit_code == 0, done.output
+    done = call("init", odd, "--units", "SI", "--out", tmp_path / "case")
+    assert done.exit_code == 2
+    assert done.stderr.endswith("rename this file or its folder\n")
+    assert not (tmp_path / "case").exists()
+
+
 @pytest.mark.parametrize("words", [[], ["blind"]])
 def test_the_list_of_commands_is_whole(words):
     assert "..." not in call(*words, "--help").stdout.split("Commands:")[1]

@@ -1,5 +1,6 @@
 """A damaged file ends in one sentence that names it, whatever library stumbled over it."""
 
+import wave
 import zipfile
 from pathlib import Path
 
@@ -8,9 +9,10 @@ import pytest
 
 from chladni.case.toml_sections import read_keys
 from chladni.dynamics.frf import FRF
-from chladni.errors import ChladniError
+from chladni.errors import ChladniError, FileError
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.read_tables import read_csv, read_npz
+from chladni.io.time.read_time import read_wav
 from chladni.io.uff.read_uff import read_uff, write_uff
 from chladni.units import UNITS
 
@@ -33,6 +35,7 @@ GOOD = {
         ("variance", np.full((6, 2, 1), "<script>"), "variance holds <U8"),
         ("outputs", np.array(["1:+Z", "1:+Z"]), "output 1:.Z is there twice"),
         ("frequency_hz", np.append(F[:-1], np.inf), "negative or not a number"),
+        ("frequency_hz", F[:, None], r"frequencies are \(6, 1\); one list is due"),
         ("frequency_hz", F - 15.0, "negative or not a number"),
         ("huge", np.zeros(3), "unknown array huge"),
         ("quantity", np.array(["mobility", "mobility"]), "quantity holds 2 texts; it is one"),
@@ -225,3 +228,17 @@ def test_a_header_of_an_npz_that_breaks_off_is_a_sentence(tmp_path: Path) -> Non
     with pytest.raises(ChladniError, match=r"a\.npz") as caught:
         read_npz(tmp_path / "a.npz")
     assert "('" not in str(caught.value)
+
+
+def test_a_wav_without_channels_is_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(1000)
+        file.writeframes(bytes(400))
+    data = bytearray(path.read_bytes())
+    data[22:24] = bytes(2)  # nChannels of the format chunk
+    path.write_bytes(data)
+    with pytest.raises(FileError, match=r"a\.wav cannot be read as WAV: .* 0 channels"):
+        read_wav(path)

@@ -121,6 +121,8 @@ def test_include(tmp_path):
         ("*ELEMENT_SHELL_THICKNESS", "*ELEMENT_SHELL", "is no number in .ELEMENT_SHELL$"),
         ("            0.70            0.71            0.72            0.72\n", "", "2 per element"),
         ("*NODE", "*INCLUDE\nnowhere.k\n*NODE", "no file 'nowhere.k'"),
+        ("*NODE", "*INCLUDE\nbad.k\n*NODE", "line 4: 'bad.k' includes itself"),
+        ("            0.62", "             nan", "line 10: nan is no number"),
         (FIXED, "*KEYWORD\n*END\n", "both are needed"),
     ],
 )
@@ -164,6 +166,37 @@ def test_vtu(tmp_path):
 
 def scaled(data):
     return [1e3 * d for d in data] if isinstance(data, list) else 1e3 * data
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<VTKFile></VTKFile>",
+        '<!DOCTYPE x [<!ENTITY a "1">]><VTKFile type="UnstructuredGrid">&a;</VTKFile>',
+        '<VTKFile type="UnstructuredGrid"><UnstructuredGrid/></VTKFile>',
+        "",
+    ],
+)
+def test_a_damaged_mesh_is_one_sentence(tmp_path, capsys, text):
+    """The library that reads it prints and ends the process, or lets any exception pass."""
+    path = tmp_path / "bad.vtu"
+    path.write_text(text)
+    with pytest.raises(FileError, match=r"bad\.vtu cannot be read as a mesh: "):
+        read_formed(path)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("x", ["nan", "1e400"])
+def test_places_are_numbers(tmp_path, x):
+    path = tmp_path / "bad.csv"
+    path.write_text(f"node,x,y,z,thickness\n1,0,0,0,1\n2,{x},0,0,1\n")
+    with pytest.raises(FileError, match=r"bad\.csv: the place of node 2 is not three numbers"):
+        read_formed(path)
+
+
+def test_cells_have_nodes():
+    with pytest.raises(ModelError, match="none of the 3 nodes"):
+        FormedMesh(np.arange(3), np.eye(3), np.array([[0, 1, 3, 3]]), np.ones(1), np.ones((1, 4)))
 
 
 def test_csv(tmp_path):

@@ -1,5 +1,7 @@
 """The page: everything inside, everything escaped, every verdict a sentence."""
 
+import copy
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -7,11 +9,13 @@ from html.parser import HTMLParser
 import pytest
 
 from chladni.errors import FileError
+from chladni.output import plain
 from chladni.report.blocks import Facts, Items, Picture, Section, Table, Text
-from chladni.report.diagnosis_json import diagnosis_json, from_json
+from chladni.report.diagnosis_json import diagnosis_json, from_json, read_diagnosis
 from chladni.report.page import write_page, write_sections
 from chladni.report.sentence import sentence
 from chladni.report.states_table import states_table
+from chladni.report.typed_fields import wrong_field
 from chladni.report.verdict import HEADING
 from chladni.updating.result import FrequencyError
 from chladni.view import plots
@@ -182,6 +186,45 @@ def test_a_page_can_be_written_again_from_its_json():
     assert diagnosis_json(from_json(written)) == written
     for key, value in DIAGNOSIS.items():
         assert set(value) <= set(written[key]) if isinstance(value, dict) else written[key]
+
+
+def _places(value, at=()):
+    """The path of every value in plain data."""
+    yield at
+    listed = dict(enumerate(value)) if isinstance(value, list) else value
+    for key, one in listed.items() if isinstance(listed, dict) else ():
+        yield from _places(one, (*at, key))
+
+
+@pytest.mark.parametrize("bad", [{}, [1], "x", "", True, 10**400, -1, None, [["x"]]], ids=repr)
+def test_a_damaged_diagnosis_is_read_or_refused_in_a_sentence(tmp_path, bad):
+    """Any one value of another kind: what is read back has the types that the page counts on."""
+    whole, path = plain(diagnosis_json(RESULT)), tmp_path / "diagnosis.json"
+    refused = 0
+    for *way, last in (at for at in _places(whole) if at):
+        damaged = copy.deepcopy(whole)
+        holder = damaged
+        for key in way:
+            holder = holder[key]
+        holder[last] = bad
+        path.write_text(json.dumps(damaged))
+        try:
+            found = read_diagnosis(tmp_path)
+        except FileError:
+            refused += 1
+        else:
+            assert wrong_field(found) == ""
+    assert refused or bad is None
+
+
+def test_a_field_of_another_type_is_named():
+    assert wrong_field(RESULT) == ""
+    effect = replace(RESULT.effects[0], log_evidence="much")
+    found = wrong_field(replace(RESULT, effects=(effect,)))
+    assert found == "effects[0].log_evidence holds 'much'"
+    wrong = replace(RESULT.effects[0].where, parts=("a", 7))
+    found = wrong_field(replace(RESULT, effects=(replace(effect, log_evidence=1, where=wrong),)))
+    assert found == "effects[0].where.parts[1] holds 7"
 
 
 def test_values_that_the_deck_keeps_are_not_called_calibrated(tmp_path):

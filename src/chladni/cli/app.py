@@ -2,6 +2,7 @@
 
 import functools
 import inspect
+import math
 import os
 import re
 import signal
@@ -17,7 +18,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import AccuracyError, ChladniError
+from ..errors import AccuracyError, ChladniError, FileError
 from .console import console, opened_console, say
 
 COMMANDS = (  # each a module here with a function ``run``, or ``STEPS`` of a command with several
@@ -135,7 +136,7 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
         code = DONE
         try:
             with opened_console(verbose, log), _ending():
-                code = _run(lambda: command(*args, **options))
+                code = _run(lambda: command(*args, **_finite(options)))
         except ChladniError as error:  # the log itself
             code = _said(error, AT_FAULT)
         raise typer.Exit(code)
@@ -151,6 +152,21 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     inner.__annotations__ = {**command.__annotations__, **more}
     return inner
+
+
+def _finite(options: dict[str, Any]) -> dict[str, Any]:
+    """The options of a command, unchanged.
+
+    Raises
+    ------
+    FileError
+        If one holds ``nan`` or ``inf``, which Python takes for numbers.
+    """
+    for name, value in options.items():
+        numbers = value if isinstance(value, list) else [value]
+        for x in (x for x in numbers if isinstance(x, float) and not math.isfinite(x)):
+            raise FileError(f"--{name.replace('_', '-')} {x:g} is not a finite number")
+    return options
 
 
 def _run(command: Callable[[], Any]) -> int:

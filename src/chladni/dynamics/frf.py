@@ -67,6 +67,8 @@ class FRF:
             raise LabelError(
                 f"no quantity {self.quantity!r}; there are {named(get_args(Quantity))}"
             )
+        if np.ndim(self.frequency) != 1:
+            raise ShapeError(f"frequencies are {np.shape(self.frequency)}; one list is due")
         if np.any(np.diff(self.frequency) <= 0):
             k = int(np.argmax(np.diff(self.frequency) <= 0))
             f = self.frequency[k : k + 2]

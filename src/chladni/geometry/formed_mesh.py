@@ -39,6 +39,11 @@ class FormedMesh:
                 f"thickness is {self.thickness.shape}, cells {self.cells.shape}, "
                 f"part {self.part.shape}; one row per cell is due"
             )
+        if not np.isfinite(self.points).all():
+            row = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
+            raise ModelError(f"the place of node {self.ids[row]} is not three numbers")
+        if self.cells.size and not 0 <= self.cells.min() <= self.cells.max() < len(self.points):
+            raise ModelError(f"a cell has a corner that is none of the {len(self.points)} nodes")
         if not len(self.nodal):
             object.__setattr__(self, "nodal", self._nodal())
         known = self.nodal[np.isfinite(self.nodal)]

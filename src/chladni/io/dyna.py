@@ -5,18 +5,22 @@ Keyword User's Manual, Vol. I). Shells without thicknesses of their own take the
 Everything is converted to SI here.
 """
 
+import io
 from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import ChladniError, FileError
 from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named
+from .damage import DAMAGED
 from .file_size import refuse_large
 
 _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
@@ -38,8 +42,9 @@ class _Block:
         return FileError(f"{self.source}, line {self.at[row]}: {what} in *{self.keyword}")
 
 
-def _blocks(path: Path) -> Iterator[_Block]:
-    """The keyword blocks of a file and of those it includes."""
+def _blocks(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Block]:
+    """The keyword blocks of a file and of those it includes; ``above`` includes this one."""
+    above = (*above, path.resolve())
     try:
         refuse_large(path)
         text = path.read_text(encoding="latin-1")
@@ -51,7 +56,7 @@ def _blocks(path: Path) -> Iterator[_Block]:
             continue
         if line.startswith("*"):
             if block is not None:
-                yield from _resolved(block)
+                yield from _resolved(block, above)
             name = line[1:].split()[0].upper() if line[1:].split() else ""
             if name == "END":
                 return
@@ -63,7 +68,7 @@ def _blocks(path: Path) -> Iterator[_Block]:
             block.lines.append(line)
             block.at.append(number)
     if block is not None:
-        yield from _resolved(block)
+        yield from _resolved(block, above)
 
 
 def _format(line: str, default: str) -> str:
@@ -72,7 +77,7 @@ def _format(line: str, default: str) -> str:
     return "%" if "I10=Y" in line else default
 
 
-def _resolved(block: _Block) -> Iterator[_Block]:
+def _resolved(block: _Block, above: tuple[Path, ...]) -> Iterator[_Block]:
     """The block itself, or the blocks of the file it includes."""
     if block.keyword != "INCLUDE":
         yield block
@@ -82,7 +87,9 @@ def _resolved(block: _Block) -> Iterator[_Block]:
             other = block.source.parent / line.strip()
             if not other.is_file():
                 raise block.fault(row, f"no file {line.strip()!r}")
-            yield from _blocks(other)
+            if other.resolve() in above:
+                raise block.fault(row, f"{line.strip()!r} includes itself")
+            yield from _blocks(other, above)
 
 
 def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -> np.ndarray:
@@ -100,10 +107,14 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
         words = np.char.strip(np.column_stack([c.ravel().astype("U32") for c in columns]))
     words[words == ""] = "0"
     try:
-        return words.astype(kind)
-    except ValueError:
+        values = words.astype(kind)
+    except (ValueError, OverflowError):
         row, word = _first_bad(words, kind)
         raise block.fault(int(rows[row]), f"{word!r} is no number") from None
+    if not np.isfinite(values).all():
+        row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(values)))
+        raise block.fault(int(rows[row]), f"{words[row, column]} is no number")
+    return values
 
 
 def _split(line: str, widths: Sequence[int]) -> list[str]:
@@ -266,11 +277,17 @@ def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     unit = units_named(units)
     if path.is_file():
         refuse_large(path)
+    read = read_keyword
     if path.suffix.lower() == ".csv":
-        return _read_csv(path, unit)
+        read = _read_csv
     if path.suffix.lower() in (".vtu", ".vtk", ".msh", ".xdmf", ".ply"):
-        return _read_mesh(path, unit)
-    return read_keyword(path, unit)
+        read = _read_mesh
+    try:
+        return read(path, unit)
+    except FileError:
+        raise
+    except ChladniError as error:  # of the mesh itself
+        raise FileError(f"{path}: {error}") from error
 
 
 def _read_csv(path: Path, unit: Units) -> FormedMesh:
@@ -300,12 +317,32 @@ def _read_csv(path: Path, unit: Units) -> FormedMesh:
 
 def _read_mesh(path: Path, unit: Units) -> FormedMesh:
     """Quads and triangles of a mesh file with nodal or elemental thickness."""
+    mesh = _meshio(path)
+    try:
+        return _formed_of(path, mesh, unit)
+    except ChladniError:
+        raise
+    except DAMAGED as error:
+        raise FileError(f"{path} cannot be read as a mesh: {error}") from error
+
+
+def _meshio(path: Path) -> Any:
+    """A mesh by meshio, which prints the reason and ends the process where it cannot read one."""
     import meshio
 
+    said = io.StringIO()
     try:
-        mesh = meshio.read(path)
-    except (OSError, ValueError, meshio.ReadError) as error:
-        raise FileError(f"{path} cannot be read as a mesh: {error}") from error
+        with redirect_stdout(said), redirect_stderr(said):
+            return meshio.read(path)
+    except SystemExit:
+        why = " ".join(said.getvalue().split())
+        raise FileError(f"{path} cannot be read as a mesh: {why or 'it is damaged'}") from None
+    except (*DAMAGED, meshio.ReadError) as error:
+        why = f"there is no {error}" if isinstance(error, KeyError) else str(error)
+        raise FileError(f"{path} cannot be read as a mesh: {why}") from error
+
+
+def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:
     cells, t, part = [], [], []
     for k, block in enumerate(mesh.cells):
         if block.type in ("quad", "triangle"):

@@ -26,6 +26,7 @@ from ..updating.result import (
 from ..workflows.diagnosis_result import Compared, DiagnosisResult, StateResult
 from .level_blocks import level_json, read_levels
 from .screening_blocks import read_screening, screening_json
+from .typed_fields import wrong_field
 
 Row = TypeVar("Row")
 _Q = {  # key: field of Scores
@@ -240,11 +241,15 @@ def read_diagnosis(folder: Path) -> DiagnosisResult:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise FileError(f"{path}: {error.strerror}; a run of `chladni diagnose` has one") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise FileError(f"{path} is no JSON: {error}") from error
     if not isinstance(found, dict) or "verdict" not in found:
         raise FileError(f"{path} holds no verdict, so it is no diagnosis")
     try:
-        return from_json(found)
-    except (KeyError, TypeError, AttributeError) as error:
-        raise FileError(f"{path} does not have the form of a diagnosis: {error}") from error
+        result = from_json(found)
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        why = f"no key {error}" if isinstance(error, KeyError) else str(error)
+        raise FileError(f"{path} does not have the form of a diagnosis: {why}") from error
+    if wrong := wrong_field(result):
+        raise FileError(f"{path} does not have the form of a diagnosis: {wrong}")
+    return result

@@ -93,8 +93,13 @@ def draft(
     Raises
     ------
     FileError
-        If a file cannot be read, or the unit system cannot be told.
+        If a file cannot be read, if its name is no text, or the unit system cannot be told.
     """
+    for path in (deck, *recordings):
+        if not str(path).isprintable():
+            raise FileError(
+                f"{path}: a case.toml holds printable UTF-8 alone; rename this file or its folder"
+            )
     bare = load_deck(deck, None, allow)
     if units is None:
         guess = guessed_units(assembly(bare.deck), deck.name)

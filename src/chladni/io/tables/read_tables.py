@@ -1,11 +1,9 @@
 """Recordings as tables in: FRF in CSV and NPZ, poles in CSV (SI, UTF-8)."""
 
 import zipfile
-import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tokenize import TokenError
 from typing import cast, get_args
 
 import numpy as np
@@ -15,6 +13,7 @@ from ...ema.response_correlations import of_responses
 from ...ema.setup import PoleTable, Recording
 from ...ema.time_record import TimeRecord
 from ...errors import ChladniError, FileError, named
+from ..damage import DAMAGED
 from ..file_size import refuse_large
 from ..time.read_time import read_mat, read_time_csv, read_time_npz, read_wav
 from ..time.time_channels import is_time, only_known
@@ -259,7 +258,7 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
             arrays = {name: file[name] for name in file.files}
     except FileError:
         raise
-    except _DAMAGED as error:
+    except DAMAGED as error:
         why = error.args[0] if error.args else error
         raise FileError(f"{path.name} cannot be read as NPZ: {why}") from error
     if timed:
@@ -289,12 +288,6 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
         level = float(found.reshape(-1)[0])
     article = _word(path, arrays, "article") if "article" in arrays else ""
     return Recording(path.name, frf, level=level, article=article)
-
-
-_DAMAGED = (
-    *(ValueError, TypeError, OSError, EOFError, RuntimeError, MemoryError, KeyError),
-    *(zipfile.BadZipFile, zlib.error, NotImplementedError, OverflowError, SyntaxError, TokenError),
-)
 
 
 def _only_known(path: Path, names: Sequence[str]) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...ema.time_record import TimeRecord
 from ...errors import FileError, not_text
+from ..damage import DAMAGED
 from ..file_size import refuse_large
 from ..tables.csv_table import read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
@@ -33,8 +34,9 @@ def read_wav(path: Path) -> Read:
 
     try:
         rate, x = wavfile.read(path)
-    except _DAMAGED as error:
-        raise FileError(f"{path.name} cannot be read as WAV: {error}") from error
+    except DAMAGED as error:
+        why = "its header holds 0 channels" if isinstance(error, ZeroDivisionError) else error
+        raise FileError(f"{path.name} cannot be read as WAV: {why}") from error
     x = np.atleast_2d(x.T)
     if not described(path).is_file():
         raise FileError(
@@ -68,7 +70,7 @@ def read_mat(path: Path) -> Read:
     try:
         refuse_large(path, sum(8 * prod(shape) for _, shape, _ in whosmat(str(path))), "unpacks to")
         held = loadmat(str(path), squeeze_me=True, struct_as_record=False)
-    except (*_DAMAGED, MatReadError) as error:
+    except (*DAMAGED, MatReadError) as error:
         raise FileError(f"{path.name} cannot be read as MAT: {error}") from error
     held = {k: v for k, v in held.items() if not k.startswith("__")}
     records = [r for v in held.values() for r in np.ravel(np.array(v, dtype=object))
@@ -204,9 +206,3 @@ def _described(path: Path, raw: list[TimeChannel]) -> list[TimeChannel]:
         unit = table.columns["unit"][k] or called[word].unit
         out.append(TimeChannel(label, unit, scale * called[word].values, role))
     return out
-
-
-_DAMAGED = (
-    *(ValueError, TypeError, OSError, EOFError, KeyError, IndexError, NotImplementedError),
-    *(MemoryError, OverflowError, AttributeError, UnboundLocalError),
-)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .write_uff import write_sets
+from .write_uff import uff_text, write_sets
 
 
 def write_shapes(
@@ -31,7 +31,7 @@ def write_shapes(
     """
     nodes = dict(zip(ids.tolist(), places, strict=True))
     shapes = (
-        _shape(k + 1, float(f), damping, ids, motion[:, :, k], title)
+        _shape(k + 1, float(f), damping, ids, motion[:, :, k], uff_text(title))
         for k, f in enumerate(frequency)
     )
     return write_sets(path, nodes, title, shapes)

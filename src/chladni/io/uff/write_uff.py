@@ -44,7 +44,12 @@ def write_uff(
     frf : FRF          labels as 412:+Z; 412:n is written as a scalar, base:+Z as node 0
     nodes : {node: (3,)}  places [m]
     """
-    write_sets(path, nodes or {}, title, _blocks(frf, title, binary))
+    write_sets(path, nodes or {}, title, _blocks(frf, uff_text(title), binary))
+
+
+def uff_text(name: str) -> str:
+    """A name as a file can hold it: bytes that are no UTF-8 become question marks."""
+    return name.encode("utf-8", "replace").decode()
 
 
 def write_sets(
@@ -54,7 +59,7 @@ def write_sets(
 
     def write(part: Path) -> None:
         part.unlink()  # pyuff writes into files of its own
-        _write_head(part, nodes, title)
+        _write_head(part, nodes, uff_text(title))
         with part.open("ab") as file:
             file.writelines(blocks)
 
