@@ -67,11 +67,15 @@ def folded_panel(
     points, nodes = grid(np.linspace(0, length, nx + 1), s)
     x, s = points[:, 0], points[:, 1]
     y = np.clip(s, 0, width)
-    bulge = 4 * rise * (y / width) * (1 - y / width) * (1 - (2 * x / length - 1) ** 2 / 2)
-    points = np.column_stack([x, y, bulge - np.abs(s - y)])
+    points = np.column_stack([x, y, bulge(x / length, y / width, rise) - np.abs(s - y)])
     middle = s[nodes].mean(axis=1)
     part = ((middle < 0) | (middle > width)).astype(np.int64)
     return sheet(points, nodes, t, material, part=part, names=("panel", "flanges"))
+
+
+def bulge(x: np.ndarray, y: np.ndarray, rise: float) -> np.ndarray:
+    """Height of the folded panel's sheet at shares x, y of its length and width [m]."""
+    return np.asarray(4 * rise * y * (1 - y) * (1 - (2 * x - 1) ** 2 / 2))
 
 
 def box(

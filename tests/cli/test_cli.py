@@ -1,6 +1,8 @@
 """The command line: what it writes; one sentence and exit 2 for whatever is wrong with a file."""
 
+import inspect
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +14,13 @@ from chladni.case import load_case
 from chladni.cli.app import COMMANDS, application, guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
+from chladni.io.dyna import read_formed
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
 from chladni.workflows.diagnosis_pipeline import _deck
 from chladni.workflows.question_of_case import question
+from chladni_specimens.plates import box, folded_panel, plate
+from chladni_specimens.tailgate.design import TailgateDesign
 
 NEEDED = {  # extra arguments a command cannot do without
     "frf": ["--input", "1:+Z", "--output", "9:+Z"],
@@ -210,6 +215,18 @@ def test_clearance_of_two_plates(tmp_path):
     assert pair["least"] == pytest.approx(2e-3, abs=1e-6)
     assert not pair["touching"]
     assert "first contact" in (out / "report.html").read_text()
+
+
+def test_a_rigid_motion_closes_no_gap_and_stops_no_picture(tmp_path):
+    """Modes 1 to 8: all are drawn, contacts are of the two elastic ones."""
+    deck, out = tmp_path / "two.bdf", tmp_path / "out"
+    deck.write_text(plates([0.0, 0.003]))
+    done = call("render", deck, "--clearance", "--modes", "1-8", "--units", "SI", "--out", out)
+    assert done.exit_code == 0, done.output
+    page = (out / "report.html").read_text()
+    assert "A rigid motion closes no gap" in page
+    table = page.split("first contact")[1].split("</table>")[0]
+    assert re.findall(r"<td[^>]*>(\d)</td>", table) == ["7", "8"]
 
 
 def test_one_plate_has_no_clearance(tmp_path):
@@ -499,12 +516,39 @@ def test_a_bad_option_names_itself(deck, tmp_path, arguments, named):
         (["plate", "--set", "length=a"], "number"),
         (["tailgate", "--size", "1"], "6 to 32"),
         (["panel", "--set", "t"], "KEY=VALUE"),
+        (["panel", "--set", "lenght=1"], "there are length, width, depth, rise, h, t\n"),
+        (["plate", "--size", "0.1"], "--size counts in mm, 1 mm is the least"),
+        (["panel", "--size", "0.1"], "--size counts in mm"),
+        (["box", "--set", "h=1e-4"], "--size counts in mm"),
     ],
 )
 def test_a_wrong_specimen_names_the_right_ones(tmp_path, arguments, named):
     done = call("specimen", *arguments, "--out", tmp_path / "x")
     assert done.exit_code == 2, (done.output, done.exception)
     assert named in done.stderr
+
+
+def test_every_setting_of_a_specimen_is_in_its_help():
+    shown = " ".join(call("specimen", "--help").stdout.split())
+    for build in (folded_panel, box, plate, TailgateDesign):
+        names = [n for n in inspect.signature(build).parameters if n != "material"]
+        assert ", ".join(names) in shown
+
+
+def test_the_panel_comes_with_its_formed_thickness(tmp_path):
+    """Forming thins: nowhere above the gauge, thinnest in the folds; its parts are the deck's."""
+    done = call("specimen", "panel", "--size", 60, "--set", "t=0.8e-3", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    formed = read_formed(tmp_path / "formed_thickness.k", "mm-t-s")
+    assert formed.names == {1: "panel", 2: "flanges"}
+    assert formed.nodal.max() <= 0.8e-3 + 1e-7
+    y = formed.points[:, 1]
+    fold = np.minimum(y, 0.3 - y) < 3e-3
+    middle = np.abs(y - 0.15) < 0.1
+    assert formed.nodal[fold].min() < 0.95 * formed.nodal[middle].min()
+    facts = json.loads((tmp_path / "specimen.json").read_text())
+    assert facts["mass_formed_kg"] < facts["mass_kg"]
+    assert [part["part"] for part in facts["mapping"]] == ["panel", "flanges"]
 
 
 def test_out_must_be_a_folder(deck):

@@ -15,7 +15,7 @@ from .run import Allow, Out, Units, place_of, started
 
 def run(
     source: Annotated[Path, typer.Argument(metavar="DECK")],
-    recordings: Annotated[list[Path] | None, typer.Argument(metavar="[RECORDING]...")] = None,
+    recordings: Annotated[list[Path] | None, typer.Argument(metavar="RECORDING")] = None,
     sensors: Annotated[
         Path | None, typer.Option(help="A table of sensors, as chladni plan writes it.")
     ] = None,

@@ -41,7 +41,13 @@ def run(
     mass: Annotated[float, typer.Option(help="Mass of one sensor [kg].", min=0.0)] = 0.005,
     drawn: Annotated[
         int,
-        typer.Option(help="Models with drawn thickness the layout must serve.", min=0, max=1000),
+        typer.Option(
+            "--drawn",
+            "--ensemble",
+            help="Models of the ensemble, their thickness drawn, that the layout must serve.",
+            min=0,
+            max=1000,
+        ),
     ] = 20,
     detect: Annotated[
         bool,

@@ -56,7 +56,7 @@ def run(
         job.notes += model.notes
         count = max([0, *chosen, *(gif or []), *(energy or [])])
         shown = sorted({*chosen, *(gif or []), *(energy or [])})
-        modal = _modal(job, model, count, shown if clearance else energy or [])
+        modal = _modal(job, model, count, energy or [])
         job.progress("pictures", 0.6)
         _still(job, model, thickness)
         if modal is not None:
@@ -101,8 +101,8 @@ def _modal(job: Run, model: Model, count: int, deforming: Sequence[int]) -> Moda
     rigid = int(rigid_modes(modal).sum())
     if still := [k for k in deforming if k <= rigid]:
         raise FileError(
-            f"{job.source}: mode {still[0]} is a rigid motion, which strains nothing and closes no "
-            f"gap; the first elastic mode is {rigid + 1}"
+            f"{job.source}: mode {still[0]} is a rigid motion, which strains nothing; the first "
+            f"elastic mode is {rigid + 1}"
         )
     if rigid:
         job.notes.append(f"Modes 1 to {rigid} are rigid motions; the first elastic is {rigid + 1}.")
@@ -184,7 +184,11 @@ def _clearance(job: Run, model: Model, modal: ModalModel | None, chosen: list[in
     job.json("clearance.json", [asdict(p) for p in pairs], "clearance of each pair of parts")
     blocks: list[Block] = [Picture(path, _GREY), _pairs(pairs)]
     if modal is not None:
-        blocks.append(_rattle(model, modal, chosen, found))
+        rigid = int(rigid_modes(modal).sum())
+        if elastic := [k for k in chosen if k > rigid]:
+            blocks.append(_rattle(model, modal, elastic, found))
+        if len(elastic) < len(chosen):
+            job.notes.append("A rigid motion closes no gap, so it is not in the table of contacts.")
     job.section("Clearance", blocks)
 
 

@@ -5,19 +5,19 @@ import inspect
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chladni_specimens.formed_panel import formed_panel
 from chladni_specimens.plates import box, folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.formed_thickness import forming_mesh
 from chladni_specimens.tailgate.skin import Skin
 from chladni_specimens.tailgate.tailgate import FormedSpecimen, tailgate_specimen
 
-from ..errors import ChladniError, FileError, LabelError, ModelError
+from ..errors import ChladniError, FileError, LabelError, ModelError, did_you_mean
 from ..fem.energy import mass_properties
 from ..geometry.formed_mesh import FormedMesh
 from ..geometry.thickness_mapping import Mapped
@@ -33,16 +33,38 @@ if TYPE_CHECKING:
     from ..planning import SensorCandidates
 
 
+def settings_of(build: Callable[..., Any]) -> list[str]:
+    """Keywords that --set may give a builder."""
+    return [n for n in inspect.signature(build).parameters if n != "material"]
+
+
+_BUILT: dict[str, Callable[..., Any]] = {
+    "panel": folded_panel,
+    "box": box,
+    "plate": plate,
+    "tailgate": TailgateDesign,
+}
+SETTINGS = "; ".join(f"{name}: {', '.join(settings_of(build))}" for name, build in _BUILT.items())
+MOST_SHELLS = 200_000  # that a specimen may have: beyond, hours pass before a mode is known
+
+
 def run(
-    name: Annotated[str, typer.Argument(help="tailgate, panel, box or plate.")],
+    name: Annotated[str, typer.Argument(help="tailgate, panel, box or plate.", metavar="NAME")],
     size: Annotated[float | None, typer.Option(help="Element size [mm].", min=0.1)] = None,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", help="KEY=VALUE in SI (repeatable).")
+        list[str] | None,
+        typer.Option(
+            "--set", help=f"KEY=VALUE in SI (repeatable): {SETTINGS}", metavar="KEY=VALUE"
+        ),
     ] = None,
     units: Annotated[str, typer.Option(help="Unit system of the deck.")] = "mm-t-s",
     out: Out = None,
 ) -> None:
-    """A generated structure: its deck, formed thickness (LS-DYNA), candidates for sensors."""
+    """A generated structure: its deck, candidates for sensors, thickness after forming.
+
+    The thickness (LS-DYNA keyword file) is that of the tailgate and the panel; the sheets of box
+    and plate are flat and keep their gauge.
+    """
     from ..geometry.thickness_mapping import map_thickness
     from ..io.dyna import write_keyword
     from ..io.nastran import write_assembly
@@ -136,6 +158,7 @@ def _tailgate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
 
 _FORMED: dict[str, Callable[[dict[str, Any]], FormedMesh]] = {
     "tailgate": lambda values: forming_mesh(Skin.of(_made(TailgateDesign, values))),
+    "panel": lambda values: _made(formed_panel, {k: v for k, v in values.items() if k != "h"}),
 }
 
 
@@ -144,17 +167,43 @@ def _bare(assembly: Assembly) -> FormedSpecimen:
 
 
 def _panel(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
-    return _bare(_made(folded_panel, _sized("h", size, values)))
+    given = _sized("h", size, values)
+    full = {"length": 0.6, "width": 0.3, "depth": 0.03, "h": 0.02, **given}
+    _affordable(_number(full, "length") * (_number(full, "width") + 2 * _number(full, "depth")),
+                _number(full, "h"))  # fmt: skip
+    return _bare(_made(folded_panel, given))
 
 
 def _box(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
-    return _bare(_made(box, _sized("h", size, values)))
+    given = _sized("h", size, values)
+    full = {"length": 0.3, "width": 0.2, "height": 0.1, "h": 0.02, **given}
+    a, b, c = (_number(full, edge) for edge in ("length", "width", "height"))
+    _affordable(2 * (a * b + b * c + c * a), _number(full, "h"))
+    return _bare(_made(box, given))
+
+
+def _affordable(area: float, h: float) -> None:
+    """Refuse elements so small that nobody waits for the mesh, let alone for its modes.
+
+    Raises
+    ------
+    ModelError
+        Naming the size that is small enough.
+    """
+    if not h > 0 or area / h**2 > MOST_SHELLS:
+        least = 1e3 * (abs(area) / MOST_SHELLS) ** 0.5
+        raise ModelError(
+            f"elements of {1e3 * h:g} mm make {area / max(h, 1e-12) ** 2:.3g} shells, "
+            f"{MOST_SHELLS} are the most; --size counts in mm, {least:.2g} mm is the least here"
+        )
 
 
 def _plate(size: float | None, values: dict[str, Any]) -> FormedSpecimen:
     """500 x 400 x 1.2 mm unless told."""
     given = {"length": 0.5, "width": 0.4, "t": 1.2e-3, **values}
     h = 0.025 if size is None else 1e-3 * size
+    if size is not None:
+        _affordable(_number(given, "length") * _number(given, "width"), h)
     counts = {
         n: max(1, round(_number(given, side) / h))
         for n, side in (("nx", "length"), ("ny", "width"))
@@ -180,10 +229,10 @@ def _made(build: Callable[..., Any], values: dict[str, Any]) -> Any:
     LabelError, ModelError
         If there is no such setting, or a value has the wrong kind.
     """
-    known = [n for n in inspect.signature(build).parameters if n != "material"]
+    known = settings_of(build)
     if wrong := [key for key in values if key not in known]:
-        near = get_close_matches(wrong[0], known, 3) or known
-        raise LabelError(f"no setting {wrong[0]!r}; there are {', '.join(near[:12])} ...")
+        hint = did_you_mean(wrong[0], known)
+        raise LabelError(f"no setting {wrong[0]!r}; {hint}there are {', '.join(known)}")
     try:
         return build(**values)
     except ChladniError:

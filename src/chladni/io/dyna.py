@@ -6,7 +6,7 @@ Everything is converted to SI here.
 """
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -107,7 +107,7 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
         words = np.char.strip(np.column_stack([c.ravel().astype("U32") for c in columns]))
     words[words == ""] = "0"
     try:
-        values = words.astype(kind)
+        values: np.ndarray = words.astype(kind)
     except (ValueError, OverflowError):
         row, word = _first_bad(words, kind)
         raise block.fault(int(rows[row]), f"{word!r} is no number") from None
@@ -277,7 +277,7 @@ def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
     unit = units_named(units)
     if path.is_file():
         refuse_large(path)
-    read = read_keyword
+    read: Callable[[Path, Units], FormedMesh] = read_keyword
     if path.suffix.lower() == ".csv":
         read = _read_csv
     if path.suffix.lower() in (".vtu", ".vtk", ".msh", ".xdmf", ".ply"):

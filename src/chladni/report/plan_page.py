@@ -171,7 +171,7 @@ def _sensors(
         for m in result.moves
     ]
     return [
-        Picture(picture, "Sensors by rank (blue), shaker (red)."),
+        Picture(picture, "Sensors by rank (blue), shaker (orange)."),
         table,
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
         Items(moves or ["No sensor had to move for a mode to be seen."]),
@@ -267,7 +267,11 @@ def _shaker(
     table = Table((*columns, *words), rows, words=("label", "place [m]", *words), caption=caption)
     cords = [_hanger(found, int(g)) for g in result.hangers]
     picture = scene.sensors(path, seen, (), best, cords, "shaker, by rank")
-    return [Facts(facts), Picture(picture, "Ten best shaker places (red), cords (blue)."), table]
+    return [
+        Facts(facts),
+        Picture(picture, "Ten best shaker places (orange), cords (green)."),
+        table,
+    ]
 
 
 def _rattling(actuator: PlannedActuator) -> str:

@@ -10,7 +10,7 @@ LARGEST = 1e300  # of a number: a float holds it and its square root of a sum do
 
 
 @cache
-def _hints(kind: type) -> dict[str, Any]:
+def _hints(kind: Any) -> dict[str, Any]:
     return get_type_hints(kind)
 
 
@@ -20,7 +20,7 @@ def wrong_field(value: object, where: str = "") -> str:
     A number that is missing (None) passes: JSON has no other word for not-a-number.
     """
     for one in fields(value):  # type: ignore[arg-type]
-        hint = _hints(type(value))[one.name]
+        hint = _hints(type(value))[one.name]  # type: ignore[arg-type]
         if wrong := _wrong(getattr(value, one.name), hint, f"{where}{one.name}"):
             return wrong
     return ""
