@@ -22,7 +22,7 @@ def limit() -> float:
 
 
 def address_space_left() -> float:
-    """Bytes that the limit leaves this process; infinite where there is none."""
+    """Bytes that the limit leaves this process; infinite without a limit."""
     if (most := limit()) == float("inf"):
         return most
     import resource

@@ -18,7 +18,7 @@ def formed_panel(
     rise: float = 0.01,
     t: float = 1e-3,
 ) -> FormedMesh:
-    """The parts of :func:`.plates.folded_panel`, numbered alike, on a forming mesh of their own.
+    """The parts of :func:`.plates.folded_panel`, with the same ids, on a forming mesh of their own.
 
     Parameters
     ----------

@@ -195,7 +195,7 @@ def test_places_are_numbers(tmp_path, x):
 
 
 def test_cells_have_nodes():
-    with pytest.raises(ModelError, match="none of the 3 nodes"):
+    with pytest.raises(ModelError, match="outside the 3 nodes"):
         FormedMesh(np.arange(3), np.eye(3), np.array([[0, 1, 3, 3]]), np.ones(1), np.ones((1, 4)))
 
 

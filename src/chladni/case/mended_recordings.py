@@ -42,7 +42,7 @@ def with_frf(
 
 
 def record_length(r: Recording) -> float:
-    """1 / Δf of the closest spectral lines [s]: no longer delay can be told from a shorter one.
+    """1 / Δf of the closest spectral lines [s]: a longer delay looks like a shorter one.
 
     A recording without lines has no such length: infinite.
     """

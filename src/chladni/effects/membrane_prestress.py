@@ -165,7 +165,7 @@ def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> 
 def with_summed_springs(assembly: Assembly, own: int) -> Assembly:
     """The assembly with one spring in place of several between two motions, from row ``own`` on.
 
-    What has no stiffness is left out. The springs must be elastic, as a membrane force's are.
+    Springs without stiffness are left out. The springs must be elastic, as a membrane force's are.
     """
     s = assembly.springs
     motions = np.sort(8 * s.nodes[own:] + s.component[own:], axis=1)[:, ::-1]  # ground is last

@@ -43,7 +43,7 @@ class FormedMesh:
             row = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
             raise ModelError(f"the place of node {self.ids[row]} is not three numbers")
         if self.cells.size and not 0 <= self.cells.min() <= self.cells.max() < len(self.points):
-            raise ModelError(f"a cell has a corner that is none of the {len(self.points)} nodes")
+            raise ModelError(f"a cell has a corner outside the {len(self.points)} nodes")
         if not len(self.nodal):
             object.__setattr__(self, "nodal", self._nodal())
         known = self.nodal[np.isfinite(self.nodal)]

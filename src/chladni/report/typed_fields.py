@@ -1,4 +1,4 @@
-"""Types of a result that was read from a file, held against the annotations of its dataclasses."""
+"""Types of a result that was read from a file, compared with the annotations of its dataclasses."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -27,7 +27,7 @@ def wrong_field(value: object, where: str = "") -> str:
 
 
 def _wrong(value: object, hint: Any, where: str) -> str:
-    """What is wrong with one value; "" if nothing is."""
+    """The fault of one value in words; "" if it has the type."""
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if kind in (Union, UnionType):
         found = [_wrong(value, h, where) for h in inner]

@@ -24,9 +24,8 @@ def write_deck(
     """Write the deck with changes; included files that change are written beside it.
 
     An included file keeps its relative name where it can; INCLUDE statements are adapted where
-    they would no longer find their file. The files that were read are never written to. Where more
-    lines are added than the deck has, they go to a file of their own, which the deck includes:
-    the deck stays one that a person reads.
+    they would no longer find their file. The files that were read are never written to. More
+    added lines than the deck has go to a file of their own, which the deck includes.
 
     Parameters
     ----------
@@ -96,7 +95,7 @@ def _footer(deck: Deck, changes: Sequence[Change]) -> list[str]:
 
 
 def _apart(deck: Deck, path: Path, final: Path, footer: list[str]) -> list[str]:
-    """Write the added lines beside the deck; what stands in the deck in their place."""
+    """Write the added lines to a file of their own; the lines that include it."""
     originals = {s.path.resolve() for s in deck.sources}
     stems = (f"{path.stem}_added{k or ''}.bdf" for k in count())
     name = next(n for n in stems if final.with_name(n).resolve() not in originals)
