@@ -68,6 +68,13 @@ def test_pyuff_reads_what_we_write(tmp_path: Path) -> None:
     np.testing.assert_allclose(read[3]["x"], H.frequency, rtol=1e-12)
 
 
+def test_a_title_that_is_no_text_is_written_with_question_marks(tmp_path: Path) -> None:
+    """A file's name may hold bytes that are no UTF-8, and is the title."""
+    frf = FRF(np.ones((3, 1, 1), complex), np.arange(1.0, 4.0), ("1:+Z",), ("1:+Z",), "mobility")
+    write_uff(tmp_path / "a.uff", frf, {1: np.zeros(3)}, title="d\udcff.bdf")
+    assert b"d?.bdf" in (tmp_path / "a.uff").read_bytes()
+
+
 def test_base_motion_keeps_its_name(tmp_path: Path) -> None:
     H = a_frf(outputs=("7:+Z",), inputs=("base:+Z",), quantity="transmissibility")
     write_uff(tmp_path / "a.uff", H)

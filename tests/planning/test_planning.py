@@ -178,6 +178,8 @@ def test_target_modes_are_flexible(built):
     assert above.frequency[5] > modal.frequency[-1]
     with pytest.raises(ModelError, match="no flexible mode below 1 Hz"):
         target_modes(built, PlanSettings(f_max=1.0))
+    with pytest.raises(ModelError, match="below 0 Hz"):
+        target_modes(built, PlanSettings(f_max=0.0))
 
 
 def test_the_plan_is_that_of_the_methods(found):
