@@ -17,7 +17,7 @@ from ..ema.setup import Recording, Sensor, SensorAccuracy, TestSetup
 from ..errors import ChladniError, FileError, LabelError, did_you_mean, named
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import Deck, assembly, read_deck
-from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
+from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 from ..io.tables.read_tables import read_recordings
 from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
@@ -148,7 +148,7 @@ def load_case(path: str | Path) -> Case:
     more = keys.sections("recording", known("recording"))
     recordings = _recordings(test, more, sensors, outside)
     notes += notes_of(recordings, "use" in test)
-    notes += left_out(deck, STRUCTURAL)
+    notes += remarks(deck, STRUCTURAL)
     if allow:
         notes.append(f"passed over as [model] allow says: {named(allow, 20)}")
     if outside:

@@ -129,9 +129,9 @@ class DeckModels:
     def model(self, subcase: int | None = None) -> Model:
         """The model under the supports and equations of a subcase, or of the one for modes."""
         from ..io.nastran import assembly
-        from ..io.nastran.read.analysis_requests import STRUCTURAL, left_out
+        from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 
-        made, notes = assembly(self.deck, self.units, subcase), left_out(self.deck, STRUCTURAL)
+        made, notes = assembly(self.deck, self.units, subcase), remarks(self.deck, STRUCTURAL)
         unit, length = ("", 1.0) if self.units is None else ("m", self.units.length)
         return Model(self.source, made, unit, tuple(notes), length, self.units, self.deck)
 

@@ -1,9 +1,12 @@
 """Every user mistake is one sentence: file, line, card, what is wrong, what there is instead."""
 
+import re
+
 import pytest
 
 from chladni.errors import ChladniError
 from chladni.io.nastran import assembly
+from chladni.io.nastran.read.analysis_requests import remarks
 
 from .conftest import PLATE
 
@@ -85,3 +88,57 @@ def test_missing_selected_set(bulk):
         assembly(bulk(PLATE, before="CEND\nSUBCASE 1\n"), subcase=5)
     with pytest.raises(ChladniError, match="there is no GRID"):
         assembly(bulk("MAT1,1,1.,,.3\n"))
+
+
+SETS = "SPC1,1,123456,1\nMPC,1,2,1,1.,3,1,-1.\n"
+
+
+@pytest.mark.parametrize("kind", ["SPC", "MPC"])
+@pytest.mark.parametrize("before", ["CEND\n{} = 7\n", ""], ids=["selected", "no case control"])
+@pytest.mark.parametrize(
+    ("cards", "said"),
+    [
+        ("{}ADD,7,7", r"ADD 7: the set joins itself \(7 -> 7\)"),
+        ("{}ADD,7,1,8\n{}ADD,8,7", r"ADD [78]: the set joins itself \([78] -> [78] -> [78]\)"),
+        ("{}ADD,7,9,10", r"ADD 7: none of the sets it joins exists \(9, 10\); there are .*7"),
+        ("{}ADD,7,8\n{}ADD,8,9", r"ADD 7: none of the sets it joins exists \(9\)"),
+        ("{}ADD,7", "ADD 7: it joins no sets"),
+    ],
+    ids=["itself", "a ring", "nothing there", "nothing one deeper", "none"],
+)
+def test_sets_that_join_others_end_in_sets_that_are_there(bulk, kind, before, cards, said):
+    """Else supports or ties would vanish without a word."""
+    own = "" if not before and "9" in cards else SETS  # the only set is taken then
+    text = PLATE + own + cards.replace("{}", kind) + "\n"
+    with pytest.raises(ChladniError, match=rf"deck.bdf:\d+: {kind}{said}"):
+        assembly(bulk(text, before=before.replace("{}", kind)))
+
+
+@pytest.mark.parametrize("value", ["ALL", "7, 8", "7.", "-1", ""])
+@pytest.mark.parametrize("kind", ["SPC", "MPC", "LOAD", "METHOD"])
+def test_a_selection_names_one_set(bulk, kind, value):
+    """A word that is no number selected nothing, so that a cantilever floated."""
+    with pytest.raises(ChladniError, match=rf"deck.bdf:2: '{kind} ?= ?.*selects no set; write"):
+        bulk(PLATE + SETS, before=f"CEND\n{kind} = {value}\n")
+    with pytest.raises(ChladniError, match=r"deck.bdf:2: 'SPC 1' selects no set.* there are 1$"):
+        bulk(PLATE + SETS, before="CEND\nSPC 1\n")
+
+
+def test_commands_of_an_included_case_control_are_held_to_the_same(bulk, tmp_path):
+    (tmp_path / "case.inc").write_text("MPC = 1\nSPC = ALL\n")
+    with pytest.raises(ChladniError, match=r"case.inc:2: 'SPC = ALL' selects no set"):
+        bulk(PLATE + SETS, before="CEND\nINCLUDE 'case.inc'\n")
+
+
+def test_a_set_that_is_not_there_beside_others_that_are_is_noted(bulk):
+    """Patran joins an empty set of its own, which Nastran passes over."""
+    deck = bulk(PLATE + SETS + "SPCADD,7,1,9\n", before="CEND\nSPC = 7\n")
+    assert len(assembly(deck).supports) == 6
+    assert [n for n in remarks(deck, ()) if re.search("SPCADD 7 joins set 9, of which there", n)]
+
+
+def test_sets_that_join_sets_hold_what_those_hold(bulk):
+    """By two ways, and over two levels, a set counts once."""
+    cards = "SPC1,2,3,2\nSPCADD,7,8,1\nSPCADD,8,1,2\n"
+    held = assembly(bulk(PLATE + SETS + cards, before="CEND\nSPC = 7\n")).supports
+    assert held.tolist() == [[0, c] for c in range(1, 7)] + [[1, 3]]

@@ -9,6 +9,7 @@ from . import excitation, response_frequencies
 from .context import context, parameter
 from .shell_elements import second_axes
 from .static_loads import loads, motions
+from .supports import missing_sets
 
 _LEFT_OUT = {
     "PLOAD1": "distributed loads on beams", "RFORCE": "centrifugal loads", "TEMP": "temperatures",
@@ -49,7 +50,7 @@ def analysis(deck: Deck, units: Units | str | None = None) -> Analysis:
         damping=excitation.damping(ctx),
         eigen=excitation.eigenvalues(ctx),
         dynamic=excitation.dynamic(ctx, static, moved),
-        notes=(*left_out(deck), *second_axes(ctx)),
+        notes=(*remarks(deck), *second_axes(ctx)),
     )
 
 
@@ -62,12 +63,13 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
         yield Subcase(case.id, *chosen, outputs=case.outputs, residual=wanted)
 
 
-def left_out(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
-    """Cards and parameters that are read but not acted upon, one sentence each."""
+def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
+    """Cards and parameters that are not acted upon or contradict others, one sentence each."""
     for name in names:
         for cards in deck.present(name):
             yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
     yield from _unheeded(deck)
+    yield from missing_sets(deck)
 
 
 def _unheeded(deck: Deck) -> Iterator[str]:

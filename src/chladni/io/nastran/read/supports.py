@@ -1,6 +1,7 @@
 """Supports: which SPC and MPC sets hold, and the dofs they hold."""
 
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
@@ -55,8 +56,25 @@ def _sets(deck: Deck, kind: str) -> set[int]:
 
 
 def _additions(deck: Deck, kind: str) -> dict[int, list[int]]:
+    """{set: the sets it joins} of SPCADD or MPCADD.
+
+    Raises
+    ------
+    FileError
+        If a set joins nothing, or itself by whatever way.
+    """
     cards = deck[f"{kind}ADD"]
-    return {int(s): id_list(cards, i, 2) for i, s in enumerate(cards.unique())}
+    added = {int(s): id_list(cards, i, 2) for i, s in enumerate(cards.unique())}
+    for i, parts in enumerate(added.values()):
+        if not parts:
+            raise cards.refuse(i, "it joins no sets")
+    try:
+        TopologicalSorter(added).prepare()
+    except CycleError as error:
+        ring = error.args[1]
+        way = " -> ".join(map(str, ring[::-1]))
+        raise cards.refuse(list(added).index(ring[0]), f"the set joins itself ({way})") from None
+    return added
 
 
 def _tops(deck: Deck, kind: str, there: set[int]) -> list[int]:
@@ -69,23 +87,31 @@ def _tops(deck: Deck, kind: str, there: set[int]) -> list[int]:
 def _resolved(deck: Deck, kind: str, chosen: int, there: set[int]) -> tuple[int, ...]:
     """The plain sets behind a number."""
     added = _additions(deck, kind)
-    out: list[int] = []
-    waiting, seen = [chosen], set()
-    while waiting:
-        s = waiting.pop(0)
-        if s in seen:
-            continue
-        seen.add(s)
-        if s in there:
-            out.append(s)
-        waiting += added.get(s, [])
-    if not out and chosen not in added:
-        known = ", ".join(map(str, sorted(there | set(added)))) or "none"
+    known = f"there are {', '.join(map(str, sorted(there | set(added)))) or 'none'}"
+    if chosen not in there | set(added):
         raise FileError(
-            f"{deck.path}: {kind} set {chosen} is selected but there is no such set; "
-            f"there are {known}"
+            f"{deck.path}: {kind} set {chosen} is selected but there is no such set; {known}"
         )
-    return tuple(out)
+    order, seen = [chosen], {chosen}
+    for s in order:  # which grows while it is gone through
+        order += dict.fromkeys(part for part in added.get(s, ()) if part not in seen)
+        seen.update(order)
+    if not (found := tuple(s for s in order if s in there)):
+        lost = ", ".join(str(s) for s in order if s not in added)
+        why = f"none of the sets it joins exists ({lost}); {known}"
+        raise deck[f"{kind}ADD"].refuse(list(added).index(chosen), why)
+    return found
+
+
+def missing_sets(deck: Deck) -> Iterator[str]:
+    """SPCADD and MPCADD that name a set the deck does not have, one sentence a card."""
+    for kind in ("SPC", "MPC"):
+        cards, added = deck[f"{kind}ADD"], _additions(deck, kind)
+        there = _sets(deck, kind) | set(added)
+        for i, (s, parts) in enumerate(added.items()):
+            if lost := [part for part in parts if part not in there]:
+                what = f"sets {lost[0]} and {len(lost) - 1} more" if lost[1:] else f"set {lost[0]}"
+                yield f"{cards.where(i)}: {cards.name} {s} joins {what}, of which there is no card"
 
 
 def supports(ctx: Context, sets: tuple[int, ...]) -> np.ndarray:

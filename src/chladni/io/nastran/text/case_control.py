@@ -21,11 +21,21 @@ SELECTS: Final = {
     "K2PP": "K2PP", "M2PP": "M2PP", "B2PP": "B2PP",
 }  # fmt: skip
 _COMMAND = re.compile(r"^\s*([A-Z]\w*)\s*(?:\([^)]*\))?\s*=\s*([\w.]+)")
+_ONE_SET = re.compile(r"^\s*\w+\s*(?:\([^)]*\))?\s*=\s*\d+\s*$")
 _SUBCASE = re.compile(r"^\s*(SUBCASE|SUBCOM|SYM|REPCASE)\s*=?\s*(\d+)", re.I)
 _SET = re.compile(r"^\s*SET\s+(\d+)\s*=\s*(.*)", re.I)
 _OUTPUTS: Final = ("DISP", "VELO", "ACCE", "VECT")  # how the requests for motion begin
 _PARAM = re.compile(r"^\s*PARAM\s*,\s*(\w+)\s*,\s*([^,\s]+)", re.I)
 _SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
+
+
+def selects_one(command: str, text: str) -> bool:
+    """Whether the text of a command that selects names one set, or matrices by their names.
+
+    >>> selects_one("SPC", "SPC = 7"), selects_one("SPC", "SPC = ALL")
+    (True, False)
+    """
+    return bool((_COMMAND if "2" in command else _ONE_SET).match(text.upper()))
 
 
 @dataclass(frozen=True)

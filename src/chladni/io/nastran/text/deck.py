@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from ....errors import FileError
+from ....errors import FileError, nearest
 from .card_layout import BOM, tables
-from .case_control import SELECTS, CaseControl, case_control
+from .case_control import SELECTS, CaseControl, case_control, selects_one
 from .known_cards import refusal
-from .known_commands import unknown
+from .known_commands import commands, harmless
 from .numbers import parse_real
 from .part_names import part_names
 from .source_files import Source, sources
@@ -83,19 +83,21 @@ def _cards(files: tuple[Source, ...]) -> dict[str, Cards]:
 
 def _case(files: tuple[Source, ...]) -> CaseControl:
     """Case control of the main file, its own includes read in place."""
-    main = files[0]
-    first, _ = main.bulk
-    text = _above_bulk(main)
+    return case_control((text for _, text in _control(files[0])), sections=files[0].bulk[0] > 0)
+
+
+def _control(main: Source) -> list[tuple[str, str]]:
+    """(file:line, text) of executive and case control, includes in place."""
+    first = max(main.bulk[0], 0)
+    lines = [t.removeprefix(BOM).decode("latin-1") for t in main.lines[:first]]
+    out = [(f"{main.path}:{k}", text) for k, text in enumerate(lines, 1)]
     for include in reversed(main.includes):
         target = main.path.parent / include.name
         if include.past <= first and target.is_file():
-            text[include.first : include.past] = target.read_text("latin-1").splitlines()
-    return case_control(text, sections=first > 0)
-
-
-def _above_bulk(main: Source) -> list[str]:
-    """Executive and case control."""
-    return [t.removeprefix(BOM).decode("latin-1") for t in main.lines[: max(main.bulk[0], 0)]]
+            texts = target.read_text("latin-1").splitlines()
+            inside = [(f"{target}:{k}", text) for k, text in enumerate(texts, 1)]
+            out[include.first : include.past] = inside
+    return out
 
 
 def _names(files: tuple[Source, ...]) -> dict[int, str]:
@@ -132,18 +134,33 @@ def _refuse_unknown(deck: Deck) -> None:
 
 def _refuse_commands(deck: Deck) -> None:
     """Refuse what of the case control might choose other supports, masses or joints."""
-    main = deck.sources[0]
-    text = [line.split("$")[0] for line in _above_bulk(main)]
-    for include in main.includes:
-        if include.past <= main.bulk[0]:
-            text[include.first : include.past] = [""] * (include.past - include.first)
-    for k, name, near in unknown(text, SELECTS):
-        if name not in deck.allowed:
+    control = _control(deck.sources[0])
+    for k, name, text in commands(text.split("$")[0] for _, text in control):
+        where = control[k][0]
+        if name in SELECTS:
+            if not selects_one(name, text):
+                raise FileError(f"{where}: {_no_set(deck, name, text)}")
+        elif not harmless(name) and name not in deck.allowed:
+            near = nearest(name, sorted(SELECTS), 0.6)
             meant = f"; is {near} meant?" if near else ""
             raise FileError(
-                f"{main.path}:{k + 1}: the command {name} of the case control is not understood "
+                f"{where}: the command {name} of the case control is not understood "
                 f"and may change the structure{meant}{_allowing(name)}"
             )
+
+
+def _no_set(deck: Deck, name: str, text: str) -> str:
+    """That a command selects no set, and the sets it may select."""
+    cards = deck.present(*_SETS.get(name, ()))
+    there = sorted({w for table in cards for w in table.words(1).tolist() if w.isdigit()}, key=int)
+    known = f"; there are {b', '.join(there).decode()}" if there else ""
+    several = f", of which {name}ADD joins several" if name in ("SPC", "MPC") else ""
+    return (
+        f"{text.strip()!r} selects no set; write {name} = n, the number of one set{several}{known}"
+    )
+
+
+_SETS = {"SPC": ("SPC", "SPC1", "SPCADD"), "MPC": ("MPC", "MPCADD"), "METHOD": ("EIGRL", "EIGR")}
 
 
 def _allowing(name: str) -> str:

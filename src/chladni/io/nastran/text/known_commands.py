@@ -4,10 +4,8 @@ MSC Nastran Quick Reference Guide, section 5. A command is known by its first fo
 """
 
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
-
-from ....errors import nearest
 
 _ACTED_UPON: Final = "SET PARAM SUBCASE SUBCOM SUBSEQ SYM SYMCOM REPCASE AUTOSPC RESVEC".split()
 _EXECUTIVE: Final = """ID SOL TIME APP DIAG CEND ENDALTER ALTER COMPILE LINK MALTER INCLUDE
@@ -34,13 +32,12 @@ _WORD = re.compile(r"^\s*([A-Z]\w*)", re.I)
 _PLOTS = re.compile(r"^\s*OUTPUT\s*\(\s*(XY|PLOT|POST|CARDS)", re.I)
 
 
-def unknown(lines: Iterable[str], selects: Collection[str]) -> Iterator[tuple[int, str, str]]:
-    """(line from 0, command, the one it resembles or '') of what stands below CEND.
+def commands(lines: Iterable[str]) -> Iterator[tuple[int, str, str]]:
+    """(line from 0, command, its text) of what stands below CEND, up to the language of plots.
 
     Parameters
     ----------
     lines : of the file above BEGIN BULK, without comments
-    selects : commands that select what is in the bulk data
     """
     texts = list(lines)
     heads = [(_WORD.match(text) or [""])[0].strip().upper() for text in texts]
@@ -48,9 +45,12 @@ def unknown(lines: Iterable[str], selects: Collection[str]) -> Iterator[tuple[in
     goes_on = False
     for k in range(below, len(texts)):
         if _PLOTS.match(texts[k]):
-            return  # the language of plots, to the end
-        word, inside = heads[k], goes_on
-        goes_on = texts[k].rstrip().endswith(",")
-        if inside or not word or word in selects or word[:4] in _FIRST_FOUR:
-            continue
-        yield k, word, nearest(word, sorted(selects), 0.6)
+            return
+        inside, goes_on = goes_on, texts[k].rstrip().endswith(",")
+        if heads[k] and not inside:
+            yield k, heads[k], texts[k]
+
+
+def harmless(command: str) -> bool:
+    """Whether a command leaves the structure as it is, or is acted upon."""
+    return command[:4] in _FIRST_FOUR
