@@ -2,11 +2,13 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from chladni.errors import ChladniError
 from chladni.io.nastran import assembly
 from chladni.io.nastran.read.analysis_requests import remarks
+from chladni.io.nastran.read.beam_profiles import SHAPES
 
 from .conftest import PLATE
 
@@ -69,6 +71,15 @@ MISTAKES = {
                            "PBEAML 1: a tapered"),
     "profile": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,OVAL\n,1.\nMAT1"), "TYPE 'OVAL'"),
     "profile sizes": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBARL,1,5,,TUBE\n,1,2\nMAT1"), "no TUBE"),
+    "moments of area": (("MAT1", "CBAR,8,1,1,2,0.,0.,1.\nPBAR,1,5,1.,2.,3.\n\n,,,,,,,,\n,,,2.5"
+                         "\nMAT1"), "PBAR 1: I12 2.5 is too large"),
+    "area": (("MAT1", "CONROD,8,1,2,5,-1.\nMAT1"), "CONROD 8: area -1"),
+    "beam lighter than nothing": (("MAT1", "CROD,8,1,1,2\nPROD,1,5,1.,,,-1.-8\nMAT1"),
+                                  "PROD 1: its NSM is negative, and more than the beam"),
+    "no body's inertia": (("MAT1", "CONM2,8,1,,1.,,,,,1.,,1.,,,3.\nMAT1"),
+                          r"CONM2 8: no body has its inertia: .* 3 exceeds 1 \+ 1"),
+    "no body's inertia, askew": (("MAT1", "CONM2,8,1,,1.,,,,,2.,-.9,2.,,,.5\nMAT1"),
+                                 "CONM2 8: no body has its inertia: .* 2.9 exceeds 0.5"),
     "spc set": (("MAT1", "SPC1,2,a,1\nMAT1"), "'A'"),
 }  # fmt: skip
 
@@ -142,3 +153,98 @@ def test_sets_that_join_sets_hold_what_those_hold(bulk):
     cards = "SPC1,2,3,2\nSPCADD,7,8,1\nSPCADD,8,1,2\n"
     held = assembly(bulk(PLATE + SETS + cards, before="CEND\nSPC = 7\n")).supports
     assert held.tolist() == [[0, c] for c in range(1, 7)] + [[1, 3]]
+
+
+PROFILES = {
+    "BOX": ("10.,10.,6.,6.", "10.,10.,1.,6.", "10.,10.,6.,1.", "10.,10.,5.,1."),
+    "BOX1": ("10.,10.,6.,6.,1.,1.", "10.,10.,1.,1.,5.,6."),
+    "TUBE": ("5.,6.", "5.,5."),
+    "TUBE2": ("5.,6.", "5.,0."),
+    "I": ("10.,5.,5.,1.,6.,6.",),
+    "I1": ("4.,1.,12.,10.",),
+    "CHAN": ("10.,10.,1.,6.", "10.,10.,11.,1."),
+    "CHAN1": ("4.,1.,12.,10.",),
+    "CHAN2": ("6.,1.,10.,10.", "1.,11.,10.,10."),
+    "T": ("10.,5.,6.,1.",),
+    "L": ("10.,10.,11.,1.",),
+    "Z": ("4.,1.,12.,10.",),
+    "HAT": ("10.,6.,20.,5.", "10.,2.,3.,5."),
+}
+
+
+@pytest.mark.parametrize("card", ["CBAR,8,1,1,2,0.,0.,1.\nPBARL", "CBEAM,8,1,1,2,0.,0.,1.\nPBEAML"])
+@pytest.mark.parametrize(("shape", "sizes"), [(s, x) for s, xs in PROFILES.items() for x in xs])
+def test_walls_that_no_section_has_room_for_are_refused(bulk, card, shape, sizes):
+    text = f"{PLATE}{card},1,5,,{shape}\n,{sizes}\n"
+    with pytest.raises(ChladniError, match=rf"PB\w+L 1: the dimensions .* make no {shape}: "):
+        assembly(bulk(text))
+
+
+def test_walls_may_touch():
+    """A profile of walls that just fill it is the solid bar of the same outline."""
+    bar = SHAPES["BAR"][0](10.0, 6.0)
+    for shape, sizes in (
+        ("CHAN", (10, 6, 1, 3)), ("L", (10, 6, 6, 10)), ("L", (10, 6, 6, 3)),
+        ("CHAN2", (5, 2, 6, 10)), ("T", (10, 6, 6, 1)), ("I", (6, 10, 10, 1, 3, 3)),
+    ):  # fmt: skip
+        found = SHAPES[shape][0](*map(float, sizes))
+        assert (found.area, found.I1, found.I2) == pytest.approx((bar.area, bar.I1, bar.I2))
+
+
+def test_inertia_about_one_axis_alone_is_taken_with_a_note(bulk):
+    """A disc of a shaft that turns; a rod's (0, J, J) and rounding are as bodies have them."""
+    cards = "CONM2,8,1,,1.,,,,,2.\nCONM2,9,2,,1.,,,,,,,2.,,,2.\nCONM2,10,3,,1.,,,,,1.,,1.,,,2.02\n"
+    deck = bulk(PLATE + cards)
+    assert len(assembly(deck).masses) == 3
+    assert [n for n in remarks(deck, ()) if "CONM2 8 has inertia about some axes alone" in n]
+
+
+@pytest.mark.parametrize(("G", "noted"), [("8.0769+5", True), ("8.1+4", False), ("", False)])
+def test_moduli_that_contradict_one_another_are_noted(bulk, G, noted):
+    """G is E/2(1+NU) but for rounding; ten times it may be meant, as of a core, and is said."""
+    deck = bulk(PLATE.replace("2.1+5,,.3", f"2.1+5,{G},.3"))
+    assembly(deck)
+    said = r"deck.bdf:7: MAT1 5: G 807690 is 10 times E/2\(1\+NU\) = 80769"
+    assert any(re.search(said, note) for note in remarks(deck, ())) == noted
+
+
+HEXA = "GRID,{},,{},{},{}\n"
+
+
+def solid(corners, name):
+    """A deck of one solid with these corners (k, 3)."""
+    grids = "".join(HEXA.format(k, *map(float, x)) for k, x in enumerate(corners, 1))
+    ids = ",".join(map(str, range(1, len(corners) + 1)))
+    return f"{grids}{name},1,1,{ids}\nPSOLID,1,5\nMAT1,5,2.1+5,,.3,7.85-9\n"
+
+
+def prism(m):
+    """Corners of a prism over a regular polygon of m corners (2m, 3)."""
+    a = 2 * np.pi * (np.arange(m) + 0.5) / m
+    face = np.stack([np.cos(a), np.sin(a), np.zeros(m)], axis=1)
+    return np.concatenate([face, face + np.eye(3)[2]])
+
+
+SHEAR = np.array([[1.0, 0.2, 0.0], [0.0, 0.05, 0.0], [3.0, 1.0, 0.3]])
+
+
+@pytest.mark.parametrize(("name", "m"), [("CHEXA", 4), ("CPENTA", 3)])
+@pytest.mark.parametrize("shape", [np.eye(3), SHEAR], ids=["straight", "sheared and flat"])
+def test_a_face_turned_against_its_opposite_is_refused(bulk, name, m, shape):
+    """Whatever linear map the element went through; |J| has one sign all over it."""
+    straight = prism(m)
+    for k in range(1, m):
+        turned = np.concatenate([straight[:m], np.roll(straight[m:], k, axis=0)])
+        said = rf"{name} 1: its face .* is turned .*; in order|1: it has no volume at its centre"
+        with pytest.raises(ChladniError, match=said):
+            assembly(bulk(solid(turned @ shape, name)))
+
+
+@pytest.mark.parametrize(("name", "m"), [("CHEXA", 4), ("CPENTA", 3)])
+def test_a_distorted_solid_is_not_taken_for_a_turned_one(bulk, name, m):
+    """Corners by a sixth of an edge out of place, then any linear map."""
+    rng = np.random.default_rng(1)
+    edge = np.linalg.norm(np.diff(prism(m)[:2], axis=0))
+    for _ in range(20):
+        X = (prism(m) + edge / 6 * rng.uniform(-1, 1, (2 * m, 3))) @ rng.normal(size=(3, 3))
+        assert len(assembly(bulk(solid(X, name))).solids[0].ids) == 1

@@ -7,7 +7,9 @@ from ....units import Units
 from ..text.deck import Deck
 from . import excitation, response_frequencies
 from .context import context, parameter
+from .materials import unlike_moduli
 from .shell_elements import second_axes
+from .springs_and_masses import one_sided_inertia
 from .static_loads import loads, motions
 from .supports import missing_sets
 
@@ -70,6 +72,8 @@ def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
             yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"
     yield from _unheeded(deck)
     yield from missing_sets(deck)
+    yield from one_sided_inertia(deck)
+    yield from unlike_moduli(deck)
 
 
 def _unheeded(deck: Deck) -> Iterator[str]:

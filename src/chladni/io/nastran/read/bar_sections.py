@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ....errors import ModelError
 from ....model.properties import BeamSection, Section
 from ..text.table import Cards
 from .beam_profiles import SHAPES, Profile, tube
@@ -23,8 +24,7 @@ def _section(
 ) -> BeamSection:
     """A section from (A, I1, I2, I12, J) in the deck's units; MID is field 2."""
     A, I1, I2, I12, J = values
-    if A < 0 or I1 < 0 or I2 < 0 or J < 0:
-        raise card.refuse(0, f"area {A:g} and moments {I1:g}, {I2:g}, {J:g} cannot be negative")
+    refuse_impossible(card, 0, values)
     L = ctx.scale.length
     return BeamSection(
         materials.isotropic(card, 0, int(card.integers(2)[0])),
@@ -37,6 +37,23 @@ def _section(
         nsm * ctx.scale.inertia / L,
         kind,
     )
+
+
+def refuse_impossible(
+    cards: Cards, i: int, values: tuple[float, float, float, float, float]
+) -> None:
+    """Refuse (A, I1, I2, I12, J) of which one is negative, or I1 I2 < I12².
+
+    The smaller principal moment of area is then negative (MSC Nastran Quick Reference, PBAR).
+    """
+    A, I1, I2, I12, J = values
+    if min(A, I1, I2, J) < 0:
+        raise cards.refuse(i, f"area {A:g} and moments {I1:g}, {I2:g}, {J:g} cannot be negative")
+    if I12**2 > I1 * I2 * (1 + _ROUNDED):
+        raise cards.refuse(i, f"I12 {I12:g} is too large: I12² exceeds I1 I2 = {I1:g} x {I2:g}")
+
+
+_ROUNDED = 1e-3  # a strip of no thickness has I12² = I1 I2, as far as the digits of a field go
 
 
 def _pbar(ctx: Context, materials: Materials, card: Cards, _: int) -> BeamSection:
@@ -56,7 +73,12 @@ def _shape(card: Cards) -> tuple[Profile, float]:
     if np.any(sizes < 0) or not np.any(sizes > 0):
         raise card.refuse(0, f"a dimension of the {word} is not positive")
     with np.errstate(all="ignore"):
-        profile = make(*sizes.tolist())
+        try:
+            profile = make(*sizes.tolist())
+        except ModelError as error:
+            raise card.refuse(
+                0, f"the dimensions {sizes.tolist()} make no {word}: {error}"
+            ) from None
     if not profile.area > 0 or not np.isfinite(profile.J) or min(profile.I1, profile.I2) <= 0:
         raise card.refuse(0, f"the dimensions {sizes.tolist()} make no {word}")
     return profile, float(card.reals(9 + count, 0.0)[0])

@@ -5,6 +5,7 @@ import numpy as np
 from ....model.assembly import Beams
 from ....model.properties import BeamSection, Part
 from ..text.table import Cards
+from .bar_sections import refuse_impossible
 from .context import Context, digits
 from .sections import Parts
 
@@ -62,6 +63,7 @@ def _conrods(ctx: Context, parts: Parts, cards: Cards) -> Beams:
     for i, key in enumerate(zip(mid.tolist(), A.tolist(), J.tolist(), nsm.tolist(), strict=True)):
         if key not in shared:
             material = parts.materials.isotropic(cards, i, int(key[0]))
+            refuse_impossible(cards, i, (key[1], 0.0, 0.0, 0.0, key[2]))
             section = BeamSection(
                 material, key[1] * L**2, J=key[2] * L**4,
                 nonstructural=key[3] * ctx.scale.inertia / L, kind="rod",

@@ -2,7 +2,8 @@
 
 y is up (plane 1), z to the right; open profiles twist as Σ b t³/3, closed ones after Bredt
 (Young & Budynas, Roark's Formulas, table 10.1). Where Nastran's own closed forms differ they do
-so by the thin-wall approximation of J and of the shear factors.
+so by the thin-wall approximation of J and of the shear factors. Dimensions that no section has
+raise a :class:`~chladni.errors.ModelError`.
 """
 
 from collections.abc import Callable
@@ -10,6 +11,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+
+from ....errors import ModelError
+
+_ROUNDING = 1e-9  # of the section's size: walls that meet so far apart touch
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ Rectangle = tuple[float, float, float, float]  # centre z, centre y, width along
 def _built_up(rectangles: list[Rectangle], J: float | None = None) -> Profile:
     """A, I and J of a section made of rectangles, about its centroid (Steiner)."""
     z, y, b, h = np.array(rectangles).T
+    _refuse_overlap(z, y, b, h)
     a = b * h
     z, y = z - a @ z / a.sum(), y - a @ y / a.sum()
     thin, long = np.minimum(b, h), np.maximum(b, h)
@@ -43,6 +49,18 @@ def _built_up(rectangles: list[Rectangle], J: float | None = None) -> Profile:
         float(twist),
         (float(upright) * 5 / 6, float(1 - upright) * 5 / 6),
     )
+
+
+def _refuse_overlap(z: np.ndarray, y: np.ndarray, b: np.ndarray, h: np.ndarray) -> None:
+    """Refuse rectangles of negative size, and two that share more than an edge."""
+    least = _ROUNDING * max(b.max(), h.max())
+    if min(b.min(), h.min()) < -least:
+        raise ModelError("its walls are thicker than the section")
+    i, j = np.triu_indices(len(z), 1)
+    deep = np.minimum((b[i] + b[j]) / 2 - np.abs(z[i] - z[j]), np.minimum(b[i], b[j]))
+    high = np.minimum((h[i] + h[j]) / 2 - np.abs(y[i] - y[j]), np.minimum(h[i], h[j]))
+    if np.any((deep > least) & (high > least)):
+        raise ModelError("its walls overlap")
 
 
 def _bar(b: float, h: float) -> Profile:
@@ -60,6 +78,8 @@ def _rod(r: float) -> Profile:
 
 def tube(ro: float, ri: float) -> Profile:
     """Round tube of outer and inner radius."""
+    if not 0 <= ri < ro:
+        raise ModelError(f"a bore of radius {ri:g} does not fit a tube of radius {ro:g}")
     I = np.pi * (ro**4 - ri**4) / 4
     return Profile(np.pi * (ro**2 - ri**2), I, I, 0.0, 2 * I, (0.5, 0.5))
 
@@ -73,6 +93,8 @@ def _box1(b: float, h: float, top: float, bottom: float, left: float, right: flo
     bm, hm = b - (left + right) / 2, h - (top + bottom) / 2
     J = 4 * (bm * hm) ** 2 / (bm / top + bm / bottom + hm / left + hm / right)
     inner = h - top - bottom
+    if not min(inner, b - left - right) > 0:
+        raise ModelError("its walls leave no hollow")
     walls = [
         (0.0, (h - top) / 2, b, top),
         (0.0, (bottom - h) / 2, b, bottom),

@@ -1,11 +1,12 @@
 """Materials: MAT1, MAT2, MAT8 to the model's types, in SI."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from ....model.properties import Anisotropic, Isotropic, Material, Orthotropic
 from ....units import Units
+from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context
 
@@ -88,6 +89,24 @@ def _isotropic(card: Cards, scale: Units) -> Isotropic:
         G * scale.stress if given else None,
         int(card.integers(1)[0]),
     )
+
+
+def unlike_moduli(deck: Deck) -> Iterator[str]:
+    """MAT1 of which E, G and NU contradict one another by more than 1 %, in one sentence.
+
+    Nastran warns of them, too, and takes all three (Quick Reference, MAT1).
+    """
+    for cards in deck.present("MAT1"):
+        E, G, nu = (cards.reals(k, np.nan) for k in (2, 3, 4))
+        due = E / (2 * (1 + np.where(nu == -1, np.nan, nu)))
+        unlike = np.flatnonzero(np.abs(G - due) > 0.01 * np.abs(G))
+        if len(unlike):
+            i, more = int(unlike[0]), len(unlike) - 1
+            others = f" (and {more} others so)" if more else ""
+            yield (
+                f"{cards.where(i)}: MAT1 {cards.integers(1)[i]}: G {G[i]:g} is {G[i] / due[i]:.3g} "
+                f"times E/2(1+NU) = {due[i]:g}; E, G and NU are taken as they stand{others}"
+            )
 
 
 def _orthotropic(card: Cards, scale: Units) -> Orthotropic:

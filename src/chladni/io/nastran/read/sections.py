@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....model.properties import Anisotropic, Part, Section, ShellSection, SolidSection
+from ....model.properties import Anisotropic, BeamSection, Part, Section, ShellSection, SolidSection
 from ..text.table import Cards
 from . import bar_sections
 from .context import Context
@@ -91,7 +91,10 @@ def _positive(card: Cards, k: int, what: str, blank: float | None = None) -> flo
 
 
 def _weighs(card: Cards, section: Section) -> None:
-    """Refuse a non-structural mass that takes away more than the sheet has."""
+    """Refuse a non-structural mass that takes away more than the sheet or the beam has."""
+    if isinstance(section, BeamSection) and section.nonstructural < 0:
+        if section.material.rho * section.area + section.nonstructural < 0:
+            raise card.refuse(0, "its NSM is negative, and more than the beam weighs")
     if isinstance(section, ShellSection) and section.nonstructural < 0:
         sheet = getattr(section.membrane or section.bending, "rho", 0.0)
         if not sheet * section.thickness + section.nonstructural >= 0:

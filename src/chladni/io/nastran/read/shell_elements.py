@@ -227,3 +227,36 @@ def _check_solid(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
     if np.any(bad := ~(thin > 1e-9 * span)):
         i = int(np.argmax(bad))
         raise cards.refuse(i, f"its volume is zero; grids {ctx.ids[nodes[i]].tolist()}")
+    for order in _LAYERS.get(cards.name, ()):
+        _refuse_turned(ctx, cards, nodes[:, order])
+
+
+_LAYERS = {  # corners of a face, then those that follow them on the opposite one
+    "CHEXA": ((0, 1, 2, 3, 4, 5, 6, 7), (0, 3, 7, 4, 1, 2, 6, 5), (0, 1, 5, 4, 3, 2, 6, 7)),
+    "CPENTA": ((0, 1, 2, 3, 4, 5),),
+}
+
+
+def _refuse_turned(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
+    """Refuse a face whose corners follow those of the opposite one better in a turned order.
+
+    Corners a_i, b_i are compared where the element's mean J is the unit: order k is the one of
+    largest Σ a_i·b_(i+k), and of an element that is a parallelepiped or near it that is k = 0.
+    """
+    X, m = ctx.places[nodes], nodes.shape[1] // 2
+    round_ = 2 * np.pi * np.arange(m) / m
+    face = np.stack([np.cos(round_), np.sin(round_)], axis=1)
+    parent = np.block([[face, -np.ones((m, 1))], [face, np.ones((m, 1))]])
+    J = np.linalg.pinv(parent) @ (X - X.mean(axis=1)[:, None])
+    size = np.linalg.norm(J, axis=2).prod(axis=1)
+    if np.any(flat := ~(np.abs(np.linalg.det(J)) > 1e-12 * size)):
+        i = int(np.argmax(flat))
+        raise cards.refuse(i, f"it has no volume at its centre; grids {ctx.ids[nodes[i]].tolist()}")
+    a, b = (Y - Y.mean(axis=1)[:, None] for Y in np.split(X @ np.linalg.inv(J), 2, axis=1))
+    fit = np.stack([np.einsum("nij,nij->n", a, np.roll(b, -k, axis=1)) for k in range(m)])
+    if np.any(turned := fit.argmax(axis=0) > 0):
+        i = int(np.argmax(turned))
+        here, there = ctx.ids[nodes[i, :m]].tolist(), ctx.ids[nodes[i, m:]]
+        due = np.roll(there, -int(fit[:, i].argmax())).tolist()
+        why = f"its face {there.tolist()} is turned against the face {here}; in order it is {due}"
+        raise cards.refuse(i, why)

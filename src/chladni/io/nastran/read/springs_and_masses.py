@@ -1,9 +1,12 @@
 """Springs, dampers, scalar masses, bushes, concentrated masses."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ....model.assembly import Bushes, Masses, Scalars
 from ....units import Units
+from ..text.deck import Deck
 from ..text.table import Cards
 from .context import Context
 
@@ -173,13 +176,54 @@ def _conm2(ctx: Context, cards: Cards) -> Masses:
     if np.any(m < 0):
         raise cards.refuse(int(np.argmax(m < 0)), "the mass is negative")
     x = np.where((cid == -1)[:, None], x - ctx.places[node], x) * L
-    I11, I21, I22, I31, I32, I33 = cards.block(9, 6, 0.0).T * ctx.scale.inertia * L**2
-    rows = [[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]]
-    inertia = np.moveaxis(np.array(rows), 2, 0)
+    inertia = _inertia(cards)
     _no_negative(cards, inertia)
+    _refuse_bodiless(cards, inertia)
+    inertia *= ctx.scale.inertia * L**2
     x = np.einsum("ni,nij->nj", x, T)
     inertia = np.einsum("nia,nij,njb->nab", T, inertia, T)
     return Masses(cards.integers(1), node, point_mass(m, x, inertia))
+
+
+def _inertia(cards: Cards) -> np.ndarray:
+    """Tensors (n, 3, 3) of CONM2 in the deck's units."""
+    I11, I21, I22, I31, I32, I33 = cards.block(9, 6, 0.0).T
+    rows = [[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+_TWO_DIGITS = 0.05  # by so much the sum of moments written to two digits may be wrong
+
+
+def _unlike_bodies(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) bool: those whose largest principal moment exceeds the sum of the others; (n, 3) all.
+
+    Of any body J_3 <= J_1 + J_2, as J_1 + J_2 - J_3 = 2 ∫ x_3² dm.
+    """
+    J = np.linalg.eigvalsh(inertia)
+    return J[:, 2] > (1 + _TWO_DIGITS) * (J[:, 0] + J[:, 1]), J
+
+
+def _refuse_bodiless(cards: Cards, inertia: np.ndarray) -> None:
+    """Refuse three moments of inertia that no body has together; fewer than three are noted."""
+    unlike, J = _unlike_bodies(inertia)
+    if np.any(bad := unlike & (J[:, 0] > 0)):
+        i = int(np.argmax(bad))
+        two, one = " + ".join(f"{x:g}" for x in J[i, :2]), f"{J[i, 2]:g}"
+        why = f"no body has its inertia: of the principal moments {one} exceeds {two}"
+        raise cards.refuse(i, why)
+
+
+def one_sided_inertia(deck: Deck) -> Iterator[str]:
+    """CONM2 with inertia about some axes alone, which no body has, in one sentence."""
+    for cards in deck.present("CONM2"):
+        if np.any(unlike := _unlike_bodies(_inertia(cards))[0]):
+            i, more = int(np.argmax(unlike)), int(unlike.sum()) - 1
+            others = f" and {more} others have" if more else " has"
+            yield (
+                f"{cards.where(i)}: CONM2 {cards.integers(1)[i]}{others} inertia about some axes "
+                "alone, which no body has"
+            )
 
 
 def _conm1(ctx: Context, cards: Cards) -> Masses:
