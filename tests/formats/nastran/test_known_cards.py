@@ -4,7 +4,7 @@ import pytest
 
 from chladni.errors import ChladniError, FileError
 from chladni.io.nastran import assembly, read_deck
-from chladni.io.nastran.read.analysis_requests import _LEFT_OUT
+from chladni.io.nastran.read.analysis_requests import _LEFT_OUT, STRUCTURAL, remarks
 from chladni.io.nastran.text.known_cards import refusal
 
 from .conftest import PLATE
@@ -13,7 +13,7 @@ from .conftest import PLATE
 @pytest.mark.parametrize(
     "card",
     """NSM,5,PSHELL,101,1. NSM1,5,PSHELL,NSM,1. NSML1,5,PSHELL,NSM,1. NSMADD,5,1 RBAR1,9,1,3,123456
-    RBE22,9,1,123456,3 SPCC1,1,123456,1 MFLUID,1 MLIST,1 MATT1,5,7 SESET,1,2 BCTABLE,1 TF,1,1,1
+    RBE22,9,1,123456,3 SPCC1,1,123456,1 MFLUID,1 MLIST,1 SESET,1,2 BCTABLE,1 TF,1,1,1
     BCPROP,1 SNORM,1 XYZ,4 CGAP,9,1,1,2""".split(),
 )
 def test_a_card_not_known_is_refused_unless_allowed(bulk, card):
@@ -46,6 +46,38 @@ def test_a_command_not_known_is_refused_unless_allowed(bulk, line, name):
     with pytest.raises(FileError, match=rf"deck.bdf:\d+: the command {name} .*--allow {name}$"):
         bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n")
     assert bulk(PLATE, before=f"SOL 103\nCEND\n{line}\n", allow=(name,)).case.sol == 103
+
+
+TABLE = "TEMP,4,1,80.\nTABLEM1,7\n,0.,1.,100.,.5,ENDT\n"
+
+
+@pytest.mark.parametrize("card", ["MATT1,5,7", "MATT8,5,7", "MATT9,5,7", "MATTVE,5,7"])
+@pytest.mark.parametrize("chosen", ["", "TEMP(LOAD) = 4\n", "TEMPERATURE(INITIAL) = 4\n"])
+def test_materials_follow_no_temperature_that_is_not_chosen(bulk, card, chosen):
+    """Nastran takes MAT1 itself then (MATT1, remark 1), and so do we, with a note."""
+    plain = assembly(bulk(PLATE))
+    deck = bulk(f"{PLATE}{TABLE}{card}\n", before=f"CEND\n{chosen}")
+    assert assembly(deck).parts == plain.parts
+    assert [note for note in remarks(deck, STRUCTURAL) if card.partition(",")[0] in note]
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    ["TEMPERATURE(MATERIAL) = 4", "TEMP(MATE) = 4", "temp = 4", "TEMPERATURE(BOTH)=4",
+     "SUBCASE 2\n TEMP( MAT )=4"],
+)  # fmt: skip
+def test_materials_that_follow_a_chosen_temperature_are_refused(bulk, chosen):
+    text, before = f"{PLATE}{TABLE}MATT1,5,7\n", f"CEND\n{chosen}\n"
+    with pytest.raises(FileError, match=r"deck.bdf:[23]: .*MATT1 at .*deck.bdf:\d+ .*allow MATT1$"):
+        bulk(text, before=before)
+    assert bulk(text, before=before, allow=("matt1",))
+    assert bulk(PLATE + TABLE, before=before)  # nothing follows it
+
+
+def test_bulk_data_alone_says_not_whether_temperatures_are_chosen(bulk):
+    with pytest.raises(FileError, match=r"deck.bdf:8: no case control says whether TEMP .*MATT1"):
+        bulk(f"{PLATE}{TABLE}MATT1,5,7\n")
+    assert bulk(f"{PLATE}MATT1,5,7\n")
 
 
 def test_usual_commands_pass(bulk):

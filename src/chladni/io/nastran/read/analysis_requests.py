@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from ....model.analysis import Analysis, Subcase
 from ....units import Units
 from ..text.deck import Deck
+from ..text.known_cards import FOLLOWS_TEMPERATURE
 from . import excitation, response_frequencies
 from .context import context, parameter
 from .materials import unlike_moduli
@@ -25,6 +26,7 @@ _LEFT_OUT = {
     "PBUSHT": "stiffness and damping that follow the frequency",
     "PELAST": "stiffness that follows the frequency",
     "PDAMPT": "damping that follows the frequency",
+    **dict.fromkeys(FOLLOWS_TEMPERATURE, "materials that follow temperature"),
 }  # fmt: skip
 _HEEDED = frozenset("WTMASS COUPMASS G AUTOSPC RESVEC K6ROT".split())
 _OUTPUT = frozenset(  # what is printed, plotted or written
@@ -34,7 +36,7 @@ _OUTPUT = frozenset(  # what is printed, plotted or written
     SPCGEN OUNIT1 OUNIT2 PDRMSG PDRG OIBULK""".split()
 )
 STRUCTURAL = (  # these change the modes: Guyan's reduction, what follows the frequency
-    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT", "MDLPRM",
+    "OMIT", "OMIT1", "ASET", "ASET1", "PBUSHT", "PELAST", "PDAMPT", "MDLPRM", *FOLLOWS_TEMPERATURE,
 )  # fmt: skip
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from ....errors import FileError, nearest
 from .card_layout import BOM, tables
 from .case_control import SELECTS, CaseControl, case_control, selects_one
-from .known_cards import refusal
-from .known_commands import commands, harmless
+from .known_cards import FOLLOWS_TEMPERATURE, refusal
+from .known_commands import commands, harmless, sets_material_temperature
 from .numbers import parse_real
 from .part_names import part_names
 from .source_files import Source, sources
@@ -135,11 +135,17 @@ def _refuse_unknown(deck: Deck) -> None:
 def _refuse_commands(deck: Deck) -> None:
     """Refuse what of the case control might choose other supports, masses or joints."""
     control = _control(deck.sources[0])
+    if not deck.case.present:
+        for cards in deck.present("TEMP", "TEMPD"):
+            where = cards.where(0)
+            _refuse_followers(deck, f"{where}: no case control says whether {cards.name} sets")
     for k, name, text in commands(text.split("$")[0] for _, text in control):
         where = control[k][0]
         if name in SELECTS:
             if not selects_one(name, text):
                 raise FileError(f"{where}: {_no_set(deck, name, text)}")
+        elif sets_material_temperature(text):
+            _refuse_followers(deck, f"{where}: {text.strip()!r} chooses")
         elif not harmless(name) and name not in deck.allowed:
             near = nearest(name, sorted(SELECTS), 0.6)
             meant = f"; is {near} meant?" if near else ""
@@ -147,6 +153,14 @@ def _refuse_commands(deck: Deck) -> None:
                 f"{where}: the command {name} of the case control is not understood "
                 f"and may change the structure{meant}{_allowing(name)}"
             )
+
+
+def _refuse_followers(deck: Deck, why: str) -> None:
+    """Refuse the first material that follows temperature, unless it is allowed."""
+    for cards in deck.present(*FOLLOWS_TEMPERATURE):
+        if cards.name not in deck.allowed:
+            said = f"{why} the temperatures that {cards.name} at {cards.where(0)} follows"
+            raise FileError(f"{said}, which is not understood{_allowing(cards.name)}")
 
 
 def _no_set(deck: Deck, name: str, text: str) -> str:

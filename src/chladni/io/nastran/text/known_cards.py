@@ -2,7 +2,7 @@
 
 Harmless is what no linear analysis of stiffness, mass, damping and harmonic loads heeds: MSC
 Nastran Quick Reference Guide, section 8. What is read, and what is left out with a note, is
-harmless, too.
+harmless, too. Materials that follow temperature (MATT1...) are, unless a temperature is chosen.
 """
 
 from typing import Final
@@ -52,6 +52,10 @@ HARMLESS: Final = frozenset(
     ECHOOFF MDLPRM ITER PARAMARC
     """.split()
 )
+FOLLOWS_TEMPERATURE: Final = (  # materials, where the case control chooses their temperatures
+    """MATT1 MATT2 MATT3 MATT4 MATT5 MATT8 MATT9 MATT11 MATTC MATTEP MATTF MATTG MATTHE MATTVE
+    MATTVP""".split()
+)
 CARRIERS: Final = frozenset(  # that stiffen, weigh or tie and do not begin with C
     """GENEL RSPLINE RTRPLT1 RJOINT RSSCON RBE2GS RBE2F RBAR1 BLSEG BCTABLE BGSET BCTSET BGADD TF
     NSM NSM1 NSML NSML1 NSMADD MFLUID""".split()
@@ -66,7 +70,7 @@ def refusal(name: str, count: int) -> str:
     >>> refusal("SPCC1", 2)
     'SPCC1 (of which there are 2) is not understood and may change the structure; is SPC1 meant?'
     """
-    if name in FIELDS or name in HARMLESS or name in LEGACY:
+    if name in FIELDS or name in HARMLESS or name in LEGACY or name in FOLLOWS_TEMPERATURE:
         return ""
     what = f"{name} (of which there are {count})"
     near = nearest(name, FIELDS, 0.75)

@@ -28,6 +28,7 @@ _FIRST_FOUR: Final = frozenset(
     name[:4]
     for name in (*_ACTED_UPON, *_EXECUTIVE, *_TITLES, *_REQUESTS, *_OTHER_ANALYSES)
 )  # fmt: skip
+_OF_MATERIALS = re.compile(r"^\s*TEMP\w*\s*(?:\(\s*(?:MATE\w*|MAT|BOTH)\b[^)]*\)\s*)?=", re.I)
 _WORD = re.compile(r"^\s*([A-Z]\w*)", re.I)
 _PLOTS = re.compile(r"^\s*OUTPUT\s*\(\s*(XY|PLOT|POST|CARDS)", re.I)
 
@@ -49,6 +50,15 @@ def commands(lines: Iterable[str]) -> Iterator[tuple[int, str, str]]:
         inside, goes_on = goes_on, texts[k].rstrip().endswith(",")
         if heads[k] and not inside:
             yield k, heads[k], texts[k]
+
+
+def sets_material_temperature(text: str) -> bool:
+    """Whether a command chooses the temperatures that materials follow (MATT1, remark 1).
+
+    >>> sets_material_temperature("TEMP(MATE) = 4"), sets_material_temperature("TEMP(LOAD) = 4")
+    (True, False)
+    """
+    return bool(_OF_MATERIALS.match(text))
 
 
 def harmless(command: str) -> bool:
