@@ -154,12 +154,13 @@ def _case(
     bare = load_deck(source, units, allow)
     if units is None:
         raise FileError(f"{source} is a bare deck, so its unit system is needed: --units mm-t-s")
+    model = bare.model()
     if driven:
-        placed(bare.model().assembly, [exciter(driven, "--input")], "--input")
+        placed(model.assembly, [exciter(driven, "--input")], "--input")
     table, hangers = scratch / "sensors.csv", ""
     if sensors is None:
         progress("planning the sensors", 0.1)
-        made = plan(bare.model().assembly, PlanSettings(draws=0))
+        made = plan(model.assembly, PlanSettings(draws=0))
         write_text(table, sensors_csv(made, driven))
         on_table = driven.startswith("base:")
         hangers = "" if on_table else f"hangers = {[int(h) for h in made.hangers]}\n"
@@ -176,5 +177,6 @@ def _case(
         f"[test]\nsensors = {json.dumps(str(table))}\n{hangers}",
     )
     case = load_case(scratch)
-    notes = tuple(note for note in case.notes if note != OUTSIDE)  # no word of the user's
+    own = (note for note in case.notes if note != OUTSIDE)  # no word of the user's
+    notes = tuple(dict.fromkeys((*model.notes, *own)))
     return replace(case, path=source, notes=notes)

@@ -80,7 +80,7 @@ def run(
             given, *placed = placed_layout(as_model(given, "frf"), sensors, input or ())
             ends = (placed[0], placed[1])
         found = frf(given, *ends, f, damping, stage)
-        job.notes.extend(found.notes)
+        job.note(found.notes)
         for k, one in enumerate(found.frfs):
             if one.quantity != "transmissibility":
                 one = one.to(cast(Quantity, quantity))

@@ -80,7 +80,7 @@ def run(
     with started("plan", source, out) as job:
         job.progress("reading the model", 0.0)
         model, said = _model(source, units, allow or ())
-        job.notes += model.notes
+        job.note(model.notes)
         if said:
             job.say(said)
         found = plan(model, settings, within(job.progress, 0.1, 0.6))

@@ -53,7 +53,7 @@ def run(
     with started("render", source, out) as job:
         job.progress("reading the model", 0.0)
         model = load_model(source, units, allow or (), command="render")
-        job.notes += model.notes
+        job.note(model.notes)
         count = max([0, *chosen, *(gif or []), *(energy or [])])
         shown = sorted({*chosen, *(gif or []), *(energy or [])})
         modal = _modal(job, model, count, energy or [])

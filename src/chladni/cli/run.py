@@ -99,15 +99,19 @@ class Run:
         """Add to the page."""
         self.sections.append(Section(title, list(blocks)))
 
+    def note(self, texts: Sequence[str]) -> None:
+        """Sentences for the page that are said at once."""
+        self.notes += texts
+        for text in texts:
+            self.say(f"note: {text}")
+
     def show(self, parts: PageParts) -> None:
         """Add a page's sections, notes and files, and say its lead."""
         self.sections += parts.sections
-        self.notes += parts.notes
         self.files += parts.files
         self.lead = parts.lead
         say_sections(parts.lead, parts.sections)
-        for note in parts.notes:
-            self.say(f"note: {note}")
+        self.note(parts.notes)
 
     def say(self, text: str) -> None:
         """One line on standard output."""

@@ -231,9 +231,10 @@ def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> 
         raise FileError(
             f"{models.source} asks for no frequency response; give --input and --output"
         )
-    labels, notes = list(outputs), list(asked.notes)
+    first = models.model(cases[0].id)
+    labels, notes = list(outputs), list(dict.fromkeys((*first.notes, *asked.notes)))
     if not labels:
-        labels, said = _wanted(models.model(cases[0].id), asked, cases)
+        labels, said = _wanted(first, asked, cases)
         notes = [*said, *notes]
     notes.append(
         "Each input is a subcase with all its loads, as the deck gives them: values are motion, "
@@ -244,19 +245,23 @@ def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> 
             "Modes beyond those of METHOD are missing, as in Nastran without RESVEC; RESVEC = YES "
             "in the case control adds residual vectors."
         )
-    columns = _columns(models, cases, labels, progress)
+    columns = _columns(models, first, cases, labels, progress)
     return FrequencyResponses(tuple(_gathered(labels, cases, columns)), tuple(notes))
 
 
 def _columns(
-    models: DeckModels, cases: Sequence[Subcase], labels: Sequence[str], progress: Progress
+    models: DeckModels,
+    first: Model,
+    cases: Sequence[Subcase],
+    labels: Sequence[str],
+    progress: Progress,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(frequencies, displacements) of every subcase, each under its own supports."""
+    """(frequencies, displacements) of every subcase under its own supports; the first is built."""
     from ..fem.deck_response import response
 
     ends = [parse(text) for text in labels]
     dofs, signs = np.array([(point, c) for point, c, _ in ends]), [sign for *_, sign in ends]
-    built: dict[tuple[int, int], Model] = {}
+    built = {(cases[0].spc, cases[0].mpc): first}
     out = []
     for k, case in enumerate(cases):
         progress(f"subcase {case.id}", 0.2 + 0.6 * k / len(cases))

@@ -21,6 +21,7 @@ from ..model.assembly import Assembly
 from ..units import Units
 from ..units import units as unit_system
 from ..view.surface import Surface, surface
+from .unit_guess import doubt_of_units
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -127,13 +128,23 @@ class DeckModels:
         return analysis(self.deck, self.units)
 
     def model(self, subcase: int | None = None) -> Model:
-        """The model under the supports and equations of a subcase, or of the one for modes."""
+        """The model under the supports and equations of a subcase, or of the one for modes.
+
+        Raises
+        ------
+        FileError
+            If the deck is wrong, or its materials are none in its unit system but in another.
+        """
         from ..io.nastran import assembly
         from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
 
-        made, notes = assembly(self.deck, self.units, subcase), remarks(self.deck, STRUCTURAL)
-        unit, length = ("", 1.0) if self.units is None else ("m", self.units.length)
-        return Model(self.source, made, unit, tuple(notes), length, self.units, self.deck)
+        made = assembly(self.deck, self.units, subcase)
+        notes = tuple(remarks(self.deck, STRUCTURAL))
+        if self.units is None:
+            return Model(self.source, made, "", notes, deck=self.deck)
+        if doubt := doubt_of_units(made, str(self.source), self.units):
+            notes = (doubt, *notes)
+        return Model(self.source, made, "m", notes, self.units.length, self.units, self.deck)
 
 
 def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Model:

@@ -54,8 +54,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
             f"{source}: no material has a modulus and a density to tell the unit system by; give "
             f"--units, one of {', '.join(UNITS)}"
         )
-    size = float(np.linalg.norm(np.ptp(made.points, axis=0))) / read_in.length
-    mass = float(mass_properties(made)[0]) / read_in.mass
+    size, mass = _size_and_mass(made, read_in)
     ranked = sorted((_misfit(pairs, size, mass, u), k, u) for k, u in enumerate(UNITS.values()))
     (best, _, units), (second, *_) = ranked[:2]
     E, rho = pairs[0]
@@ -64,13 +63,53 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
             f"{source}: E = {E:g} and rho = {rho:g} are usual in no unit system "
             f"({', '.join(UNITS)}); look at the materials, or give --units"
         )
-    E, rho = E * units.stress, rho * units.density
-    why = (
-        f"in {units.name} the deck is {size * units.length:.3g} m across, weighs "
-        f"{mass * units.mass:.4g} kg and its first material is {_named(E, rho)} "
-        f"(E = {E / 1e9:.4g} GPa, rho = {rho:.4g} kg/m³)"
-    )
-    return UnitGuess(units, second > best + CLEAR, why)
+    return UnitGuess(units, second > best + CLEAR, _why(pairs[0], size, mass, units))
+
+
+def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
+    """What speaks against the unit system a bare deck was read in; '' where nothing does.
+
+    Raises
+    ------
+    FileError
+        If its materials are known ones in another system and in no way in this one.
+    """
+    pairs, (size, mass) = _materials(made, units), _size_and_mass(made, units)
+    seen = f"in {units.name} {_seen(size, mass, units)}"
+    if pairs and _off_materials(pairs, units) > NEAR:
+        better = min(UNITS.values(), key=lambda u: _off_materials(pairs, u))
+        if _off_materials(pairs, better) <= NEAR:
+            raise FileError(
+                f"{source}: give --units {better.name}, not {units.name}: "
+                f"{_why(pairs[0], size, mass, better)}; {seen}, and its materials are no known ones"
+            )
+        E, rho = pairs[0]
+        first = _moduli(E * units.stress, rho * units.density)
+        return f"{source}: its materials are known ones in no unit system; {seen}, with {first}"
+    if _odd(size, mass, units):
+        return f"{source}: {seen}: look at --units and at the cards"
+    return ""
+
+
+def _size_and_mass(made: Assembly, read_in: Units) -> tuple[float, float]:
+    """As they stand in the deck."""
+    size = float(np.linalg.norm(np.ptp(made.points, axis=0))) / read_in.length
+    return size, float(mass_properties(made)[0]) / read_in.mass
+
+
+def _why(pair: tuple[float, float], size: float, mass: float, u: Units) -> str:
+    """What the deck is in a unit system of which its first material (E, rho) is a known one."""
+    E, rho = pair[0] * u.stress, pair[1] * u.density
+    named = f"{_named(E, rho)} ({_moduli(E, rho)})"
+    return f"in {u.name} {_seen(size, mass, u)} and its first material is {named}"
+
+
+def _seen(size: float, mass: float, u: Units) -> str:
+    return f"the deck is {size * u.length:.3g} m across, weighs {mass * u.mass:.4g} kg"
+
+
+def _moduli(E: float, rho: float) -> str:
+    return f"E = {E / 1e9:.4g} GPa, rho = {rho:.4g} kg/m³"
 
 
 def material_of(section: Section) -> Material | None:
@@ -97,10 +136,19 @@ def _materials(made: Assembly, read_in: Units) -> list[tuple[float, float]]:
 
 def _misfit(pairs: list[tuple[float, float]], size: float, mass: float, u: Units) -> float:
     """Decades from known materials, median of the parts; one more for an odd size or mass each."""
-    each = [_distance(E * u.stress, rho * u.density)[0] for E, rho in pairs]
-    small_or_large = not SIZE[0] <= size * u.length <= SIZE[1]
+    return _off_materials(pairs, u) + _odd(size, mass, u)
+
+
+def _off_materials(pairs: list[tuple[float, float]], u: Units) -> float:
+    """Decades from the nearest known material, median of the parts."""
+    return float(np.median([_distance(E * u.stress, rho * u.density)[0] for E, rho in pairs]))
+
+
+def _odd(size: float, mass: float, u: Units) -> int:
+    """How many of size and mass are not those of what is tested in one piece."""
+    small_or_large = size > 0 and not SIZE[0] <= size * u.length <= SIZE[1]
     light_or_heavy = mass > 0 and not MASS[0] <= mass * u.mass <= MASS[1]
-    return float(np.median(each)) + small_or_large + light_or_heavy
+    return small_or_large + light_or_heavy
 
 
 def _distance(E: float, rho: float) -> tuple[float, str]:

@@ -1,0 +1,84 @@
+"""A bare deck in a unit system in which it cannot be meant: refused, or said where none fits."""
+
+import itertools
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from chladni.cli.app import application
+from chladni.errors import FileError
+from chladni.units import UNITS
+from chladni.workflows.loaded_model import load_deck
+
+SIDE, THICK, E, RHO = 0.3, 1e-3, 2.1e11, 7850.0  # SI
+READERS = {
+    "modes": ("--count", "8"),
+    "render": ("--modes", "7"),
+    "frf": ("--input", "1:+Z", "--output", "9:+Z", "--lines", "4"),
+    "plan": ("--sensors", "4", "--drawn", "0", "--modes", "2"),
+    "bench": ("--exact",),
+    "study": ("--vary", "E=90%:110%", "--samples", "2"),
+}
+
+
+def written(path, u, E=E, rho=RHO, side=SIDE):
+    """A plate of 4 by 4 shells whose numbers are those of a unit system."""
+    n = 4
+    lines = [f"MAT1,1,{E / u.stress:.5e},,.3,{rho / u.density:.5e}"]
+    lines += [f"PSHELL,1,1,{THICK / u.length:.5e},1,,1", "SPC1,1,123456,1"]
+    x = [side * k / n / u.length for k in range(n + 1)]
+    lines += [f"GRID,{1 + j + 5 * i},,{x[i]:.6e},{x[j]:.6e},0." for i in range(5) for j in range(5)]
+    for i, j in itertools.product(range(n), range(n)):
+        a = 1 + j + 5 * i
+        lines.append(f"CQUAD4,{1 + j + n * i},1,{a},{a + 5},{a + 6},{a + 1}")
+    path.write_text("\n".join(["BEGIN BULK", *lines, "ENDDATA", ""]))
+    return path
+
+
+@pytest.mark.parametrize(("meant", "said"), list(itertools.product(UNITS.values(), repeat=2)))
+def test_a_deck_of_known_materials_is_read_in_their_system_alone(tmp_path, meant, said):
+    deck = load_deck(written(tmp_path / "plate.bdf", meant), said)
+    if said == meant:
+        assert deck.model().notes == ()
+        return
+    with pytest.raises(FileError, match=rf"give --units {meant.name}, not {said.name}: .*steel"):
+        deck.model()
+
+
+@pytest.mark.parametrize(
+    ("more", "noted"),
+    [
+        ({"rho": 7850e12}, "known ones in no unit system; .* weighs .*, with E = 210 GPa"),
+        ({"E": 1.0, "rho": 1.0}, "known ones in no unit system"),
+        ({"side": 3e-4}, "the deck is 0.000424 m across, weighs .* look at --units"),
+        ({"side": 300.0}, "the deck is 424 m across"),
+    ],
+)
+def test_what_no_system_mends_is_a_note(tmp_path, more, noted):
+    """A density in another system than E; numbers without units; a deck too small or large."""
+    deck = written(tmp_path / "plate.bdf", UNITS["mm-t-s"], **more)
+    (note,) = load_deck(deck, "mm-t-s").model().notes
+    assert re.search(noted, note)
+    assert load_deck(deck).model().notes == ()  # numbers are kept: nothing was said of units
+
+
+@pytest.mark.parametrize("command", READERS)
+def test_commands_refuse_the_wrong_system(tmp_path, command):
+    deck = written(tmp_path / "plate.bdf", UNITS["SI"])
+    words = [command, deck, *READERS[command], "--units", "mm-t-s", "--out", tmp_path / "out"]
+    done = CliRunner().invoke(application(), [str(w) for w in words])
+    assert done.exit_code == 2
+    assert "give --units SI, not mm-t-s" in " ".join(done.output.split())
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["modes", "render", "frf", "plan"])
+def test_commands_say_what_looks_odd(tmp_path, command):
+    """On the terminal and on the page."""
+    deck = written(tmp_path / "plate.bdf", UNITS["SI"], E=7e10, rho=270.0)
+    words = [command, deck, *READERS[command], "--units", "SI", "--out", tmp_path / "out"]
+    done = CliRunner().invoke(application(), [str(w) for w in words])
+    assert done.exit_code == 0, done.output
+    assert "known ones in no unit system" in " ".join(done.output.split())
+    assert "known ones in no unit system" in (tmp_path / "out" / "report.html").read_text()
