@@ -67,7 +67,7 @@ def guessed_units(made: Assembly, source: str, read_in: Units = UNITS["SI"]) -> 
 
 
 def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
-    """What speaks against the unit system a bare deck was read in; '' where nothing does.
+    """A sentence against the unit system a bare deck was read in; '' where nothing speaks so.
 
     Raises
     ------
@@ -92,13 +92,13 @@ def doubt_of_units(made: Assembly, source: str, units: Units) -> str:
 
 
 def _size_and_mass(made: Assembly, read_in: Units) -> tuple[float, float]:
-    """As they stand in the deck."""
+    """Diagonal of the box around the deck, and its mass, in the deck's own units."""
     size = float(np.linalg.norm(np.ptp(made.points, axis=0))) / read_in.length
     return size, float(mass_properties(made)[0]) / read_in.mass
 
 
 def _why(pair: tuple[float, float], size: float, mass: float, u: Units) -> str:
-    """What the deck is in a unit system of which its first material (E, rho) is a known one."""
+    """The deck as a unit system has it, in which its first material (E, rho) is a known one."""
     E, rho = pair[0] * u.stress, pair[1] * u.density
     named = f"{_named(E, rho)} ({_moduli(E, rho)})"
     return f"in {u.name} {_seen(size, mass, u)} and its first material is {named}"

@@ -68,7 +68,7 @@ def _subcases(deck: Deck) -> Iterator[Subcase]:
 
 
 def remarks(deck: Deck, names: Iterable[str] = _LEFT_OUT) -> Iterator[str]:
-    """Cards and parameters that are not acted upon or contradict others, one sentence each."""
+    """Cards and parameters that are not heeded or contradict others, one sentence each."""
     for name in names:
         for cards in deck.present(name):
             yield f"{cards.where(0)}: {name} ({_LEFT_OUT[name]}) is left out"

@@ -240,8 +240,8 @@ _LAYERS = {  # corners of a face, then those that follow them on the opposite on
 def _refuse_turned(ctx: Context, cards: Cards, nodes: np.ndarray) -> None:
     """Refuse a face whose corners follow those of the opposite one better in a turned order.
 
-    Corners a_i, b_i are compared where the element's mean J is the unit: order k is the one of
-    largest Σ a_i·b_(i+k), and of an element that is a parallelepiped or near it that is k = 0.
+    Corners a_i, b_i are compared where the element's mean J is the unit. Their order k is the one
+    of largest Σ a_i·b_(i+k). It is k = 0 for a parallelepiped and for what is near to one.
     """
     X, m = ctx.places[nodes], nodes.shape[1] // 2
     round_ = 2 * np.pi * np.arange(m) / m

@@ -198,7 +198,7 @@ _TWO_DIGITS = 0.05  # by so much the sum of moments written to two digits may be
 def _unlike_bodies(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n,) bool: those whose largest principal moment exceeds the sum of the others; (n, 3) all.
 
-    Of any body J_3 <= J_1 + J_2, as J_1 + J_2 - J_3 = 2 ∫ x_3² dm.
+    A body has J_3 <= J_1 + J_2, as J_1 + J_2 - J_3 = 2 ∫ x_3² dm.
     """
     J = np.linalg.eigvalsh(inertia)
     return J[:, 2] > (1 + _TWO_DIGITS) * (J[:, 0] + J[:, 1]), J

@@ -30,7 +30,7 @@ _SOL = re.compile(r"^\s*SOL[\s,]+(\w+)", re.I)
 
 
 def selects_one(command: str, text: str) -> bool:
-    """Whether the text of a command that selects names one set, or matrices by their names.
+    """True where a command that selects names one set, or matrices by their names.
 
     >>> selects_one("SPC", "SPC = 7"), selects_one("SPC", "SPC = ALL")
     (True, False)

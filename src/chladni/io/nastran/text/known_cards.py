@@ -1,8 +1,8 @@
 """Names of bulk data that may stand in a deck; any other may change the structure and is refused.
 
 Harmless is what no linear analysis of stiffness, mass, damping and harmonic loads heeds: MSC
-Nastran Quick Reference Guide, section 8. What is read, and what is left out with a note, is
-harmless, too. Materials that follow temperature (MATT1...) are, unless a temperature is chosen.
+Nastran Quick Reference Guide, section 8. Cards that are read or left out with a note are harmless,
+too. Materials that follow temperature (MATT1...) are harmless while no temperature is chosen.
 """
 
 from typing import Final

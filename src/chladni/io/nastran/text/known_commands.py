@@ -53,7 +53,7 @@ def commands(lines: Iterable[str]) -> Iterator[tuple[int, str, str]]:
 
 
 def sets_material_temperature(text: str) -> bool:
-    """Whether a command chooses the temperatures that materials follow (MATT1, remark 1).
+    """True for a command that chooses the temperatures that materials follow (MATT1, remark 1).
 
     >>> sets_material_temperature("TEMP(MATE) = 4"), sets_material_temperature("TEMP(LOAD) = 4")
     (True, False)
@@ -62,5 +62,5 @@ def sets_material_temperature(text: str) -> bool:
 
 
 def harmless(command: str) -> bool:
-    """Whether a command leaves the structure as it is, or is acted upon."""
+    """True for a command that leaves the structure as it is or is heeded."""
     return command[:4] in _FIRST_FOUR
