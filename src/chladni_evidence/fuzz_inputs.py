@@ -94,6 +94,51 @@ SPC1,1,123,1,THRU,4
 MPC,2,9,1,1.,8,1,-1.
 ENDDATA
 """,
+    "sets.bdf": """SOL 103
+CEND
+TEMPERATURE(LOAD) = 4
+SPC = 7
+MPC = 8
+METHOD = 3
+BEGIN BULK
+EIGRL,3,,,4
+MAT1,1,7.+10,2.6316+10,.33,2700.
+MATT1,1,5
+TABLEM1,5
+,20.,7.+10,100.,6.5+10,ENDT
+TEMPD,4,80.
+PBARL,1,1,,BOX
+,.03,.02,.002,.003
+PBEAML,2,1,,I
+,.03,.02,.02,.002,.003,.003
+PBAR,3,1,1.-4,1.-9,2.-9,2.-9
+,,,,,,,,
+,,,.5-9
+GRID,1,,0.,0.,0.
+GRID,2,,.2,0.,0.
+GRID,3,,.4,0.,0.
+GRID,4,,.4,.2,0.
+CBAR,1,1,1,2,0.,0.,1.
+CBEAM,2,2,2,3,0.,0.,1.
+CBAR,3,3,3,4,0.,0.,1.
+CONM2,4,4,,.3
+,2.-4,.5-4,2.-4,,,3.-4
+PSOLID,9,1
+GRID,11,,0.,0.,.1
+GRID,12,,.1,0.,.1
+GRID,13,,0.,.1,.1
+GRID,14,,0.,0.,.2
+GRID,15,,.1,0.,.2
+GRID,16,,0.,.1,.2
+CPENTA,9,9,11,12,13,14,15,16
+SPC1,1,123456,1
+SPC1,2,123,11,12,13
+SPCADD,6,2
+SPCADD,7,1,6
+MPC,3,4,3,1.,3,3,-1.
+MPCADD,8,3
+ENDDATA
+""",
 }
 _SMALL = 60_000  # bytes of a deck of the user's that is taken
 SENSORS = ("label", "grid", "x", "y", "z", "direction", "role", "mass", "position_sd")

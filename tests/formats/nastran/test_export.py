@@ -186,3 +186,15 @@ def test_plain_text(tmp_path):
     assert text.isascii()
     assert max(map(len, text.splitlines())) <= 80
     assert text.startswith("$ units: mm-t-s\nSOL 103\n")
+
+
+@pytest.mark.parametrize("m", [0.0, 2.0])
+def test_inertia_that_no_body_has_stays_a_matrix(tmp_path, m):
+    """Fluid or a condensed part may weigh so; a CONM2 that says it is refused."""
+    matrix = np.diag([m, m, m, 1.0, 1.0, 3.0])[None]
+    base = everything()
+    made = replace(base, masses=Masses(np.array([9000]), base.masses.node[:1], matrix))
+    path = write_assembly(made, tmp_path / "fresh.bdf", UNITS["mm-t-s"])
+    assert "CONM1" in path.read_text()
+    again = assembly(read_deck(path), UNITS["mm-t-s"], loose=True).masses
+    np.testing.assert_allclose(again.matrix, matrix, atol=1e-9)

@@ -193,10 +193,12 @@ def test_walls_may_touch():
 
 def test_inertia_about_one_axis_alone_is_taken_with_a_note(bulk):
     """A disc of a shaft that turns; a rod's (0, J, J) and rounding are as bodies have them."""
-    cards = "CONM2,8,1,,1.,,,,,2.\nCONM2,9,2,,1.,,,,,,,2.,,,2.\nCONM2,10,3,,1.,,,,,1.,,1.,,,2.02\n"
+    moments = ("2.", "1.,-1.,1.", ",,2.,,,2.", "1.,,1.,,,2.02")
+    cards = "".join(f"CONM2,{8 + k},{k + 1},,1.,,,,,{J}\n" for k, J in enumerate(moments))
     deck = bulk(PLATE + cards)
-    assert len(assembly(deck).masses) == 3
-    assert [n for n in remarks(deck, ()) if "CONM2 8 has inertia about some axes alone" in n]
+    assert len(assembly(deck).masses) == 4
+    said = "CONM2 8 and 1 others have inertia about some axes alone"
+    assert [n for n in remarks(deck, ()) if said in n]
 
 
 @pytest.mark.parametrize(("G", "noted"), [("8.0769+5", True), ("8.1+4", False), ("", False)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from ....model.assembly import Assembly, Average, Equation, RigidBody
 from ....units import Units
-from ..read.springs_and_masses import point_mass
+from ..read.springs_and_masses import no_body, point_mass
 from ..text.format import Value, card
 from .numbering import Ids, Systems
 
@@ -77,11 +77,13 @@ def _body(M: np.ndarray) -> tuple[float, np.ndarray, np.ndarray] | None:
     """(m, offset, inertia about the mass) of a rigid body's matrix, None where it is no such."""
     m = float(M[0, 0])
     if not m > 0:
-        return None if np.any(M[:3]) else (0.0, np.zeros(3), M[3:, 3:])
+        return None if np.any(M[:3]) or no_body(M[3:, 3:])[1] else (0.0, np.zeros(3), M[3:, 3:])
     X = M[3:, :3] / m
     x = np.array([X[2, 1], X[0, 2], X[1, 0]])
     J = M[3:, 3:] + m * (X @ X)
     J = np.where(np.abs(J) < 1e-12 * max(np.abs(M[3:, 3:]).max(), 1e-300), 0.0, J)
+    if no_body(J)[1]:
+        return None
     again = point_mass(np.array([m]), x[None], J[None])[0]
     return (m, x, J) if np.allclose(again, M, rtol=1e-10, atol=1e-12 * np.abs(M).max()) else None
 

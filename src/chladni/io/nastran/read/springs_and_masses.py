@@ -193,31 +193,32 @@ def _inertia(cards: Cards) -> np.ndarray:
 
 
 _TWO_DIGITS = 0.05  # by so much the sum of moments written to two digits may be wrong
+_GIVEN = 1e-3  # of the largest principal moment; a smaller one is no more than rounding
 
 
-def _unlike_bodies(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) bool: those whose largest principal moment exceeds the sum of the others; (n, 3) all.
+def no_body(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) bool: tensors (n, 3, 3) that no body has, and those of them that give all three moments.
 
     A body has J_3 <= J_1 + J_2, as J_1 + J_2 - J_3 = 2 ∫ x_3² dm.
     """
-    J = np.linalg.eigvalsh(inertia)
-    return J[:, 2] > (1 + _TWO_DIGITS) * (J[:, 0] + J[:, 1]), J
+    J_1, J_2, J_3 = np.linalg.eigvalsh(inertia).T
+    unlike = J_3 > (1 + _TWO_DIGITS) * (J_1 + J_2)
+    return unlike, unlike & (J_1 > _GIVEN * J_3)
 
 
 def _refuse_bodiless(cards: Cards, inertia: np.ndarray) -> None:
     """Refuse three moments of inertia that no body has together; fewer than three are noted."""
-    unlike, J = _unlike_bodies(inertia)
-    if np.any(bad := unlike & (J[:, 0] > 0)):
+    if np.any(bad := no_body(inertia)[1]):
         i = int(np.argmax(bad))
-        two, one = " + ".join(f"{x:g}" for x in J[i, :2]), f"{J[i, 2]:g}"
-        why = f"no body has its inertia: of the principal moments {one} exceeds {two}"
+        J = [f"{x:g}" for x in np.linalg.eigvalsh(inertia[i])]
+        why = f"no body has its inertia: of the principal moments {J[2]} exceeds {J[0]} + {J[1]}"
         raise cards.refuse(i, why)
 
 
 def one_sided_inertia(deck: Deck) -> Iterator[str]:
     """CONM2 with inertia about some axes alone, which no body has, in one sentence."""
     for cards in deck.present("CONM2"):
-        if np.any(unlike := _unlike_bodies(_inertia(cards))[0]):
+        if np.any(unlike := no_body(_inertia(cards))[0]):
             i, more = int(np.argmax(unlike)), int(unlike.sum()) - 1
             others = f" and {more} others have" if more else " has"
             yield (
