@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 
 from chladni.arrays import fingerprint
 from chladni.dynamics.eigen import normal_modes
+from chladni.dynamics.modes import rigid_modes
 from chladni.dynamics.reduction import attachments, orthonormal, shifted
 from chladni.fem.assemble import Structure, structure
 from chladni.model.assembly import Assembly
@@ -19,6 +20,7 @@ from .calculix import calculix_modes
 Solver = Literal["chladni", "calculix"]
 ABOVE = 1.6  # our modes reach up to this many times the highest recorded frequency
 BY_CALCULIX = 70  # modes CalculiX is asked for
+_KEPT = "rigid at 0 Hz"  # what is in the cache; another word where that changes
 RIGID = 0.02  # below it a frequency of CalculiX is rounding [Hz]
 
 
@@ -28,7 +30,7 @@ class ArticleModes:
 
     Attributes
     ----------
-    frequency : (r,) Hz
+    frequency : (r,) Hz      0 of rigid ones
     rows : (k,) int          rows of the article's points, increasing
     shapes : (k, 3, r)       motion of these points [1/√kg]
     loss : (r, r)            Φᵀ K_loss Φ of materials with losses [rad²/s²]
@@ -73,7 +75,7 @@ def _kept(
     asked: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
 ) -> ArticleModes:
     """Modes by our elements, from the cache where they are."""
-    kept = None if cache is None else cache / f"{fingerprint(asked)}.npz"
+    kept = None if cache is None else cache / f"{fingerprint((asked, _KEPT))}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
             return ArticleModes(*(held[f.name] for f in fields(ArticleModes)))
@@ -110,4 +112,5 @@ def _ours(built: Structure, rows: np.ndarray, loaded: np.ndarray, f_max: float) 
     shapes = basis @ Q
     moving = (built.T @ shapes).reshape(len(built.assembly.points), 6, -1)[rows, :3]
     f = np.sqrt(np.maximum(lam, 0.0)) / (2 * np.pi)
+    f[: int(rigid_modes(modes).sum())] = 0.0
     return ArticleModes(f, rows, moving, shapes.T @ (built.loss @ shapes))

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from chladni.dynamics import eigen
 from chladni.dynamics.eigen import normal_modes
-from chladni.dynamics.modes import rigid_modes
+from chladni.dynamics.modes import ModalModel, rigid_modes
 from chladni.dynamics.system import System
 from chladni.errors import AccuracyError, ModelError
 from chladni.fem.assemble import structure
@@ -50,6 +50,14 @@ def test_free_box_has_six_rigid_modes(shell_box):
     modal = normal_modes(shell_box, 12)
     assert rigid_modes(modal).sum() == 6
     assert modal.frequency[6] > 1e3 * modal.frequency[5]
+
+
+def test_a_wide_range_of_modes_leaves_the_rigid_one_rigid():
+    """Modes of a line over three decades and more: what is highest says nothing of the lowest."""
+    f = np.r_[1e-6, line_frequency(10_000, np.arange(1, 10_000))]
+    modal = ModalModel(f, 0 * f, np.zeros((0, len(f))), np.zeros((0, 2), int))
+    assert f[-1] > 1e3 * f[1]
+    assert rigid_modes(modal).tolist() == [True] + [False] * (len(f) - 1)
 
 
 def test_sparse_equals_dense(monkeypatch):

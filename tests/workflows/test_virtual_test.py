@@ -112,6 +112,17 @@ def test_levels_of_one_article_differ_by_noise_alone(case):
     assert np.median(np.abs(high / low - 1)) < 2e-3
 
 
+@pytest.mark.parametrize("band", [(5.0, 60.0), (1.0, 8.0)])
+def test_a_local_spring_is_firm_against_the_first_elastic_mode(case, band):
+    """k = 0.2 m ω_1²: neither residual vectors far above nor a band below hide rigid motions."""
+    found = benched(case, band=band, local=("clearance",), exact=True)
+    own = chladni.modes(case, 7)
+    due = 0.2 * own.mass * (2 * np.pi * own.modal.frequency[6]) ** 2
+    assert own.rigid.tolist() == [True] * 6 + [False]
+    assert found.truth["local"][0]["k"] == pytest.approx(due, rel=0.02)
+    assert found.truth["frequency_hz"]["A"][:6].tolist() == [0.0] * 6
+
+
 def test_articles_differ_and_exact_ones_do_not(case):
     def f(result):
         return [np.array(v)[6:12] for v in result.truth["frequency_hz"].values()]

@@ -6,7 +6,6 @@ from typing import Self
 import numpy as np
 
 from ..arrays import readonly
-from ..dynamics.modes import ModalModel, rigid_modes
 from ..errors import ShapeError
 from .local_forces import LocalForce
 
@@ -19,7 +18,7 @@ class BenchArticle:
     ----------
     name : str
     weight : float              as it is weighed, without sensors [kg]
-    frequency, damping : (r,)   [Hz], of critical; rigid motions have 0 Hz
+    frequency, damping : (r,)   [Hz], of critical; rigid motions have 0 Hz to the last digit
     outputs : (n_out, r)        along what each sensor feels, at its true place
     mounts : (n_out, 3, r)      translation where each sensor sits
     drive : (6, r)              at the shaker: along the stinger, two ways across, three rotations
@@ -81,9 +80,7 @@ class BenchArticle:
     @property
     def elastic(self) -> np.ndarray:
         """True for modes that are no rigid motion (r,)."""
-        none = np.zeros((0, len(self.frequency)))
-        modal = ModalModel(self.frequency, self.damping, none, np.zeros((0, 2), int))
-        return ~rigid_modes(modal)
+        return np.asarray(self.frequency > 0)
 
     def turned(self, frequency: np.ndarray, damping: np.ndarray, Q: np.ndarray, name: str) -> Self:
         """The article whose modes are Φ Q, Q (r, r) orthogonal."""

@@ -11,7 +11,6 @@ from ..dofs import parse, rows
 from ..errors import LabelError, ShapeError
 
 _RIGID_GAP = 100.0  # a jump in frequency no structure makes between two flexible modes
-_FLOOR = 1e-5  # of the highest frequency: below it numbers are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +72,13 @@ class ModalModel:
 
 
 def rigid_modes(modal: ModalModel) -> np.ndarray:
-    """True for modes under the noise floor: a frequency jump of 100 or more follows (r,) bool.
+    """True for modes without stiffness: a frequency jump of 100 or more follows (r,) bool.
 
-    Modes of a soft suspension lie within a factor of 100 of the first flexible mode and are not
-    counted; a model whose modes are all rigid has no jump and counts none.
+    Rounding gives each a frequency of its own near zero, so that the last jump counts. Modes of a
+    soft suspension lie within a factor of 100 of the first flexible mode and are not counted; a
+    model whose modes are all of 0 Hz has no jump and counts none. Residual vectors are no modes:
+    their frequencies jump, too, so that a model is judged before it has them.
     """
-    f = np.maximum(modal.frequency, _FLOOR * modal.frequency.max(initial=0.0))
-    jumps = np.flatnonzero(f[1:] >= _RIGID_GAP * f[:-1])
+    f = modal.frequency
+    jumps = np.flatnonzero((f[1:] > 0) & (f[1:] >= _RIGID_GAP * f[:-1]))
     return np.arange(len(f)) < (jumps[-1] + 1 if len(jumps) else 0)

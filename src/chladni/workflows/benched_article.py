@@ -10,6 +10,8 @@ from ..bench.accelerometers import AccelerometerType
 from ..bench.article_scatter import Scatter, drawn_damping
 from ..bench.bench_article import BenchArticle
 from ..bench.local_forces import LocalForce
+from ..dynamics.eigen import normal_modes
+from ..dynamics.modes import ModalModel, rigid_modes
 from ..dynamics.residual import with_residual_vectors
 from ..fem.assemble import Structure, structure
 from ..fem.energy import mass_properties
@@ -18,6 +20,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import node_points, solved
 from ..geometry.facets import tangents, unit
 from ..model.assembly import Assembly
+from .loaded_model import LEAST
 
 ABOVE = 2.0  # modes reach so many times the highest line, residual vectors stand for the rest
 SAME_PLACE = 1e-3  # nearer than this the sensor at the driving point is meant [m]
@@ -79,7 +82,7 @@ def benched(
     dissipate in each mode by itself.
     """
     built = structure(assembly)
-    found = solved(built, ABOVE * f_max)
+    modes = _modes(built, ABOVE * f_max)
     n = len(places.points)
     felt = rows_of(built, places.grids, places.points, places.directions)
     moved = rows_of(
@@ -91,13 +94,14 @@ def benched(
     hung = _hung(built, () if on_table else hangers)
     base = inputs.loads(built)[:1] if on_table else sp.csr_array((0, built.T.shape[1]))
     loads = sp.vstack([base if on_table else drive[:3], hung]).T.toarray()
-    whole = with_residual_vectors(built.system, found.modes, loads, node_points(built))
+    whole = with_residual_vectors(built.system, modes, loads, node_points(built))
     phi, r = whole.shapes, len(whole)
-    zeta = np.full(r, REST)
-    zeta[: len(found.modes)] = drawn_damping(scatter, len(found.modes), rng)
-    zeta = zeta + _dissipated(built, phi, whole.frequency)
+    f, zeta = whole.frequency.copy(), np.full(r, REST)
+    f[: len(modes)][rigid_modes(modes)] = 0.0
+    zeta[: len(modes)] = drawn_damping(scatter, len(modes), rng)
+    zeta = zeta + _dissipated(built, phi, f)
     return BenchArticle(
-        name="A", weight=mass_properties(assembly)[0], frequency=whole.frequency, damping=zeta,
+        name="A", weight=mass_properties(assembly)[0], frequency=f, damping=zeta,
         outputs=felt @ phi, mounts=(moved @ phi).reshape(n, 3, r), drive=drive @ phi,
         hangers=(hung @ phi).reshape(-1, 3, r), output_labels=outputs.labels,
         input_label=inputs.labels[0], masses=outputs.mass, channels=outputs.channels,
@@ -105,6 +109,15 @@ def benched(
         carried=places.directions @ inputs.directions[0],
         mounts_carried=np.tile(inputs.directions[0], (n, 1)),
     )  # fmt: skip
+
+
+def _modes(built: Structure, band: float) -> ModalModel:
+    """Up to a frequency [Hz], and so many that an elastic one is among them."""
+    found = solved(built, band).modes
+    least = min(LEAST, len(built.system.dofs))
+    if len(found) >= least:
+        return found
+    return normal_modes(built.system, least, points=node_points(built))
 
 
 def _drive(built: Structure, inputs: MeasuredDofs) -> sp.csr_array:
