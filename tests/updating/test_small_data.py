@@ -9,7 +9,7 @@ import pytest
 from chladni.case import load_case
 from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.frf import FRF
-from chladni.errors import AccuracyError, ChladniError
+from chladni.errors import AccuracyError, ChladniError, FileError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
@@ -17,7 +17,7 @@ from chladni.units import UNITS
 from chladni.updating.diagnosis import Diagnosis
 from chladni.updating.least_data import too_little, withheld
 from chladni.updating.measured_frequencies import widened
-from chladni.updating.preparation import _own_modes
+from chladni.updating.preparation import _own_modes, equalised_lines
 from chladni.updating.real_modes import real_modes
 from chladni.workflows.calibrate import calibrate
 from chladni.workflows.correlate import correlate
@@ -211,3 +211,31 @@ def test_what_a_rig_rings_with_bears_no_name():
     deck = SimpleNamespace(modes=SimpleNamespace(frequency=np.array([0.0, 100.0, 250.0, 900.0])))
     assert _own_modes(deck, 40.0, 200.0) == 2
     assert _own_modes(deck, 0.0, 100.0) == 1
+
+
+@pytest.mark.parametrize("low", [79.0, 79.1, 80.0, 33.3, 1e-3, 1234.5])
+@pytest.mark.parametrize("width", [1.02, 3.0])
+def test_the_lowest_line_compared_is_the_end_of_the_band(low, width):
+    """A band narrower than the step between lines keeps one, whatever its end rounds to."""
+    f = equalised_lines((low, width * low), (), 0.08)
+    assert f[0] == low
+    assert f[-1] < width * low
+
+
+def test_a_band_of_which_no_line_is_left_is_refused(tmp_path):
+    """Lines 6 % apart: a band of 4 % holds one of them, and a gap may take that one away."""
+    case = case_of(tmp_path, "frf.npz", plate_deck())
+    built = structure(assembly(read_deck(tmp_path / "deck.bdf"), UNITS["SI"]))
+    modal = normal_modes(built.system, 12)
+    f_1 = float(modal.frequency[6])
+    f = np.linspace(0.97 * f_1, 1.03 * f_1, 200)
+    phi = built.rows(np.array([[35, 3], [1, 3]])) @ modal.shapes
+    s = 2j * np.pi * f[:, None]
+    d = s**2 / ((2 * np.pi * modal.frequency) ** 2 + 0.01 * 2 * np.pi * modal.frequency * s + s**2)
+    H = np.einsum("om,fm->fo", phi * phi[0], d)[:, :, None]
+    write_npz(tmp_path / "frf.npz", FRF(H, f, ("35:+Z", "1:+Z"), ("35:+Z",), "accelerance"))
+    with (tmp_path / "case.toml").open("a") as text:
+        text.write(f"[band]\nfit = [{0.98 * f_1}, {1.02 * f_1}]\n")
+        text.write(f"exclude = [[{0.979 * f_1}, {0.981 * f_1}]]\n")
+    with pytest.raises(FileError, match="exclude leaves no line between"):
+        calibrate(load_case(case))

@@ -169,8 +169,8 @@ def modal_gains(
     phi_out, phi_in : (n_out, m), (n_in, m)   shapes of the model [1/√kg]
     frequency : (m,)                          [Hz], within which a factor of 1.3 is looked for
     """
-    A = constants(identified).reshape(identified.order, -1)
-    model = np.einsum("om,im->moi", phi_out, phi_in).reshape(len(frequency), -1)
+    A = constants(identified).reshape(identified.order, identified.lower.size)
+    model = np.einsum("om,im->moi", phi_out, phi_in).reshape(len(frequency), A.shape[1])
     cross = A @ model.T
     own, theirs = (np.abs(A) ** 2).sum(axis=1), (model**2).sum(axis=1)
     mac = np.abs(cross) ** 2 / np.maximum(own[:, None] * theirs, 1e-300)

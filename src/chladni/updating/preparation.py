@@ -80,6 +80,12 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
             f"no mode stands out of the recording between {low:g} and {fit_max:g} Hz, so there is "
             "nothing to fit a model to"
         )
+    lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
+    if not ((lines[0] >= low) & (lines[0] <= fit_max)).any():
+        raise FileError(
+            f"[band] exclude leaves no line between {low:g} and {fit_max:g} Hz to compare with the "
+            f"model (its lines lie {0.75 * ZETA:.0%} apart); exclude less, or widen the band"
+        )
     progress("modes of the deck", 0.3)
     nominal = modelled(question.searched(question.assembly), SOLVED * f_max)
     built = nominal.structure
@@ -89,7 +95,6 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     mesh = mesh_hidden(nominal, f_max, measured_on(question))
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
-    lines = [equalised_lines(reach, question.exclude, zeta) for zeta in (ZETA, ZETA_Q)]
     held_sensors = _held_sensors(question)
     others, said = others_identified(question, reach)
     data, spreads = [], []
@@ -185,7 +190,7 @@ def equalised_lines(
     band: tuple[float, float], exclude: Sequence[tuple[float, float]], zeta: float
 ) -> np.ndarray:
     """Lines three quarters of a half-bandwidth apart, f_{k+1} = f_k (1 + 0.75 ζ), gaps left out."""
-    f = np.exp(np.arange(np.log(band[0]), np.log(band[1]), 0.75 * zeta))
+    f = band[0] * np.exp(np.arange(0.0, np.log(band[1] / band[0]), 0.75 * zeta))
     for a, b in exclude:
         f = f[(f < a) | (f > b)]
     return f
