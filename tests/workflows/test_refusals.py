@@ -87,3 +87,18 @@ def test_a_result_that_is_trusted_hands_itself_out(diagnosed):
     assert diagnosed.trusted() is diagnosed
     with pytest.raises(AccuracyError, match="too narrow"):
         replace(diagnosed, distrust=("the basis is too narrow",)).trusted()
+
+
+def test_frfs_beside_the_poles_that_are_compared_are_screened_alone(case, tmp_path):
+    """Where poles are compared the case knows places of its table alone, not those of the FRFs."""
+    source = tmp_path / "case"
+    shutil.copytree(case.path.parent, source)
+    (source / "poles.csv").write_text("mode,frequency_hz\n1,40.0\n2,80.0\n")
+    rows = ["label,grid,direction,role", *(f"{g}:+Z,{g},+Z,input" for g in (30, 43))]
+    (source / "sensors.csv").write_text("\n".join(rows) + "\n")
+    named = '["frf.npz", "poles.csv"]\nuse = "poles.csv"\nsensors = "sensors.csv"'
+    text = (source / "case.toml").read_text().replace('["frf.npz"]', named)
+    (source / "case.toml").write_text(text)
+    (found,) = chladni.evaluate_recordings(chladni.load_case(source)).recordings
+    assert found.screening.name == "frf.npz"
+    assert "channels against the model" not in [check.name for check in found.screening.checks]

@@ -62,7 +62,8 @@ def evaluate_recordings(
 ) -> Evaluation:
     """Estimate the FRFs of what holds time data, and screen every recording.
 
-    The first recording of a case is screened against its model as well.
+    The first recording of a case is screened against its model as well, unless the case compares
+    natural frequencies: it then knows the places of other channels, or of none.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def _screened(
     case: Case | None, r: Recording, others: Sequence[Recording], first: bool
 ) -> Screening:
     identified = _identified(case, r)
-    if case is None or not first or identified is None:
+    if case is None or not (first and case.frfs) or identified is None:
         return screened(r, identified, others)
     model = modelled(case.tested(case.assembly), REACH * identified.band[1])
     return screened_by_model(case, identified, model)
