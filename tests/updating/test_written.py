@@ -25,7 +25,8 @@ from chladni.updating.likelihood import Poles, Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.result_parts import calibrated
+from chladni.updating.result import Agreement, Scores
+from chladni.updating.result_parts import calibrated, foretells_worse
 from chladni.updating.written_hypothesis import as_foretold, as_found, as_written
 
 
@@ -423,3 +424,20 @@ def test_what_makes_another_material_is_written_before_what_divides_a_part(reduc
     assert len(one.parts) == len(other.parts) > 1
     for mine, its in zip(one.parts, other.parts, strict=True):
         assert (mine.section.bending.E1, mine.name) == (its.section.bending.E1, its.name)
+
+
+def held(nominal, calibrated, floor=None):
+    return Agreement(held_out=Scores(nominal=nominal, calibrated=calibrated, floor=floor))
+
+
+def test_numbers_that_foretell_worse_than_the_deck_are_not_to_be_trusted():
+    """What is fitted must serve what was not; only what noise leaves of Q may be chance."""
+    (why,) = foretells_worse(held(0.315, 0.938, 0.01))
+    assert "0.938, 0.315 before" in why
+    assert 'gain = "unknown"' in why
+    assert "position_sd" in why
+    assert foretells_worse(held(0.108, 0.150))
+    assert not foretells_worse(held(0.108, 0.115, 0.01))
+    assert not foretells_worse(held(0.108, 0.108))
+    assert not foretells_worse(held(None, None))
+    assert not foretells_worse(None)

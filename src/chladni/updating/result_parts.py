@@ -177,6 +177,24 @@ def agreement(
     )
 
 
+def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
+    """Why a calibration is not to be trusted: it foretells what no fit saw worse than the deck.
+
+    By no more than the noise of the recording leaves of Q it may be chance.
+    """
+    held = None if agreement is None else agreement.held_out
+    if held is None or held.nominal is None or held.calibrated is None:
+        return ()
+    if held.calibrated <= held.nominal + (held.floor or 0.0):
+        return ()
+    return (
+        "the calibrated deck foretells the data that no fit saw worse than the deck as it was "
+        f"given (Q {held.calibrated:.3g}, {held.nominal:.3g} before): its numbers make up for "
+        "something else; chladni diagnose looks for that, and where level or places of sensors "
+        'are uncertain, [test] gain = "unknown" and position_sd say so',
+    )
+
+
 def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
     """Ordinary parameters as they were found beside scatter, joints and folds, and in the decks.
 

@@ -54,6 +54,7 @@ from ..updating.result_parts import (
     agreement,
     alternatives,
     calibrated,
+    foretells_worse,
     laid_on_sheets,
     named_effects,
     otherwise,
@@ -148,6 +149,8 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     distrust = known.distrust
     if diagnosing and result.verdict in ("calibration only", "nothing missing"):
         distrust = (*distrust, *in_doubt(found.plain.fit, found.null.fit))
+    if not diagnosing:
+        distrust = (*distrust, *foretells_worse(result.agreement))
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
         distrust = (f"nothing is named: {prepared.too_little}", *distrust)
     said = () if known.screening is None else known.screening.notes
