@@ -35,9 +35,9 @@ WORKFLOW = {  # command: the function it calls
 }
 
 
-def written(command, name, folder, out, *options):
+def written(command, name, folder, out, *options, code=0):
     done = CliRunner().invoke(application(), [command, str(folder), *options, "--out", str(out)])
-    assert done.exit_code == 0, (done.output, done.exception)
+    assert done.exit_code == code, (done.output, done.exception)
     return json.loads((out / name).read_text())
 
 
@@ -73,7 +73,9 @@ def test_json_of_a_command_is_the_result_of_its_function(
 
 
 def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder, tmp_path):
-    found = written("calibrate", "diagnosis.json", folder, tmp_path / "out")
+    """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
+    found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)
+    assert "foretells the data that no fit saw worse" in calibrated.distrust[0]
     assert found.pop("files")["deck"] == "updated.bdf"
     due = plain(to_json(calibrated))
     due.pop("files")
