@@ -75,7 +75,7 @@ def test_json_of_a_command_is_the_result_of_its_function(
 def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder, tmp_path):
     """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
     found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)
-    assert "foretells the data that no fit saw worse" in calibrated.distrust[0]
+    assert "predicts the held-out data worse" in calibrated.distrust[0]
     assert found.pop("files")["deck"] == "updated.bdf"
     due = plain(to_json(calibrated))
     due.pop("files")

@@ -172,7 +172,7 @@ def test_two_shakers_an_article_and_a_level(tmp_path):
     out = tmp_path / "out"
     done = CliRunner().invoke(application(), ["calibrate", str(tmp_path), "--out", str(out)])
     assert done.exit_code == 3, (done.output, done.exception)
-    assert "foretells the data that no fit saw worse" in done.stderr
+    assert "predicts the held-out data worse" in done.stderr
     told = json.loads((out / "diagnosis.json").read_text())
     rows = {r["name"]: r for r in told["recordings"]}
     assert rows["other.npz"]["relation"] == "article"

@@ -178,7 +178,7 @@ def agreement(
 
 
 def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
-    """Why a calibration is not to be trusted: it foretells what no fit saw worse than the deck.
+    """Why a calibration is not to be trusted: it predicts the held-out data worse than the deck.
 
     By no more than the noise of the recording leaves of Q it may be chance.
     """
@@ -188,10 +188,9 @@ def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
     if held.calibrated <= held.nominal + (held.floor or 0.0):
         return ()
     return (
-        "the calibrated deck foretells the data that no fit saw worse than the deck as it was "
-        f"given (Q {held.calibrated:.3g}, {held.nominal:.3g} before): its numbers make up for "
-        "something else; chladni diagnose looks for that, and where level or places of sensors "
-        'are uncertain, [test] gain = "unknown" and position_sd say so',
+        "the calibrated deck predicts the held-out data worse than the deck as it was given "
+        f"(Q {held.calibrated:.3g}, {held.nominal:.3g} before); try chladni diagnose, "
+        '[test] gain = "unknown" if the level is uncertain, position_sd if the places are',
     )
 
 

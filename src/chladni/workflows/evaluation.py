@@ -62,8 +62,8 @@ def evaluate_recordings(
 ) -> Evaluation:
     """Estimate the FRFs of what holds time data, and screen every recording.
 
-    The first recording of a case is screened against its model as well, unless the case compares
-    natural frequencies: it then knows the places of other channels, or of none.
+    The first recording of a case is screened against its model as well. A case that compares
+    natural frequencies does not know the places of its channels; it is screened alone.
 
     Raises
     ------
