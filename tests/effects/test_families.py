@@ -350,7 +350,7 @@ def test_goes_into_the_deck_by_its_cards_and_no_others(family, on, proposed, tmp
     write_deck(read, tmp_path / "new.bdf", changes(read, before, after, UNITS["mm-t-s"]))
     touched = cards_that_differ(path, tmp_path / "new.bdf")
     assert touched
-    assert touched <= set(family.cards)
+    assert touched - {"INCLUDE"} <= set(family.cards)  # many cards stand in a file of their own
     again = assembly(read_deck(tmp_path / "new.bdf"), UNITS["mm-t-s"])
     found, due, was = (normal_modes(structure(a).system, 12).frequency[6:]
                        for a in (again, after, before))  # fmt: skip
