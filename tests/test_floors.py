@@ -24,6 +24,7 @@ GROUND = {
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
     "model": GROUND,
+    "decision": GROUND,
     "geometry": GROUND | {"model"},
     "sparse": GROUND,
     "dynamics": GROUND | {"sparse"},
@@ -33,7 +34,7 @@ MAY_IMPORT = {  # floor: the floors it may use, its own aside
     "bench": GROUND | {"dynamics", "ema"},
     "effects": GROUND | {"model", "geometry", "dynamics", "fem", "ema"},
 }
-MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse"}
+MAY_IMPORT["updating"] = MAY_IMPORT["effects"] | {"effects", "sparse", "decision"}
 MAY_IMPORT["case"] = GROUND | {"model", "geometry", "fem", "dynamics", "ema", "io", "effects"}
 BELOW = MAY_IMPORT["updating"] | {"updating", "geometry", "io", "bench", "case"}
 MAY_IMPORT["view"] = GROUND | {"model", "geometry", "dynamics"}

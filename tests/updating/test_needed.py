@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chladni.decision.decision_rules import TIED
 from chladni.effects.element_groups import element_groups
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
-from chladni.updating.diagnosis import Diagnosis, needed, threshold
+from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.likelihood import Poles, Responses
-from chladni.updating.ties import TIED
 from chladni_specimens.plates import plate
 
 DATA = object.__new__(Poles), object.__new__(Responses)
@@ -24,14 +24,20 @@ def orthotropy_of(E, rho):
 
 @pytest.mark.parametrize("data", DATA)
 def test_along_its_grain_wood_is_stiffer_as_a_rule(data):
-    others = [SimpleNamespace(effect=SimpleNamespace(expected=False))] * 12
+    """Another leader needs the whole price, however many families were tried."""
+    others = (SimpleNamespace(effect=SimpleNamespace(expected=False)),) * 12
     wood, steel = (
         SimpleNamespace(effect=orthotropy_of(E, rho)) for E, rho in ((5e9, 420.0), (2.1e11, 7850.0))
     )
-    assert needed(data, [wood, *others]) == TIED < threshold(data, 13)
-    assert needed(data, [steel, *others]) == threshold(data, 13)
-    assert needed(data, [others[0], wood]) == threshold(data, 2)  # another leads
-    assert needed(data, []) == threshold(data)
+    null = SimpleNamespace(data=data, effect=SimpleNamespace(expected=False))
+
+    def due(*hypotheses):
+        return Diagnosis(null, null, null, hypotheses).due
+
+    assert due(wood, *others) == TIED < threshold(data, 13)
+    assert due(steel, *others) == threshold(data, 13)
+    assert due(others[0], wood) == threshold(data, 2)
+    assert due() == threshold(data)
 
 
 @pytest.mark.parametrize("data", DATA)

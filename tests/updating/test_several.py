@@ -21,19 +21,16 @@ from chladni.effects.surroundings import Setup
 from chladni.fem.energy import mass_properties
 from chladni.updating import candidates as scanned
 from chladni.updating import diagnosis as diagnosing
-from chladni.updating import several_judged
-from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.candidates import candidates, repeats
+from chladni.updating.deciding import on_its_own_basis
 from chladni.updating.diagnosis import Diagnosis, threshold
-from chladni.updating.held_out_evidence import HeldOutEvidence, held_out_evidence
+from chladni.updating.held_out_evidence import held_out_evidence
 from chladni.updating.hypothesis_fit import HypothesisFit, UpdatingProblem, fitted
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.rivals import _on_its_own_basis
 from chladni.updating.search_round import _of_the_same_lump, on_common_basis, search_round
-from chladni.updating.several import Rival, _begun_with, _More, _paying, _revised, _same, several
-from chladni.updating.several_judged import named_together
+from chladni.updating.several import _begun_with, _More, _paying, _revised, _same, several
 from chladni.updating.written_hypothesis import as_written
 
 SENSORS = [1, 7, 57, 63, 25, 39]
@@ -221,7 +218,8 @@ def test_a_rival_has_a_basis_of_its_own_again(two, found):
     with pytest.raises(ValueError, match="mismatch"):
         rival.data.scaled(rival.fit.state, False)
     null = null_of(two)
-    again = _on_its_own_basis(two, SimpleNamespace(null=null), rival)
+    asked = SimpleNamespace(problem=two)
+    again = on_its_own_basis(asked, SimpleNamespace(null=null), rival)
     assert again.data.scaled(again.fit.state, False)[0].size
     gains = [null.neg2_log_evidence - t.neg2_log_evidence for t in (again, lead)]
     assert gains[0] == pytest.approx(gains[1], rel=0.02)
@@ -317,83 +315,3 @@ def test_where_nothing_is_named_and_calibration_fits_nothing_more_is_sought(monk
     problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
     found = diagnosing._searched_beside(problem, quiet, lambda text, share: None)
     assert (found.verdict, found.sets) == ("nothing missing", ())
-
-
-GOOD, BAD = HeldOutEvidence(50.0, 50.0, 50.0), HeldOutEvidence(-DUE - 9, 50.0, 50.0)
-
-
-@pytest.mark.parametrize(
-    ("heard", "fits", "borne", "named"),
-    [
-        ((GOOD, GOOD), True, True, True),
-        ((GOOD, BAD), True, True, False),  # one of them is refused by data that no fit saw
-        ((GOOD, GOOD), False, True, False),  # together they do not fit
-        ((GOOD, GOOD), True, False, False),  # together they are refused against calibration
-    ],
-)
-def test_all_must_be_borne_by_data_that_no_fit_saw(monkeypatch, found, heard, fits, borne, named):
-    both, answers = found[1].sets[-1], iter(heard)
-    refused = lambda d: replace(d, verdict="not in catalogue", notes=(*d.notes, "no"))  # noqa: E731
-    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: next(answers))
-    monkeypatch.setattr(several_judged, "tested", lambda d, p: d if fits else refused(d))
-    monkeypatch.setattr(several_judged, "judged", lambda p, d: d if borne else refused(d))
-    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
-    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics")
-    prepared = SimpleNamespace(problem=None, unseen=None)
-    answer, why = named_together(prepared, alone, both, both.hypothesis)
-    assert (answer is not None) == named
-    assert bool(why) != named
-    if answer is not None:
-        assert answer.found is both.hypothesis
-        assert answer.gains == both.gains
-
-
-@pytest.mark.parametrize(
-    ("alone", "together", "named"),
-    [(0.009, 0.011, False), (0.009, 0.4, True), (0.02, 0.011, True)],
-)
-def test_a_set_does_not_fit_by_a_hair_what_one_effect_does_not(
-    monkeypatch, found, alone, together, named
-):
-    """More parameters lower what is left of anything."""
-    both = found[1].sets[-1]
-    test = FitTest(together >= LEAST, together, "", "")
-    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
-    monkeypatch.setattr(several_judged, "tested", lambda d, p: replace(d, adequacy=test))
-    monkeypatch.setattr(several_judged, "judged", lambda p, d: d)
-    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
-    before = FitTest(alone >= LEAST, alone, "", "")
-    single = Diagnosis(
-        null, null, null, (found[0][0],), "missing physics", ("it fits",), adequacy=before
-    )
-    prepared = SimpleNamespace(problem=None, unseen=None)
-    assert (named_together(prepared, single, both, both.hypothesis)[0] is not None) == named
-
-
-def test_a_renewed_fit_that_lost_the_gain_is_not_named(monkeypatch, found):
-    both = found[1].sets[-1]
-    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
-    fit = both.hypothesis.fit
-    worse = replace(fit, neg2_log_evidence=fit.neg2_log_evidence + min(both.gains))
-    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
-    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics")
-    prepared = SimpleNamespace(problem=None, unseen=None)
-    renewed = replace(both.hypothesis, fit=worse)
-    assert named_together(prepared, alone, both, renewed)[0] is None
-
-
-def test_what_would_do_in_the_place_of_one_is_told_with_what_physics_says_of_it(monkeypatch, found):
-    both = found[1].sets[-1]
-    rival = Rival("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant")
-    both = replace(both, rivals=((), (rival,)))
-    for name in ("tested", "judged"):
-        monkeypatch.setattr(several_judged, name, lambda *given: next(d for d in given if d.notes))
-    monkeypatch.setattr(several_judged, "held_out_evidence", lambda *given: GOOD)
-    null = SimpleNamespace(neg2_log_evidence=0.0, data=None)
-    alone = Diagnosis(null, null, null, (found[0][0],), "missing physics", ("it fits",))
-    prepared = SimpleNamespace(problem=SimpleNamespace(notes=()), unseen=None, notes=())
-    answer, _ = named_together(prepared, alone, both, both.hypothesis)
-    assert answer is not None
-    assert answer.one_of[:2] == (both.own.effects[1].name, "adhesive-stiffness")
-    assert "pull a coupon" in answer.one_of[2]
-    assert "cannot have: E of 300 MPa" in answer.notes[-1]

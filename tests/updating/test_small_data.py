@@ -14,8 +14,7 @@ from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
 from chladni.io.tables.write_tables import write_npz
 from chladni.units import UNITS
-from chladni.updating.diagnosis import Diagnosis
-from chladni.updating.least_data import too_little, withheld
+from chladni.updating.least_data import too_little
 from chladni.updating.measured_frequencies import widened
 from chladni.updating.preparation import _own_modes, equalised_lines
 from chladni.updating.real_modes import real_modes
@@ -171,24 +170,6 @@ def test_time_records_are_no_responses(tmp_path: Path) -> None:
 )
 def test_least_data(modes: int, channels: int, enough: bool) -> None:
     assert (too_little(modes, channels) == "") is enough
-
-
-def test_a_name_is_withheld_with_what_it_cannot_be_told_from() -> None:
-    def hypothesis(name: str, S: float) -> SimpleNamespace:
-        return SimpleNamespace(
-            effect=SimpleNamespace(name=name, expected=False), neg2_log_evidence=S
-        )
-
-    ends = {"point-mass": 10.0, "suspension": 90.0, "sensor-fault": 130.0}
-    hypotheses = tuple(hypothesis(name, S) for name, S in ends.items())
-    null = hypothesis("nothing", 100.0)
-    found = Diagnosis(null, null, null, hypotheses, "missing physics")  # type: ignore[arg-type]
-    few = SimpleNamespace(too_little="3 modes cannot bear a name")
-    kept = withheld(SimpleNamespace(too_little=""), found)  # type: ignore[arg-type]
-    assert kept is found
-    answer = withheld(few, found)  # type: ignore[arg-type]
-    assert answer.one_of == ("calibration alone", "point-mass", "suspension")
-    assert answer.found is None
 
 
 def test_a_wide_band_says_nothing_of_what_lies_far_below_it() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from chladni.decision.hypothesis_table import NULL, HypothesisTable
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
@@ -17,16 +18,18 @@ from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.errors import ModelError
 from chladni.fem.derivative import Slope
 from chladni.fem.modelled import modelled
-from chladni.updating import outcome
+from chladni.updating import deciding, outcome
+from chladni.updating.deciding import decided
+from chladni.updating.decision_in_words import concluded
 from chladni.updating.diagnosis import Diagnosis, threshold
-from chladni.updating.held_out_evidence import HeldOutEvidence
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.likelihood import Poles, Responses
+from chladni.updating.leaning import leaning
+from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import fit
-from chladni.updating.outcome import FittedScores
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.result import Agreement, Scores
 from chladni.updating.result_parts import calibrated, foretells_worse
+from chladni.updating.rows_of_fits import row_of_null
 from chladni.updating.written_hypothesis import as_foretold, as_found, as_written
 
 
@@ -152,133 +155,6 @@ DUE = threshold(object.__new__(Responses), 1)  # of one family
 NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
 
 
-@pytest.mark.parametrize(
-    ("ahead", "heard", "left", "called"),  # left of Q: of what was fitted, of what was not
-    [
-        (
-            1000.0,
-            HeldOutEvidence(0.0, 0.0, 0.0),
-            (0.1, 1.0),
-            NAMED,
-        ),  # no vote of what cannot feel it
-        (1000.0, HeldOutEvidence(), (0.1, 1.0), NAMED),  # nor has what was not held out
-        (1000.0, HeldOutEvidence(-DUE - 1, 500.0, 500.0), (0.1, 1.0), REST),
-        (1000.0, HeldOutEvidence(500.0, -DUE - 1, 500.0), (0.1, 1.0), REST),
-        (1000.0, HeldOutEvidence(500.0, 500.0, -DUE - 1), (0.1, 1.0), REST),
-        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.1, 2.0), REST),
-        (DUE + 2, HeldOutEvidence(-1.0, 0.0, 0.0), (0.1, 1.0), NAMED),
-        (DUE + 2, HeldOutEvidence(-4.0, 0.0, 0.0), (0.1, 1.0), LITTLE),
-        (
-            1.9 * DUE,
-            HeldOutEvidence(0.0, 0.0, 0.0),
-            (0.1, 1.1),
-            LITTLE,
-        ),  # faint, and serves no better
-        (2.1 * DUE, HeldOutEvidence(0.0, 0.0, 0.0), (0.1, 1.1), NAMED),
-        (1.9 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), (0.1, 1.0), LITTLE),
-        (2.1 * DUE, HeldOutEvidence(-2 * DUE, 0.0, 0.0), (0.1, 1.0), REST),  # the data are at odds
-        (
-            1000.0,
-            HeldOutEvidence(500.0, 500.0, 500.0),
-            (0.6, 0.6),
-            REST,
-        ),  # more left than explained
-        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.4, 0.6), NAMED),
-        (1000.0, HeldOutEvidence(500.0, 500.0, 500.0), (0.6, 0.4), NAMED),
-        (1.9 * DUE, HeldOutEvidence(9.0, 9.0, 9.0), (0.6, 0.6), LITTLE),
-        (0.9 * DUE, HeldOutEvidence(0.0, 1.0, 1.0), (0.1, 0.1), LITTLE),  # as after a renewed fit
-    ],
-)
-def test_data_no_fit_saw_can_refuse_a_name(monkeypatch, hypothesis, ahead, heard, left, called):
-    """No name then, and nothing of it in the deck that is reported.
-
-    Where all data together, or what was fitted by far, still refute calibration alone, something is
-    missing all the same.
-    """
-    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
-    scores = tuple(FittedScores(1.0, share, 1.0) for share in left)
-    monkeypatch.setattr(outcome, "fitted_scores", lambda prepared, found: scores)
-    null = HypothesisFit(
-        Effect(),
-        replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + ahead),
-        hypothesis.model,
-    )
-    found = Diagnosis(null, null, null, (hypothesis,), "missing physics")
-    problem = SimpleNamespace(mass_measurement=None, labels=(), damping=None, coupling=None)
-    judged = outcome.judged(SimpleNamespace(problem=problem, unseen=None), found)
-    assert judged.verdict == called
-    assert (judged.written is not None) == (called == NAMED)
-    assert any("so it is not named" in note for note in judged.notes) == (called != NAMED)
-    assert called != REST or not judged.adequacy.passes
-    if called == NAMED:
-        return
-    against = not outcome.carried(ahead, heard, DUE)  # what refused it is said, and nothing else
-    worse = not against and (left[1] > outcome.HARM or (ahead < 2 * DUE and left[1] > 1))
-    little = against and min(heard.votes.values()) >= 0
-    assert ("gained too little" in judged.refused) == little
-    assert ("data no fit saw worse explained" in judged.refused) == (against and not little)
-    assert ("worse on data no fit saw" in judged.refused) == worse
-    assert ("leaves more than it explains" in judged.refused) == (not against and not worse)
-    if called == REST and not against:
-        assert outcome.AGAINST not in judged.adequacy.what
-    open_ = called == REST and not against  # it may be the leader, with more beside it
-    assert judged.one_of == ((hypothesis.effect.name, outcome.BEYOND) if open_ else ())
-
-
-def unnamed(monkeypatch, null, lead, heard):
-    """A case and its diagnosis: a leader that what was fitted does not name, and what is heard."""
-    monkeypatch.setattr(outcome, "held_out_evidence", lambda *asked: heard)
-    monkeypatch.setattr(outcome, "tested", lambda found, problem: found)
-    found = Diagnosis(null, null, null, (lead,), "nothing missing", ("of calibration",))
-    return SimpleNamespace(problem=None, unseen=None, too_little=""), found
-
-
-@pytest.mark.parametrize(
-    ("gain", "news", "named"),
-    [(0.7 * DUE, 0.2 * DUE, False), (0.7 * DUE, 0.4 * DUE, True), (-1.0, 2 * DUE, False)],
-)
-def test_all_poles_together_may_bear_a_name(monkeypatch, reduced, gain, news, named):
-    """The Bayes factor of fitted and foretold poles is the product of both."""
-    f = np.array([20.0, 30.0, 40.0])
-    data = Poles(f, np.full(3, 1e-3), np.ones(3, bool), np.ones(3), (10.0, 50.0))
-    effects = [ordinary(reduced.groups, "E", [0])]
-    fitted = fit(reduced.model, effects, data, None, np.zeros(1))
-    lead = HypothesisFit(effects[0], fitted, reduced.model)
-    worse = replace(fitted, neg2_log_evidence=fitted.neg2_log_evidence + gain)
-    null = HypothesisFit(Effect(), worse, reduced.model)
-    due = threshold(data, 1)
-    heard = HeldOutEvidence(news * due / DUE)
-    null = replace(null, fit=replace(worse, neg2_log_evidence=(
-        fitted.neg2_log_evidence + gain * due / DUE)))  # fmt: skip
-    asked, found = unnamed(monkeypatch, null, lead, heard)
-    got = outcome.borne_by_all_data(asked, found)
-    assert (got.verdict == "missing physics") == named
-    asked = SimpleNamespace(problem=None, unseen=None, too_little="three modes are the least")
-    assert outcome.borne_by_all_data(asked, found) is found
-
-
-@pytest.mark.parametrize(
-    ("gain", "heard", "named"),
-    [
-        (0.7, HeldOutEvidence(0.4 * DUE, 1.0, 1.0), True),
-        (0.7, HeldOutEvidence(0.2 * DUE, 1.0, 1.0), False),  # not enough together
-        (0.7, HeldOutEvidence(9 * DUE, -1.0, 1.0), False),  # folds of what was fitted object
-        (0.4, HeldOutEvidence(9 * DUE, 1.0, 1.0), False),  # what was fitted hardly points there
-        (0.7, HeldOutEvidence(None, 9 * DUE, 9 * DUE), False),  # folds are no new data
-    ],
-)
-def test_all_responses_together_may_bear_a_name(monkeypatch, hypothesis, gain, heard, named):
-    """Those held out are data as those fitted are; the bound on false alarms is that of all."""
-    worse = replace(hypothesis.fit, neg2_log_evidence=hypothesis.neg2_log_evidence + gain * DUE)
-    null = HypothesisFit(Effect(), worse, hypothesis.model)
-    asked, found = unnamed(monkeypatch, null, hypothesis, heard)
-    got = outcome.borne_by_all_data(asked, found)
-    assert (got.verdict == "missing physics") == named
-    assert ("together more than" in got.notes[-1]) == named
-    again = outcome.borne_by_all_data(asked, replace(found, refused="it left too much"))
-    assert again.verdict == "nothing missing"
-
-
 def test_calibration_alone_is_written_without_scatter(reduced, responses):
     """What the null has beside E stays out of the deck, and E is fitted anew."""
     effects = [ordinary(reduced.groups, "E", [0]), random_field(reduced.groups, "t", 0.05)]
@@ -309,6 +185,20 @@ def glued(reduced):
     return ModelFamily(prior, "adhesive", slope=Slope(none, none, 0.01 * K))
 
 
+def calibration(base, data, found, changed=0.0):
+    """What is answered where nothing is named, and calibration gained so much."""
+    null = replace(row_of_null(found.null), p=0.5)
+    table = HypothesisTable(
+        {NULL: null}, nominal=null.neg2_log_evidence + changed,
+        leaning=bool(leaning(found.plain.fit)), families=20,
+    )  # fmt: skip
+    n = sum(len(e.parameters) for e in base)
+    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(n))
+    prepared = SimpleNamespace(problem=problem, score=data, too_little="")
+    found = replace(found, table=table)
+    return concluded(prepared, found, *decided(prepared, found, lambda hypothesis: 1 / 0))[0]
+
+
 @pytest.mark.parametrize(("x", "verdict"), [(1.6, "calibration only"), (1.4, "nothing missing")])
 def test_a_deck_whose_joints_are_strained_is_calibrated(reduced, responses, x, verdict):
     """The joints explain what E, rho and t would add nothing to: they are what is written."""
@@ -319,9 +209,8 @@ def test_a_deck_whose_joints_are_strained_is_calibrated(reduced, responses, x, v
         return HypothesisFit(Effect(), found, reduced.model)
 
     data = replace(data, values=data.model(at(x).fit.state))
-    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(2))
-    quiet = Diagnosis(at(0.0), at(x), at(0.0), (), "nothing missing")
-    found = outcome.prudently_calibrated(SimpleNamespace(problem=problem, score=data), quiet)
+    quiet = Diagnosis(at(0.0), at(x), at(0.0), ())
+    found = calibration(base, data, quiet)
     assert found.verdict == verdict
     written = [e.text for e in found.plain.fit.effects]
     assert written == [base[0].text, "adhesive"][: 2 if x > 1.5 else 1]
@@ -350,12 +239,9 @@ def prudent(monkeypatch, reduced, responses, E, plain):
         return HypothesisFit(Effect(), found, reduced.model)
 
     for made in ("as_found", "as_written"):
-        monkeypatch.setattr(outcome, made, lambda null, mass_measurement=None: at(E))
-    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
+        monkeypatch.setattr(deciding, made, lambda null, mass=None: at(E))
     begun = at(plain)
-    diagnosis = Diagnosis(begun, begun, begun, (), "calibration only")
-    found = outcome.prudently_calibrated(SimpleNamespace(problem=problem, score=data), diagnosis)
-    return found, begun
+    return calibration(base, data, Diagnosis(begun, begun, begun, ()), 100.0), begun
 
 
 @pytest.mark.parametrize(("E", "kept"), [(0.03, True), (0.2, False)])
@@ -385,25 +271,22 @@ def test_values_that_make_no_structure_are_not_prudent(monkeypatch, reduced, res
     found = fit(reduced.model, base, data, None, np.array([0.04]), max_steps=0)
     plain = HypothesisFit(Effect(), found, reduced.model)
     none = HypothesisFit(Effect(), replace(found, x=np.array([np.inf])), reduced.model)
-    real = outcome.evaluate
+    real = deciding.evaluate
 
     def evaluated(model, effects, x, gradient):
         if not np.isfinite(x).all():
             raise ModelError("an effect left negative stiffness")
         return real(model, effects, x, gradient)
 
-    def asked(null, mass_measurement=None):
+    def asked(null, mass=None):
         if begun:
             return none
         raise ModelError("an effect left negative stiffness")
 
-    monkeypatch.setattr(outcome, "evaluate", evaluated)
+    monkeypatch.setattr(deciding, "evaluate", evaluated)
     for made in ("as_found", "as_written"):
-        monkeypatch.setattr(outcome, made, asked)
-    problem = SimpleNamespace(base=base, mass_measurement=None, mean=lambda: np.zeros(1))
-    prepared = SimpleNamespace(problem=problem, score=data)
-    diagnosis = Diagnosis(plain, plain, plain, (), "calibration only")
-    assert outcome.prudently_calibrated(prepared, diagnosis).plain is plain
+        monkeypatch.setattr(deciding, made, asked)
+    assert calibration(base, data, Diagnosis(plain, plain, plain, ()), 100.0).plain is plain
 
 
 def test_what_makes_another_material_is_written_before_what_divides_a_part(reduced):

@@ -8,12 +8,15 @@
 6. where an effect is named, or nothing fits: sets of several effects (``several``).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..decision.decide import RULES, called
+from ..decision.decision_rules import gain_due
+from ..decision.hypothesis_table import NULL, HypothesisTable, Row, Wanted
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..errors import ModelError
@@ -22,19 +25,14 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
-from .held_out_evidence import HeldOutEvidence
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
-from .likelihood import Responses
+from .leaning import leaning
+from .likelihood import Poles, Responses
 from .lossy_place import heard_of_damping
 from .reduced_model import evaluate
+from .rows_of_fits import row_of, row_of_null
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
-from .ties import TIED
-
-FALSE_ALARM = 1e-3  # chance that any family is named where nothing is missing, of poles
-FALSE_ALARM_FRF = 1e-5  # nominal: tuning nulls gained up to 24 of responses, where 1e-3 asks 18
-CHANGED = 6.0  # gain that ordinary parameters must bring to be called calibrated
-UNEXPLAINED = "; nothing in the catalogue explains the recording"  # ends a note that says why
 
 Progress = Callable[[str, float], None]
 
@@ -47,16 +45,17 @@ class Diagnosis:
     ----------
     nominal, null : fits without, and with ordinary parameters free, scatter allowed in both
     plain : ordinary parameters alone, as any calibration would: what a named effect is compared
-        with; where nothing is named, beside the learned error of the model instead
+        with; where nothing is named, with the learned error of the model
     hypotheses : best hypothesis of every family, best first
     verdict : one of the public verdicts
     notes : what was done and why, one sentence each
-    written : the named effect as a deck can hold it, once the held-out data have been heard
+    sets : several effects together, each of which pays, in the order in which the sets grew
+    table : all of them as the decision reads them
+    tests : of the rows that were held against what they predict themselves
+    written : the named effect as a deck can hold it, once data that no fit saw were asked
     deck : the same with numbers that make the updated deck respond as all that was found does
     adequacy : whether the explanation fits at all, where that was tested
-    one_of : what the data cannot tell apart, where they are too few to name anything
-    heard : what data that no fit saw say of the leading effect
-    sets : several effects together, each of which pays, in the order in which the sets grew
+    one_of : what the data cannot tell apart, and what would settle it
     gains : in -2 ln evidence, what the named hypothesis loses without each of its effects
     refused : why the leader is not named although it gains what is due
     shared : whether the deck's numbers are those of several states of one object
@@ -67,14 +66,15 @@ class Diagnosis:
     null: HypothesisFit
     plain: HypothesisFit
     hypotheses: tuple[HypothesisFit, ...]
-    verdict: str
+    verdict: str = ""
     notes: tuple[str, ...] = ()
+    sets: tuple[Several, ...] = ()
+    table: HypothesisTable = field(default_factory=lambda: HypothesisTable({}))
+    tests: Mapping[str, FitTest] = field(default_factory=dict)
     written: HypothesisFit | None = None
     deck: HypothesisFit | None = None
     adequacy: FitTest | None = None
     one_of: tuple[str, ...] = ()
-    heard: HeldOutEvidence | None = None
-    sets: tuple[Several, ...] = ()
     gains: tuple[float, ...] = ()
     refused: str = ""
     shared: bool = False
@@ -99,12 +99,13 @@ class Diagnosis:
     @property
     def due(self) -> float:
         """Gain in -2 ln evidence that is needed to name the best of the families tried."""
-        return needed(self.null.data, self.hypotheses)
+        first = self.hypotheses[0] if self.hypotheses else self.null
+        return self.due_of(first)
 
     def due_of(self, hypothesis: HypothesisFit) -> float:
         """The same of any of them."""
-        others = (t for t in self.hypotheses if t is not hypothesis)
-        return needed(self.null.data, (hypothesis, *others))
+        due = threshold(self.null.data, len(self.hypotheses))
+        return min(due, RULES.expected_due) if hypothesis.effect.expected else due
 
     @property
     def as_the_null(self) -> bool:
@@ -138,19 +139,33 @@ def diagnose(
     hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     null = _restarted(problem, null, hypotheses)
     progress("verdict", 0.95)
-    called = verdict(nominal, null, hypotheses)
-    found = Diagnosis(nominal, null, plain, tuple(hypotheses), called, unasked(problem))
-    found = _tested_alone(problem, found)
+    found = Diagnosis(nominal, null, plain, tuple(hypotheses), notes=unasked(problem))
+    found = _called(problem, found)
+    whole = PAIRED if found.verdict == "not in catalogue" else 2  # a search begins from these
+    found = _names_alone(problem, found, whole)
     del hypotheses  # what is behind keeps no basis of its own: 10 to 300 MB each on a tailgate
     give_back_freed_memory()
     found = _searched_beside(problem, found, within(progress, 0.8, 1.0))
     return _names_alone(problem, found, 1)
 
 
-def _tested_alone(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
-    """The diagnosis tested; whole are those alone from which a search for several begins."""
-    alone = tested(found, problem)
-    return _names_alone(problem, alone, PAIRED if alone.verdict == "not in catalogue" else 2)
+def _called(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
+    """The diagnosis by what was fitted alone: the leader, or calibration, is named and tested."""
+    table = HypothesisTable(
+        {NULL: row_of_null(found.null), **{t.effect.name: row_of(t) for t in found.hypotheses}},
+        tuple(t.effect.name for t in found.hypotheses),
+        nominal=found.nominal.neg2_log_evidence,
+        poles=isinstance(found.null.data, Poles),
+        leaning=bool(leaning(found.plain.fit)),
+        families=len(families()),
+    )
+    tests = dict(found.tests)
+    while isinstance(said := called(table), Wanted):
+        asked = found.null if said.key == NULL else found.hypotheses[0]
+        chances = fit_test(problem, asked)
+        table = table.having(chances.of(table.rows[said.key]))
+        tests |= {said.key: chances.test} if chances.test else {}
+    return replace(found, verdict=said.verdict, table=table, tests=tests)
 
 
 def _names_alone(problem: UpdatingProblem, found: Diagnosis, whole: int) -> Diagnosis:
@@ -174,11 +189,25 @@ def _searched_beside(problem: UpdatingProblem, alone: Diagnosis, progress: Progr
     return replace(alone, sets=search.sets, notes=notes)
 
 
-def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
-    """The diagnosis with its explanation held against what it predicts itself."""
-    winner = diagnosis.found or diagnosis.null
-    if diagnosis.found:
-        winner = _about_itself(problem, winner)
+@dataclass(frozen=True)
+class FitChances:
+    """The test of fit of a hypothesis, with p of it and of damping that follows what it changes.
+
+    p is NaN where there is no test, and where damping is no less likely than the rest.
+    """
+
+    test: FitTest | None
+    p: float
+    p_damping: float
+
+    def of(self, row: Row) -> Row:
+        """A row with these."""
+        return replace(row, p=self.p, p_damping=self.p_damping)
+
+
+def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
+    """What a hypothesis predicts itself, held against the data."""
+    winner = _about_itself(problem, hypothesis)
     lost, damping = winner.fit.state.dissipated, problem.damping
     damping = None if damping is None else damping.beyond(winner.fit.state)
     fits = adequacy(
@@ -186,19 +215,9 @@ def tested(diagnosis: Diagnosis, problem: UpdatingProblem) -> Diagnosis:
         coupling=problem.coupling if lost is None else None,  # its responses have complex modes
     )  # fmt: skip
     if fits is None:
-        return diagnosis
-    name = winner.name if diagnosis.found else "calibration alone"
-    fits = heard_of_damping(fits, winner, damping)
-    note = f"of the model's own draws {fits.p:.0%} fit no better than {name}: {fits.what}"
-    if fits.passes:
-        return replace(diagnosis, adequacy=fits, notes=(*diagnosis.notes, note))
-    note = f"{note}, {fits.where}{UNEXPLAINED}"
-    notes = (*diagnosis.notes, note)
-    refused = f"what it leaves is not explained: {fits.what}" if diagnosis.found else ""
-    return replace(
-        diagnosis, adequacy=fits, verdict="not in catalogue", notes=notes, written=None,
-        refused=refused or diagnosis.refused,
-    )  # fmt: skip
+        return FitChances(None, np.nan, np.nan)
+    both = heard_of_damping(fits, winner, damping)
+    return FitChances(both, fits.p, both.p if both.p != fits.p else np.nan)
 
 
 def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> HypothesisFit:
@@ -208,6 +227,8 @@ def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> Hypothesis
     structure (a support turns rigid modes into flexible ones, which err as those do).
     """
     data = winner.data
+    if winner.effect not in winner.fit.effects:  # the null: errors spread from it as it is
+        return winner
     if not isinstance(data, Responses) or data.error is None:
         return winner
     data = data.allowing_errors(winner.fit.state, data.error.delta)
@@ -233,33 +254,13 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
 def threshold(data: object, tried: int | None = None) -> float:
     """The gain in -2 ln evidence that is needed to name anything from responses or from poles.
 
-    Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
-    (Markov); the families that were ``tried`` share the chance of a false alarm, all that are known
-    where it is not said: what proposes nothing on a structure raises none.
+    Parameters
+    ----------
+    tried : families that proposed something; all that are known where it is not said
     """
-    chance = FALSE_ALARM_FRF if isinstance(data, Responses) else FALSE_ALARM
-    return float(2 * np.log((tried or len(families())) / chance))
-
-
-def needed(data: object, hypotheses: Sequence[HypothesisFit]) -> float:
-    """The gain in -2 ln evidence that is needed to name the first of the families tried.
-
-    What a material has as a rule (wood is stiffer along its grain) is no false alarm where it is
-    named: it has to be told apart from calibration, as two explanations are.
-    """
-    due = threshold(data, len(hypotheses))
-    return min(due, TIED) if hypotheses and hypotheses[0].effect.expected else due
-
-
-def verdict(
-    nominal: HypothesisFit, null: HypothesisFit, hypotheses: Sequence[HypothesisFit]
-) -> str:
-    """The public verdict."""
-    best, due = hypotheses[0] if hypotheses else None, needed(null.data, hypotheses)
-    if best is not None and null.neg2_log_evidence - best.neg2_log_evidence > due:
-        return best.verdict
-    changed = nominal.neg2_log_evidence - null.neg2_log_evidence > CHANGED
-    return "calibration only" if changed else "nothing missing"
+    known = isinstance(data, Responses)
+    chance = RULES.chance_of_responses if known else RULES.chance_of_poles
+    return gain_due(tried or len(families()), chance)
 
 
 def _calibrated(problem: UpdatingProblem, nominal: HypothesisFit, null: HypothesisFit) -> Diagnosis:
@@ -271,8 +272,8 @@ def _calibrated(problem: UpdatingProblem, nominal: HypothesisFit, null: Hypothes
         f"{agree} of {len(tries) + 1} starts, {len(tries)} of them random, ended within 1 of the "
         "best -2 ln evidence"
     )
-    plain = _plain(problem, best)
-    return tested(Diagnosis(nominal, best, plain, (), verdict(nominal, best, ()), (note,)), problem)
+    found = Diagnosis(nominal, best, _plain(problem, best), (), notes=(note,))
+    return _called(problem, found)
 
 
 def _random_starts(problem: UpdatingProblem, count: int = 4) -> list[np.ndarray]:

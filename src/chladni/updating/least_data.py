@@ -5,18 +5,10 @@ must be able to contradict it. A mode gives its frequency and, with responses in
 number more for every channel.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
-
-from .diagnosis import Diagnosis
-from .hypothesis_fit import HypothesisFit
-from .question import Prepared
 
 NUMBERS = 8  # 3 + 3 + 2, see above
 MODES = 3  # of one mode a shift can be mass or stiffness; of two any place can be made to fit
-NOT_BEHIND = 0.0  # an effect that gains less than this over calibration alone explains nothing
 
 
 def too_little(modes: int, channels: int) -> str:
@@ -33,23 +25,3 @@ def too_little(modes: int, channels: int) -> str:
         f"{modes} mode{'s' * (modes != 1)}{seen} cannot bear a name: {due} modes are the least, "
         "for three ordinary numbers, an effect of three and two that can contradict it"
     )
-
-
-def withheld(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis without a name, where the data cannot bear one."""
-    if not prepared.too_little:
-        return diagnosis
-    one_of = tuple(t.effect.name for t in _in_question(diagnosis, diagnosis.hypotheses))
-    note = (
-        f"{prepared.too_little}; these explain the data and cannot be told apart by them: "
-        f"{', '.join(('calibration alone', *one_of))}; more modes, or more sensors of known gain, "
-        "would separate them"
-    )
-    return replace(
-        diagnosis, verdict="not in catalogue", notes=(*diagnosis.notes, note), written=None,
-        one_of=("calibration alone", *one_of), sets=(), refused=prepared.too_little,
-    )  # fmt: skip
-
-
-def _in_question(diagnosis: Diagnosis, hypotheses: Sequence[HypothesisFit]) -> list[HypothesisFit]:
-    return [t for t in hypotheses if diagnosis.two_log_bayes_factor(t) > NOT_BEHIND]

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..decision.decision_rules import TIED
+from ..decision.tied import same
 from ..effects.effect import Effect
 from ..effects.estimate import Estimate, Location
 from ..ema.odds import evidence_in_words
@@ -22,7 +24,7 @@ from .result import (
     Remainder,
     Scores,
 )
-from .ties import TIED, same
+from .rows_of_fits import row_of
 
 STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
 HEAVIER = 0.02  # of the deck's mass: what paint and sealant weigh, which no deck of sheets has
@@ -148,7 +150,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
             f"gains {gain:.1f} in -2 ln evidence over plain calibration; {due:.0f} are needed "
             "before anything is named"
         )
-    if same(hypothesis, best.name):
+    if same(row_of(hypothesis), best.name):
         return f"as it was fitted it is {best.name} for all these data can tell"
     gap = (hypothesis.neg2_log_evidence - best.neg2_log_evidence) / 2
     return (

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..decision.decision_rules import TIED
 from ..effects.effect import Effect
 from ..effects.registry import families
 from ..effects.search_context import Candidate
@@ -20,7 +21,7 @@ from .candidates import UpdatingContext, already_there
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .likelihood import Responses
 from .map_fit import Status
-from .ties import TIED, simplest_first
+from .rows_of_fits import simplest_first
 
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied

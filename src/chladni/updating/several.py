@@ -19,6 +19,8 @@ from itertools import combinations
 
 import numpy as np
 
+from ..decision.decision_rules import GOOD_PART, TIED
+from ..decision.hypothesis_table import Rival
 from ..effects.effect import Effect
 from ..effects.search_context import Candidate
 from ..errors import ModelError
@@ -29,33 +31,15 @@ from .likelihood import Responses
 from .map_fit import unknowns
 from .reduced_model import Reduced, evaluate
 from .search_round import search_round, taken
-from .ties import TIED
 
 MOST = 3  # effects in one answer
 FITTED = 6  # candidates of a later round that are fitted
-GOOD_PART = 0.5  # of the gain due, that fitted responses bear where others bear the rest
 WORTH = 0.25  # of the gain due, by rough fits: below it none of a round is followed further
 PAIRED = 4  # families in front that are tried in pairs
 BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
 ATTEMPTS = 4  # rounds that may change the set
 
 Say = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another family that would do in the place of a member of a set.
-
-    Attributes
-    ----------
-    name : of the family
-    behind : how far it stays behind, in -2 ln evidence
-    implausible : why its value is none such a thing can have; "" where it may
-    """
-
-    name: str
-    behind: float
-    implausible: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 1. the recording is read, what is held out is chosen (``prepare``);
 2. hypotheses are fitted and compared by evidence (``updating.diagnosis``);
 3. the fit that is reported is repeated where the reduced model had left its ground (``renewed``);
-4. the held-out data are heard (``judged``);
+4. the decision is made on rows of numbers, and asks for the fits that it needs (``decided``);
 5. the result is written into the deck, and every number is taken from the decks as written.
 """
 
@@ -24,28 +24,18 @@ from ..io.nastran.edit.written_assembly import written_assembly
 from ..model.assembly import Assembly
 from ..progress import Progress, within
 from ..sparse.freed_memory import give_back_freed_memory
-from ..updating.confusers import with_confusers, with_doubt
+from ..updating.deciding import decided
+from ..updating.decision_in_words import concluded
 from ..updating.diagnosis import Diagnosis
 from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import in_doubt, leaning, strained
-from ..updating.least_data import withheld
 from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.other_recordings import scored_others
-from ..updating.outcome import (
-    borne_by_all_data,
-    fitted_scores,
-    held_out,
-    judged,
-    models,
-    named_with_what_is_usual,
-    prudently_calibrated,
-    real_poles,
-    with_deck,
-)
+from ..updating.outcome import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
 from ..updating.renewal import renewed
@@ -60,8 +50,6 @@ from ..updating.result_parts import (
     otherwise,
     remainder,
 )
-from ..updating.rivals import heard_of_rivals
-from ..updating.several_judged import largest_named, named_beside_more
 from ..updating.written_scores import noise_Q, written_Q
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, model_frf
@@ -128,9 +116,8 @@ def explained(
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
     found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
-    if diagnosing:
-        found = withheld(prepared, found)
-    found, distrust = _judged(asked, prepared, found)
+    named = prepared if diagnosing else replace(prepared, too_little="")  # nothing is to be named
+    found, distrust = _judged(asked, named, found)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -163,34 +150,14 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
 def _judged(
     asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[Diagnosis, tuple[str, ...]]:
-    """The verdict after renewal and the held-out data, and reasons not to trust it."""
-    distrust: tuple[str, ...] = ()
-    renew = partial(renewed, asked, prepared)
-    found = borne_by_all_data(prepared, found)
-    together, said = largest_named(prepared, found, [s for s in found.sets if s.pay], renew)
-    if together is not None:
-        return together, said
-    found = replace(found, notes=(*found.notes, *said))
+    """The verdict by all data, and reasons not to trust it."""
+    decision, known = decided(prepared, found, partial(renewed, asked, prepared))
+    found, distrust = concluded(prepared, found, decision, known)
     if found.found is not None:
-        alone, lead = found, renew(found.found)
-        hypotheses = (lead.hypothesis, *found.hypotheses[1:])
-        found = replace(found, hypotheses=hypotheses, notes=(*found.notes, lead.note))
-        named, distrust = found, lead.distrust
-        found = judged(prepared, named)
-        together, said = named_beside_more(prepared, alone, found, renew)
-        if together.found is not None and found.found is None:
-            return together, said
-        beside = together.notes[len(found.notes) :]
-        found = named_with_what_is_usual(prepared, named, together, beside)
-    if found.found is None and found.refused and not prepared.too_little:
-        found, distrust = heard_of_rivals(prepared, found, renew)
-    found = with_doubt(with_confusers(found))
-    if found.found is None:
-        found = prudently_calibrated(prepared, found)
-        plain = renewed(asked, prepared, found.plain, held=found.as_the_null)
-        found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
-        distrust = plain.distrust
-    return found, distrust
+        return found, distrust
+    plain = renewed(asked, prepared, found.plain, held=found.as_the_null)
+    found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
+    return found, plain.distrust
 
 
 def _updated(

@@ -1,0 +1,74 @@
+"""Whether several effects may be named together.
+
+A second effect next to a first one that is a little off mops up what that leaves. Therefore each is
+asked with all others in place, as the first is with calibration alone; and all together must fit,
+and must be supported by the data held out against calibration alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from .hypothesis_table import NULL, SetRow
+from .judgement import JudgedTable, judged, tested
+from .reasons import Decision, Reason, Step, steps
+
+
+def largest_named(
+    case: JudgedTable, alone: Decision, sets: Sequence[SetRow]
+) -> tuple[Decision | None, tuple[Step, ...]]:
+    """The decision with the last of some sets named that may be; None, and what refused each."""
+    refusals: list[Step] = []
+    for whole in reversed(sets):
+        found = _together(case, alone, whole)
+        if isinstance(found, Decision):
+            return found, ()
+        refusals.append(found)
+    return None, tuple(refusals)
+
+
+def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | Step:
+    """The decision with several effects named together; or why they are not.
+
+    A second effect beside a first one that is a little off mops up what that leaves. Therefore each
+    is asked beside all others, as the first is beside calibration alone; and all together must fit,
+    and must be borne by the data held out against calibration alone.
+    """
+    table, rules = case.table, case.rules
+    row = table.renewal(whole.key)
+    lost = max(0.0, row.neg2_log_evidence - table.rows[whole.key].neg2_log_evidence)
+    done = [Step(Reason.FOUND_TOGETHER, whole.key)]
+    for k, gain in enumerate(whole.gains):
+        if not case.carried(gain - lost, table.rows[whole.member(k)].heard(), whole.due):
+            return Step(Reason.SET_REFUSED, whole.key, Reason.NOT_BORNE, k)
+        done.append(Step(Reason.HEARD_BESIDE, whole.key, member=k))
+    begun = replace(
+        alone, order=(row.key, *alone.order), due=case.due(row, 1), steps=tuple(done), whole=whole
+    )
+    found = tested(case, begun, row)
+    if not found.named:
+        return Step(Reason.SET_REFUSED, whole.key, Reason.UNFIT)
+    before = table.rows[alone.tested or NULL]
+    if not before.fits(rules) and row.fit(rules) < rules.plainly:
+        return Step(Reason.SET_REFUSED, whole.key, Reason.BARELY_FITS)
+    found = judged(case, found, rules.most_left)
+    if not found.named:
+        return Step(Reason.SET_REFUSED, whole.key, found.reason)
+    found = replace(found, reason=Reason.TOGETHER)
+    for k, rivals in enumerate(whole.rivals):
+        if rivals:
+            one_of = (whole.members[k], *(r.name for r in rivals))
+            step = Step(Reason.RIVAL_OF_MEMBER, whole.key, member=k, names=one_of)
+            found = replace(found, one_of=one_of, steps=steps(found, step))
+            break
+    renewed = Step(Reason.RENEWED, whole.key)
+    return replace(found, steps=steps(found, renewed, *_perhaps_beside(case, whole)))
+
+
+def _perhaps_beside(case: JudgedTable, named: SetRow) -> tuple[Step, ...]:
+    """A step for every effect that pays a part of its price beside those that are named."""
+    part: dict[str, Step] = {}
+    for other in case.table.sets:
+        for k, (name, gain) in enumerate(zip(other.members, other.gains, strict=True)):
+            if gain <= other.due and name not in named.members:
+                part[name] = Step(Reason.PERHAPS_BESIDE, other.key, member=k, names=named.members)
+    return tuple(part.values())

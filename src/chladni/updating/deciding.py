@@ -1,0 +1,239 @@
+"""The fits and numbers that a decision asks for, until it is made."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..decision.decide import decide
+from ..decision.hypothesis_table import (
+    Ask,
+    CalibratedDeck,
+    HypothesisTable,
+    Left,
+    Row,
+    SetRow,
+    Votes,
+    Wanted,
+    after,
+    renewed,
+)
+from ..decision.reasons import Decision
+from ..effects.effect import Effect
+from ..errors import ModelError
+from .adequacy import FitTest
+from .diagnosis import Diagnosis, fit_test
+from .held_out_evidence import held_out_evidence
+from .hypothesis_fit import HypothesisFit
+from .likelihood import Poles, Responses
+from .lossy_place import heard_of_damping
+from .map_fit import fit
+from .outcome import given, scores_of
+from .question import Prepared
+from .reduced_model import evaluate
+from .renewal import Renewal
+from .rows_of_fits import row_of
+from .search_round import taken
+from .several import Several
+from .written_hypothesis import as_found, as_written, of_mesh
+
+Renew = Callable[[HypothesisFit], Renewal]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured for a decision so far.
+
+    Attributes
+    ----------
+    table : the rows
+    fits, tests, renewals : of its rows, by key
+    written : rows as a deck can hold them
+    sets : several effects, by key
+    decks : of a calibration
+    failed : why a row could not be fitted again
+    """
+
+    table: HypothesisTable
+    fits: Mapping[str, HypothesisFit]
+    tests: Mapping[str, FitTest]
+    sets: Mapping[str, Several] = field(default_factory=dict)
+    renewals: Mapping[str, Renewal] = field(default_factory=dict)
+    written: Mapping[str, HypothesisFit] = field(default_factory=dict)
+    decks: Mapping[CalibratedDeck, HypothesisFit] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
+
+    def row(self, row: Row) -> "Measured":
+        """With a row put in or replaced."""
+        return replace(self, table=self.table.having(row))
+
+    def with_Q(self, deck: CalibratedDeck, Q: tuple[float, ...]) -> "Measured":
+        """With Q of a calibration."""
+        return replace(self, table=replace(self.table, decks={**self.table.decks, deck: Q}))
+
+
+def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decision, Measured]:
+    """The decision on a diagnosis, every fit it asks for made, and all that was measured.
+
+    Parameters
+    ----------
+    renew : a hypothesis on a reduced model that bears it
+    """
+    known = begun(prepared, found)
+    while isinstance(decision := decide(known.table), Wanted):
+        known = measured(prepared, found, renew, known, decision)
+    return decision, known
+
+
+def begun(prepared: Prepared, found: Diagnosis) -> Measured:
+    """The rows of a diagnosis before data that no fit saw are asked."""
+    sets = {f"set {k}": s for k, s in enumerate(found.sets)}
+    fits = {t.effect.name: t for t in found.hypotheses} | {k: s.hypothesis for k, s in sets.items()}
+    table = replace(
+        found.table, enough=not prepared.too_little,
+        sets=tuple(_set_row(key, s) for key, s in sets.items()),
+    )  # fmt: skip
+    rows = [row_of(s.hypothesis, key) for key, s in sets.items()]
+    for made in table.sets:
+        without = enumerate(zip(made.members, sets[made.key].without, strict=True))
+        rows += [Row(made.member(k), (n,), t.neg2_log_evidence) for k, (n, t) in without]
+    return Measured(table.having(*rows), fits, found.tests, sets)
+
+
+def _set_row(key: str, s: Several) -> SetRow:
+    names = tuple(e.name for e in s.own.effects)
+    return SetRow(key, names, s.gains, s.due, s.ahead, s.rivals)
+
+
+def measured(
+    prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, wanted: Wanted
+) -> Measured:
+    """What was known and what is wanted."""
+    key, problem = wanted.key, prepared.problem
+    if wanted.ask is Ask.RENEWAL:
+        return _renewed(prepared, found, renew, known, key)
+    if wanted.ask is Ask.DECK:
+        return _calibrated(prepared, found, known, CalibratedDeck[key])
+    row = known.table.rows[key]
+    if wanted.ask is Ask.VOTES:
+        return known.row(replace(row, votes=_votes(prepared, found, known, key)))
+    if wanted.ask is Ask.LEFT:
+        written = as_written(known.fits[key], problem.mass_measurement)
+        own, plain = known.fits[key], found.plain
+        stages = [(plain, plain.fit.state), (own, written.fit.state)]
+        left = Left(*((a, b) for a, b in scores_of(prepared, own, stages)))
+        return replace(known, written={**known.written, key: written}).row(replace(row, left=left))
+    if wanted.ask is Ask.AFTER:
+        return _after(prepared, known, row, wanted.beside)
+    asked = known.fits.get(key, found.null)
+    chances = fit_test(problem, asked)
+    tests = {**known.tests, key: chances.test} if chances.test else known.tests
+    return replace(known, tests=tests).row(chances.of(row))
+
+
+def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> Votes:
+    """What data that no fit saw say of a row, or of a member of a set beside the others."""
+    problem, unseen = prepared.problem, prepared.unseen
+    if key in known.fits:
+        asked = held_out_evidence(problem, unseen, found.null, known.fits[key])
+    else:
+        whole, member = key.rsplit("/", 1)
+        s = known.sets[whole]
+        asked = held_out_evidence(problem, unseen, s.without[int(member)], s.own, s.about)
+    return Votes(asked.held_out, asked.sensors, asked.lines)
+
+
+def _renewed(
+    prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, key: str
+) -> Measured:
+    """A row fitted again on a model that bears it; of a rival, on a basis of its own first.
+
+    Of what was renewed before, only the leader keeps its model: the others are decided on.
+    """
+    lead, rival = known.table.singles[:1], known.fits[key]
+    try:
+        if (key,) != lead and key not in known.sets:
+            rival = on_its_own_basis(prepared, found, rival)
+        whole = renew(rival)
+    except ModelError as error:
+        if (key,) == lead or key in known.sets:
+            raise
+        row = replace(known.table.rows[key], key=renewed(key), fitted=False)
+        return replace(known, failed={**known.failed, key: str(error)}).row(row)
+    done = {renewed(k) for k in known.renewals if (k,) != lead}
+    fits, written = (
+        {k: t for k, t in every.items() if k not in done} for every in (known.fits, known.written)
+    )
+    return replace(
+        known, fits={**fits, renewed(key): whole.hypothesis}, written=written,
+        renewals={**known.renewals, key: replace(whole, hypothesis=found.null)},  # no model
+    ).row(row_of(whole.hypothesis, renewed(key)))  # fmt: skip
+
+
+def on_its_own_basis(prepared: Prepared, found: Diagnosis, rival: HypothesisFit) -> HypothesisFit:
+    """A rival fitted again from where it was: a diagnosis keeps the model of its leader alone."""
+    null, problem = found.null.data, prepared.problem
+    assert isinstance(null, (Responses, Poles))
+    problem = replace(problem, data=null.over(problem.reduced.model))
+    base = taken(problem, rival, ("ordinary", "nuisance"))
+    return problem.fitted_with(rival.effect, rival.fit.of(rival.effect), base)
+
+
+def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measured:
+    """Whether damping that a row leaves follows what the leader changes."""
+    key, test, damping = after(row.key, leader), known.tests.get(row.key), prepared.problem.damping
+    asked = Row(key, row.names, row.neg2_log_evidence, p_damping=1.0)
+    if test is None or damping is None:
+        return known.row(asked)
+    left = damping.beyond(known.fits[row.key].fit.state)
+    follows = heard_of_damping(test, known.fits[leader], left)
+    tests = {**known.tests, key: follows}
+    return replace(known, tests=tests).row(replace(asked, p_damping=follows.p))
+
+
+def _calibrated(
+    prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
+) -> Measured:
+    """Q of a calibration on what was fitted, with what the mesh hides and without, as a deck is."""
+    null, problem = found.null, prepared.problem
+    data = prepared.score.over(null.model)
+
+    def Q(effects: Sequence[Effect], x: np.ndarray) -> tuple[float, ...]:
+        try:
+            idle = np.where(of_mesh(effects), 0.0, x)
+            each = [evaluate(null.model, effects, at, False) for at in (x, idle)]
+        except ModelError:  # no structure at all: nothing speaks for it
+            return (np.inf, np.inf)
+        return tuple(data.Q(state, data.use) for state in each)
+
+    if deck is CalibratedDeck.GIVEN:
+        return known.with_Q(deck, Q(problem.base, given(problem, null)))
+    try:
+        made = numbers(prepared, found, known, deck)
+    except ModelError:  # without scatter its numbers are no structure's
+        return known.with_Q(deck, ())
+    known = replace(known, decks={**known.decks, deck: made})
+    return known.with_Q(deck, Q(made.fit.effects, made.fit.x))
+
+
+def numbers(
+    prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
+) -> HypothesisFit:
+    """The calibration that is answered with where nothing is named."""
+    mass = prepared.problem.mass_measurement
+    if deck in known.decks:
+        return known.decks[deck]
+    if deck is CalibratedDeck.FOUND:
+        return as_found(found.null)
+    if deck is CalibratedDeck.WRITTEN:
+        return as_written(found.null, mass)
+    plain = found.plain
+    if deck is CalibratedDeck.PLAIN:
+        return plain
+    x = [
+        np.array([p.nominal for p in e.parameters]) if e.kind == "ordinary" else plain.fit.of(e)
+        for e in plain.fit.effects
+    ]
+    begun = np.concatenate([np.zeros(0), *x])
+    own = fit(plain.model, plain.fit.effects, plain.data, mass, begun, max_steps=0)
+    return replace(plain, fit=own)

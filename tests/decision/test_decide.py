@@ -1,0 +1,445 @@
+"""What follows from rows of numbers: names, ties, doubts and refusals, each at its limit."""
+
+from dataclasses import fields, replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chladni.decision.decide import RULES, decide
+from chladni.decision.decision_rules import TIED, DecisionRules, gain_due
+from chladni.decision.hypothesis_table import (
+    NULL,
+    Ask,
+    CalibratedDeck,
+    HypothesisTable,
+    Left,
+    Rival,
+    Row,
+    Votes,
+    Wanted,
+    renewed,
+)
+from chladni.decision.reasons import ALONE, BEYOND, Decision, Reason
+from chladni.decision.tied import leading, tied
+
+from .tables import FOR, SERVES, decision, named, row, table, together
+
+DUE = gain_due(1, RULES.chance_of_responses)  # of one family
+FOUR = gain_due(4, RULES.chance_of_responses)
+NAMED, REST, LITTLE = "missing physics", "not in catalogue", "nothing missing"
+R = Reason
+
+
+def one(gain, votes=FOR, left=SERVES, **more):
+    return table(row("crack", gain, votes=votes, left=left), **more)
+
+
+def with_left(fitted, held_out):
+    return Left((1.0, fitted), (1.0, held_out))
+
+
+@pytest.mark.parametrize(
+    ("gain", "votes", "left", "verdict", "why"),
+    [
+        (1000.0, Votes(0.0, 0.0, 0.0), (0.1, 1.0), NAMED, R.NAMED),  # data that cannot feel it
+        (1000.0, Votes(), (0.1, 1.0), NAMED, R.NAMED),  # nor has what was not held out
+        (1000.0, Votes(-DUE - 1, 500.0, 500.0), (0.1, 1.0), REST, R.AGAINST),
+        (1000.0, Votes(500.0, -DUE - 1, 500.0), (0.1, 1.0), REST, R.AGAINST),
+        (1000.0, Votes(500.0, 500.0, -DUE - 1), (0.1, 1.0), REST, R.AGAINST),
+        (1000.0, Votes(500.0, 500.0, 500.0), (0.1, 2.0), REST, R.WORSE),
+        (DUE + 2, Votes(-1.0, 0.0, 0.0), (0.1, 1.0), NAMED, R.NAMED),
+        (DUE + 2, Votes(-4.0, 0.0, 0.0), (0.1, 1.0), LITTLE, R.AGAINST),
+        (1.9 * DUE, Votes(0.0, 0.0, 0.0), (0.1, 1.1), LITTLE, R.WORSE),  # faint, and no better
+        (2.1 * DUE, Votes(0.0, 0.0, 0.0), (0.1, 1.1), NAMED, R.NAMED),
+        (1.9 * DUE, Votes(-2 * DUE, 0.0, 0.0), (0.1, 1.0), LITTLE, R.AGAINST),
+        (2.1 * DUE, Votes(-2 * DUE, 0.0, 0.0), (0.1, 1.0), REST, R.AGAINST),  # data are at odds
+        (1000.0, Votes(500.0, 500.0, 500.0), (0.6, 0.6), REST, R.LEAVES_MORE),
+        (1000.0, Votes(500.0, 500.0, 500.0), (0.4, 0.6), NAMED, R.NAMED),
+        (1000.0, Votes(500.0, 500.0, 500.0), (0.6, 0.4), NAMED, R.NAMED),
+        (1.9 * DUE, Votes(9.0, 9.0, 9.0), (0.6, 0.6), LITTLE, R.LEAVES_MORE),
+    ],
+)
+def test_data_no_fit_saw_can_refuse_a_name(gain, votes, left, verdict, why):
+    """Where all data together, or what was fitted by far, still refute calibration, it is not it.
+
+    Then it may be the leader with more next to it, unless data speak against the leader.
+    """
+    found = decision(one(gain, votes, with_left(*left)))
+    assert (found.verdict, found.reason) == (verdict, why)
+    assert found.named == (verdict == NAMED)
+    refuted = verdict == REST
+    assert (found.refuting is not None) == refuted
+    if refuted:
+        open_ = why in (R.WORSE, R.LEAVES_MORE)
+        assert found.one_of == (("crack", BEYOND) if open_ else ())
+
+
+def test_a_renewed_fit_that_lost_its_gain_is_not_named():
+    made = one(1.2 * DUE, Votes(0.0, 1.0, 1.0), then={"crack": {"neg2_log_evidence": -0.9 * DUE}})
+    assert decision(made).reason is R.TOO_LITTLE
+
+
+def test_a_fault_of_a_channel_is_asked_of_what_that_recorded_and_no_fit_saw():
+    """Of all that was fitted it explains little."""
+    fault = {"physics": False, "channels": True}
+    for held_out, verdict in ((0.4, "measurement fault"), (0.6, REST)):
+        made = table(row("sensor-fault", 1e3, left=with_left(0.9, held_out), **fault))
+        assert decision(made).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("gain", "news", "name"), [(0.7, 0.2, ""), (0.7, 0.4, "crack"), (-1.0, 2.0, "")]
+)
+def test_all_poles_together_may_bear_a_name(gain, news, name):
+    """The Bayes factor of fitted and foretold poles is the product of both."""
+    due = gain_due(1, RULES.chance_of_poles)
+    made = one(gain * due, Votes(news * due), poles=True)
+    assert named(made) == name
+    few = replace(made, enough=False)
+    assert (decision(few).verdict, decision(few).reason) == (REST, R.TOO_FEW)
+
+
+@pytest.mark.parametrize(
+    ("gain", "votes", "name"),
+    [
+        (0.7, Votes(0.4 * DUE, 1.0, 1.0), "crack"),
+        (0.7, Votes(0.2 * DUE, 1.0, 1.0), ""),  # not enough together
+        (0.7, Votes(9 * DUE, -1.0, 1.0), ""),  # folds of what was fitted object
+        (0.4, Votes(9 * DUE, 1.0, 1.0), ""),  # what was fitted hardly points there
+        (0.7, Votes(None, 9 * DUE, 9 * DUE), ""),  # folds are no new data
+    ],
+)
+def test_all_responses_together_may_bear_a_name(gain, votes, name):
+    """Those held out are data as those fitted are; the bound on false alarms is that of all."""
+    assert named(one(gain * DUE, votes)) == name
+
+
+def test_too_few_data_list_what_explains_them():
+    made = table(row("point-mass", 90.0), row("crack", 10.0), row("suspension", -30.0))
+    found = decision(replace(made, enough=False))
+    assert (found.verdict, found.one_of) == (REST, (ALONE, "point-mass", "crack"))
+
+
+def test_what_a_material_has_as_a_rule_needs_less():
+    """Wood is stiffer along its grain."""
+    for expected, name in ((True, "orthotropic-material"), (False, "")):
+        made = table(row("orthotropic-material", TIED + 1, votes=Votes(), expected=expected))
+        assert named(made) == name
+
+
+def test_what_leaves_more_than_its_own_draws_is_not_named():
+    for p, p_damping, verdict in ((0.02, 1.0, NAMED), (0.005, 1.0, REST), (0.5, 0.005, REST)):
+        made = table(replace(row("crack", 1e3, p=p), p_damping=p_damping))
+        assert decision(made).verdict == verdict
+    assert decision(table(null=row("", 0.0, p=0.005))).verdict == REST
+
+
+# rivals of a leader that is refused
+
+
+def behind(gains, sound=("point-mass",), **more):
+    """mass-patch leads and is refused: its deck is worse."""
+    worse, names = with_left(0.1, 2.0), ("mass-patch", "point-mass", "crack", "suspension")
+    rows = (
+        row(n, g, left=SERVES if n in sound else worse) for n, g in zip(names, gains, strict=True)
+    )
+    return table(*rows, **more)
+
+
+GAIN = 5 * FOUR
+
+
+def test_a_rival_that_nothing_refuses_is_the_answer():
+    """What was passed over is tied with nothing; what nobody refused may be."""
+    made = behind((GAIN, GAIN - 1, GAIN - 2, 0.0))
+    found = decision(made)
+    assert (found.verdict, named(made)) == (NAMED, "point-mass")
+    assert found.passed_over == (("mass-patch", R.WORSE),)
+    assert found.one_of == ("point-mass", "crack")
+    assert found.refuting is None
+
+
+def test_the_next_is_asked_where_a_rival_is_refused_too():
+    found = decision(behind((GAIN, GAIN - 1, GAIN - 2, 0.0), sound=("crack",)))
+    assert found.passed_over == (("mass-patch", R.WORSE), ("point-mass", R.WORSE))
+    lost = {"point-mass": {"fitted": False}}
+    made = behind((GAIN, GAIN - 1, GAIN - 2, 0.0), sound=("point-mass", "crack"), then=lost)
+    assert decision(made).passed_over[1] == ("point-mass", R.NOT_FITTED)
+
+
+@pytest.mark.parametrize(
+    ("second", "more", "why"),
+    [
+        (FOUR - 1, {}, ()),  # it would not be named alone
+        (GAIN - RULES.running * FOUR - 1, {}, ()),  # the leader explains far more
+        (GAIN - 1.1 * FOUR, {}, ("point-mass", R.REFUTED)),
+        (GAIN - 1, {"sound": ()}, ("point-mass", R.WORSE)),
+        (GAIN - 1, {"after_lead": 0.001}, ("point-mass", R.DAMPING)),
+    ],
+)
+def test_else_the_refusal_stays(second, more, why):
+    """What the leader refutes as it refutes calibration alone is not the answer either."""
+    found = decision(behind((GAIN, second, 0.0, 0.0), **more))
+    assert (found.verdict, found.named) == (REST, False)
+    assert found.passed_over[1:] == ((why,) if why else ())
+
+
+def test_a_rival_nearly_refuted_stands():
+    assert named(behind((GAIN, GAIN - 0.9 * FOUR, 0.0, 0.0))) == "point-mass"
+
+
+# several effects
+
+
+TWO = gain_due(2, RULES.chance_of_responses)
+SINGLES = (row("crack", 200.0), row("point-mass", 100.0))
+PAID, PART = (2 * TWO, 2 * TWO), (2 * TWO, 0.8 * TWO)
+
+
+def test_a_set_that_pays_comes_before_one_effect():
+    made = table(*SINGLES, sets=[together("set 0", PAID, TWO)])
+    found = decision(made)
+    assert (named(made), found.reason) == ("crack and point-mass", R.TOGETHER)
+    assert found.whole is not None
+    assert found.whole.gains == PAID
+    assert named(made, RULES.without("sets")) == "crack"
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"votes": (FOR, Votes(-TWO - 9, 50.0, 50.0))},  # of one of them
+        {"p": 0.005},  # together they do not fit
+        {"left": with_left(0.1, 2.0)},  # the deck with both is worse
+        {"ahead": 0.9 * TWO},  # hardly ahead of one alone
+    ],
+)
+def test_all_must_be_supported_by_data_that_no_fit_saw(more):
+    kept = {k: v for k, v in more.items() if k != "votes"}
+    votes = more.get("votes", (FOR, FOR))
+    made = table(*SINGLES, sets=[together("set 0", PAID, TWO, votes, **kept)])
+    assert named(made) == "crack"
+
+
+def test_a_set_whose_renewed_fit_lost_the_gain_is_not_named():
+    lost = {"set 0": {"neg2_log_evidence": -1e3 + 1.5 * TWO}}
+    none = (Votes(0.0, 0.0, 0.0),) * 2
+    made = table(*SINGLES, sets=[together("set 0", PAID, TWO, none)], then=lost)
+    assert named(made) == "crack"
+
+
+@pytest.mark.parametrize(("alone", "both", "name"), [(0.009, 0.011, ""), (0.009, 0.4, "both")])
+def test_a_set_does_not_fit_by_a_hair_what_one_effect_does_not(alone, both, name):
+    """More parameters lower what is left of anything."""
+    singles = (row("crack", 200.0, p=alone), row("point-mass", 20.0))
+    made = table(*singles, sets=[together("set 0", PAID, TWO, p=both)])
+    assert (named(made) != "") == (name != "")
+
+
+def test_a_set_that_pays_in_part_is_asked_where_the_leader_leaves_too_much():
+    """The last of them first; not where the leader is refused for another reason."""
+    sets = [together(f"set {k}", PART, TWO) for k in range(2)]
+    for left, name in ((with_left(0.6, 0.6), "crack and point-mass"), (with_left(0.1, 2.0), "")):
+        made = table(row("crack", 200.0, left=left), row("point-mass", 20.0), sets=sets)
+        assert named(made) == name
+        found = decision(made)
+        assert found.whole is None or found.whole.key == "set 1"
+
+
+def test_what_may_stand_in_the_place_of_one_is_one_of_several():
+    rivals = ((), (Rival("adhesive-stiffness", 4.0, "E of 300 MPa is that of no sealant"),))
+    made = table(*SINGLES, sets=[together("set 0", PAID, TWO, rivals=rivals)])
+    assert decision(made).one_of == ("point-mass", "adhesive-stiffness")
+
+
+def test_an_effect_that_pays_a_part_is_perhaps_there_as_well():
+    other = replace(together("set 0", PART, TWO)[0], members=("crack", "suspension"))
+    sets = [(other, (FOR, FOR), together("set 0", PART, TWO)[2]), together("set 1", PAID, TWO)]
+    steps = decision(table(*SINGLES, sets=sets)).steps
+    assert [(s.key, s.member) for s in steps if s.reason is R.PERHAPS_BESIDE] == [("set 0", 1)]
+
+
+@pytest.mark.parametrize(
+    ("p", "left", "votes", "name"),
+    [
+        (0.95, 0.7, FOR, "crack"),
+        (0.85, 0.7, FOR, ""),  # the test does not all but surely pass
+        (0.95, 0.85, FOR, ""),  # less than a fifth of Q goes
+        (0.95, 0.7, Votes(-1.0, 50.0, 50.0), ""),  # one vote is against it
+    ],
+)
+def test_a_usual_remainder_may_stay(p, left, votes, name):
+    made = table(row("crack", 200.0, p=p, votes=votes, left=with_left(left, left)))
+    assert named(made) == name
+
+
+# ties and doubts
+
+
+def test_near_ones_are_one_of_several():
+    made = table(
+        row("point-mass", 300.0), row("sensor-mass", 301.0 - TIED), row("crack", 299.0 - TIED)
+    )
+    assert decision(made).one_of == ("point-mass", "sensor-mass")
+
+
+def test_another_name_for_the_leader_is_no_rival_of_it():
+    lump = row("local-resonator", 299.0, becomes="point-mass")
+    assert decision(table(row("point-mass", 300.0), lump)).one_of == ()
+
+
+@pytest.mark.parametrize(("nearly", "one_of"), [("point-mass", True), ("", False)])
+def test_what_the_leader_may_be_is_one_of_both_whatever_the_odds(nearly, one_of):
+    lump = row("local-resonator", 300.0, nearly=nearly)
+    found = decision(table(lump, row("point-mass", 300 - 5 * TIED)))
+    assert found.one_of == (("local-resonator", "point-mass") if one_of else ())
+
+
+@pytest.mark.parametrize(
+    ("gains", "one_of"),
+    [
+        ((TIED + 2, TIED + 1, 1.0), (ALONE, "point-mass", "sensor-mass")),
+        ((TIED + 9, TIED - 1, 1.0), (ALONE, "point-mass")),
+        ((TIED - 1, 2.0, 1.0), ()),
+    ],
+)
+def test_what_leads_without_a_name_leaves_calibration_in_doubt(gains, one_of):
+    names = ("point-mass", "sensor-mass", "suspension")
+    rows = (row(n, g, votes=Votes(0.0, 0.0, 0.0)) for n, g in zip(names, gains, strict=True))
+    found = decision(table(*rows))
+    assert (found.verdict, found.one_of) == (LITTLE, one_of)
+
+
+@pytest.mark.parametrize(("vote", "one_of"), [(1.0, ("crack", BEYOND)), (-1.0, ())])
+def test_where_calibration_does_not_fit_a_leader_that_gains_little_is_one_of(vote, one_of):
+    """It, or what the catalogue does not hold; not where other data are against it."""
+    lost = {"crack": {"neg2_log_evidence": -0.6 * DUE, "votes": Votes(vote, vote, vote)}}
+    none = Votes(0.0, 0.0, 0.0)
+    made = table(row("crack", DUE + 1, votes=none), null=row("", 0.0, p=0.005), then=lost)
+    found = decision(made)
+    assert (found.verdict, found.one_of) == (REST, one_of)
+
+
+def test_what_relieves_strained_joints_is_one_of_both():
+    """What leaves them strained is no rival."""
+    rows = (
+        row("point-mass", TIED - 1, votes=Votes(0.0)),
+        row("sensor-mass", 5.0, strained=True),
+        row("suspension", 2.0),
+    )
+    for strained, one_of in ((True, (ALONE, "point-mass", "suspension")), (False, ())):
+        found = decision(table(*rows, null=row("", 0.0, strained=strained)))
+        assert found.one_of == one_of
+        assert found.verdict == ("calibration only" if strained else LITTLE)
+
+
+# numbers of a calibration
+
+
+@pytest.mark.parametrize(
+    ("found", "written", "plain", "leaning", "deck"),
+    [
+        ((0.9, 1.0), (0.9, 1.0), (0.9, 0.9), False, "FOUND"),
+        ((0.9, 1.1), (0.9, 0.9), (0.9, 0.9), False, "WRITTEN"),
+        ((), (0.9, 0.9), (0.9, 0.9), False, "WRITTEN"),  # no structure has these numbers
+        ((1.1, 1.1), (1.1, 1.1), (0.9, 1.1), False, "PLAIN"),
+        ((1.1, 1.1), (1.1, 1.1), (1.1, 1.1), False, "GIVEN"),
+        ((1.1, 1.1), (1.1, 1.1), (0.9, 0.9), True, "GIVEN"),
+    ],
+)
+def test_numbers_of_a_calibration_serve_no_worse_than_the_deck(
+    found, written, plain, leaning, deck
+):
+    each = dict(zip(CalibratedDeck, (found, written, plain, (1.0, 1.0)), strict=True))
+    answer = decision(table(decks=each, nominal=100.0, leaning=leaning))
+    assert answer.deck is CalibratedDeck[deck]
+    assert answer.verdict == (LITTLE if deck == "GIVEN" else "calibration only")
+
+
+# the leader of a round
+
+
+def test_a_leader_that_is_a_simpler_effect_lets_it_lead():
+    lump, mass = row("local-resonator", 0.0, becomes="point-mass"), row("point-mass", 1 - TIED)
+    far, foot = row("point-mass", -TIED - 1), 100 * (TIED + 1)
+    assert leading([lump, mass], 500.0) == 1
+    assert leading([lump, far], 500.0) == 0
+    assert leading([lump, far], foot + 1) == 1  # its foot is a hundredth of what was gained
+    assert leading([row("local-resonator", 0.0), mass], 500.0) == 0
+    assert leading([replace(lump, becomes="", nearly="point-mass"), mass], 200.0) == 1
+
+
+def test_a_value_a_thing_cannot_have_yields_to_one_it_can():
+    string, hem = row("adhesive-stiffness", 0.0, sound=False), row("hem-contact", 1 - TIED)
+    assert leading([string, hem], 500.0) == 1
+    assert leading([string, row("hem-contact", -TIED - 1)], 500.0) == 0
+    assert leading([replace(string, sound=True), hem], 500.0) == 0
+
+
+# the function itself
+
+
+def test_it_asks_for_one_fit_by_name_and_never_for_more_than_it_needs():
+    whole = table(row("crack", 1e3), row("point-mass", 1e3 - 1))
+    known = replace(whole, rows={NULL: Row(NULL, (), 0.0)}, singles=("crack",))
+    bare = replace(whole.rows["crack"], p=None, p_damping=None, votes=None, left=None)
+    known = known.having(bare)
+    asked = []
+    while isinstance(wanted := decide(known), Wanted):
+        asked.append((wanted.ask, wanted.key))
+        due = whole.rows[wanted.key]
+        known = known.having(
+            {
+                Ask.TEST: replace(known.rows[wanted.key], p=due.p),
+                Ask.RENEWAL: replace(bare, key=renewed("crack")),
+                Ask.VOTES: replace(known.rows.get(wanted.key, due), votes=due.votes),
+                Ask.LEFT: replace(known.rows.get(wanted.key, due), left=due.left),
+            }[wanted.ask]
+        )
+    again = renewed("crack")
+    due = [(Ask.TEST, "crack"), (Ask.RENEWAL, "crack"), (Ask.VOTES, again), (Ask.LEFT, again)]
+    assert asked == due
+    assert wanted.named
+
+
+VOTE = st.one_of(st.none(), st.floats(-100, 100))
+ROWS = st.builds(
+    row,
+    st.sampled_from(("crack", "point-mass", "suspension", "sensor-fault")),
+    st.floats(-20, 200),
+    st.sampled_from((0.001, 0.03, 0.5, 0.95)),
+    st.builds(Votes, VOTE, VOTE, VOTE),
+    st.builds(with_left, st.floats(0, 2), st.floats(0, 2)),
+    strained=st.booleans(),
+)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(ROWS, max_size=4, unique_by=lambda r: r.key), st.booleans())
+def test_every_table_has_a_verdict_with_its_reason(rows, enough):
+    """A name gained what is due of all data, was tested, and is the first in order."""
+    made = table(*sorted(rows, key=lambda r: r.neg2_log_evidence), enough=enough)
+    found = decision(made)
+    assert found == decision(made)  # nothing is remembered
+    assert found.named == (found.verdict in (NAMED, "measurement fault"))
+    if found.named:
+        lead = made.rows[found.order[0]]
+        assert made.gain(lead) + lead.heard().news > found.due
+        assert enough
+        assert lead.fits(RULES)
+    else:
+        assert found.reason is not R.NAMED
+
+
+def test_every_rule_has_a_value_with_it_off():
+    """Each is named once, and changes the rules."""
+    for f in fields(DecisionRules):
+        assert RULES.without(f.name) != RULES
+        assert f.metadata["why"]
+
+
+def test_ties_hold_the_leader_first():
+    best = row("crack", 0.0)
+    assert tied(best, [best, row("point-mass", 1.0)]) == ("crack", "point-mass")
+    assert isinstance(decide(HypothesisTable({NULL: Row(NULL, (), 0.0, p=0.5)})), Decision)
