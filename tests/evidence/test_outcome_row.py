@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from chladni.decision.reasons import Reason
+from chladni.updating.decision_in_words import REFUSED
 from chladni_evidence.blind_diagnosis import Answer
 from chladni_evidence.outcome_row import line, row
 from chladni_evidence.outcome_table import beside, confusion, overall, table, tables
@@ -89,12 +91,10 @@ def test_outcome(given, truth, outcome):
     assert row(given, truth)["outcome"] == outcome
 
 
-@pytest.mark.parametrize(
-    "why", ["left the data no fit saw worse explained", "made the deck worse on data no fit saw"]
-)
+@pytest.mark.parametrize("why", [REFUSED[Reason.AGAINST], REFUSED[Reason.WORSE]])
 def test_the_veto_is_told_from_the_evidence(why):
     """A name the held-out data refused counts by evidence, and the veto was wrong to refuse it."""
-    note = f"point-mass gained 1314 in -2 ln evidence but {why}"
+    note = f"point-mass gained 1314 in -2 ln evidence, but {why} (nothing was held out)"
     given = answer(None, "calibration only", notes=["first", note])
     r = row(given, told())
     assert (r["outcome"], r["by_evidence"], r["vetoed"]) == ("none", "right", "point-mass")
