@@ -17,6 +17,9 @@ from .fuzz import DUE, fuzz, until
 from .fuzz_inputs import KINDS, fuzz_inputs
 from .identification_evidence import KINDS as NOISES
 from .identification_evidence import table
+from .record import record
+from .recorded_case import read_case
+from .replay import case_lines, likelihood_lines, narrower, rule_lines
 from .screening_evidence import TIMES
 from .screening_faults import FAULTS, tally
 from .thesis import regenerate
@@ -75,8 +78,26 @@ def _thesis(asked: argparse.Namespace) -> int:
     return 0
 
 
+def _recorded(asked: argparse.Namespace) -> int:
+    """Cases diagnosed once, and the rows of their decisions kept."""
+    record(asked.case, asked.out, _say)
+    return 0
+
+
+def _replayed(asked: argparse.Namespace) -> int:
+    """Recorded cases decided again, as they are and without each of the rules."""
+    cases = [read_case(path) for path in asked.file]
+    told = [*case_lines(cases), "", *rule_lines(cases)]
+    if asked.noise != 1.0 or asked.floor is not None:
+        told = likelihood_lines(cases, narrower(asked.noise, asked.floor))
+    for text in told:
+        _say(text)
+    return 0
+
+
 COMMANDS = {
     "run": _run, "screen": _screened, "fuzz": _fuzzed, "identify": _identified, "thesis": _thesis,
+    "record": _recorded, "replay": _replayed,
 }  # fmt: skip
 
 
@@ -109,6 +130,13 @@ def _parser() -> argparse.ArgumentParser:
     tested = commands.add_parser("thesis", help="tables 3 to 6, figures 19, 23 to 27 of the thesis")
     tested.add_argument("--seed", type=int, default=1)
     tested.add_argument("--out", type=Path, required=True)
+    kept = commands.add_parser("record", help="diagnose cases once, and keep all that decides them")
+    kept.add_argument("case", type=Path, nargs="+", help="a case folder")
+    kept.add_argument("--out", type=Path, required=True, help="a folder for one file a case")
+    again = commands.add_parser("replay", help="decide recorded cases again, and without each rule")
+    again.add_argument("--noise", type=float, default=1.0, help="times the noise of the responses")
+    again.add_argument("--floor", type=float, help="sd that nothing explains [decades]")
+    again.add_argument("file", type=Path, nargs="+", help="what record wrote")
     command = commands.add_parser("run", help="make, diagnose, score")
     command.add_argument("--set", choices=SETS, required=True)
     command.add_argument("--seeds", required=True, help="first and last, as 600-604")

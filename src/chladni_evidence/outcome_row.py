@@ -35,8 +35,8 @@ NEAR = {"tailgate": 0.150}  # a place this far off is right [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
 VETO = re.compile(
-    r"(\S+) gained .* in -2 ln evidence, but the (?:data|deck with it is worse on the data) that no "
-    r"fit saw"
+    r"(\S+) gained .* in -2 ln evidence, but the (?:data|deck with it is worse on the data) "
+    r"that no fit saw"
 )
 
 
@@ -51,19 +51,19 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     """
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}
-    called, vetoed, place = _called(d), _vetoed(d), _place(d, truth)
+    name, vetoed, place = called(d), _vetoed(d), _place(d, truth)
     reach = NEAR.get(truth["structure"], CLOSE)
     return {
         "structure": truth["structure"],
         "seed": truth["seed"],
         "mesh": truth["mesh"],
         "effect": kind,
-        "called": called,
-        "outcome": _outcome(answer, called, truth),
-        "by_evidence": _outcome(answer, vetoed or called, truth),
+        "called": name,
+        "outcome": outcome_of(answer, name, truth),
+        "by_evidence": outcome_of(answer, vetoed or name, truth),
         "vetoed": vetoed,
         "veto_right": None if vetoed is None else not _is(vetoed, truth),
-        "kin": _kin(called, truth),
+        "kin": _kin(name, truth),
         "place_m": place,
         "near": None if place is None else place <= reach,
         "gain_share": _gain(d),
@@ -80,7 +80,7 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
     }
 
 
-def _called(d: Row) -> str:
+def called(d: Row) -> str:
     """The names given, else the verdict."""
     if d.get("verdict") in NAMED and d.get("effects"):
         return AND.join(sorted(str(e["name"]) for e in d["effects"]))
@@ -93,19 +93,20 @@ def _vetoed(d: Row) -> str | None:
     return found[0] if found else None
 
 
-def _outcome(answer: Answer, called: str, truth: Row) -> str:
+def outcome_of(answer: Answer, name: str, truth: Row) -> str:
+    """What an answer that gives this name is, held against the truth."""
     if answer.crashed:
         return "crash"
     if answer.code == 2:
         return "refused"
     among = [set(names) for names in answer.result.get("one_of") or []]
-    if answer.code == 3 or called in ADMITTED:
+    if answer.code == 3 or name in ADMITTED:
         return "admitted"
-    if called in PLAINLY:
+    if name in PLAINLY:
         return "right" if truth["effect"] in NULLS else "none"
-    if _is(called, truth):
+    if _is(name, truth):
         return "right" if _channel(answer.result, truth) else "wrong"
-    given, hidden = (Counter(members(names)) for names in (called, truth["effect"]))
+    given, hidden = (Counter(members(names)) for names in (name, truth["effect"]))
     if not given - hidden:
         return "part"
     apart = set((given - hidden) + (hidden - given))
@@ -208,7 +209,7 @@ def _named(d: Row, truth: Row) -> Iterator[tuple[Row, float]]:
     Two of one family are not told apart here.
     """
     hidden = Counter(members(truth["effect"]))
-    if Counter(members(_called(d))) != hidden:
+    if Counter(members(called(d))) != hidden:
         return
     for true in truth.get("effects") or [truth]:
         mine = [e for e in d["effects"] if e["name"] == true["effect"]]

@@ -52,6 +52,7 @@ class Measured:
     sets : several effects, by key
     decks : of a calibration
     failed : why a row could not be fitted again
+    whole : whether rows that were decided on keep their models, 10 to 300 MB each on a tailgate
     """
 
     table: HypothesisTable
@@ -62,6 +63,7 @@ class Measured:
     written: Mapping[str, HypothesisFit] = field(default_factory=dict)
     decks: Mapping[CalibratedDeck, HypothesisFit] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
+    whole: bool = False
 
     def row(self, row: Row) -> "Measured":
         """With a row put in or replaced."""
@@ -160,7 +162,7 @@ def _renewed(
             raise
         row = replace(known.table.rows[key], key=renewed(key), fitted=False)
         return replace(known, failed={**known.failed, key: str(error)}).row(row)
-    done = {renewed(k) for k in known.renewals if (k,) != lead}
+    done = {renewed(k) for k in known.renewals if (k,) != lead and not known.whole}
     fits, written = (
         {k: t for k, t in every.items() if k not in done} for every in (known.fits, known.written)
     )

@@ -8,7 +8,6 @@
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -38,7 +37,7 @@ from ..updating.other_recordings import scored_others
 from ..updating.outcome import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
-from ..updating.renewal import renewed
+from ..updating.renewal import Renewal, renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import (
     agreement,
@@ -78,10 +77,25 @@ class Explained:
     screening: Screening | None = None
 
 
-def explained(
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """A case whose hypotheses are fitted, before any decision."""
+
+    case: Case
+    asked: Question
+    prepared: Prepared
+    found: Diagnosis
+    screening: Screening | None
+
+    def renew(self, hypothesis: HypothesisFit) -> Renewal:
+        """A hypothesis on a reduced model that bears it."""
+        return renewed(self.asked, self.prepared, hypothesis)
+
+
+def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
-) -> Explained:
-    """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case.
+) -> Searched:
+    """Fit all hypotheses of one state of a case; without ``diagnosing`` calibration alone.
 
     Parameters
     ----------
@@ -116,8 +130,16 @@ def explained(
         notes = tuple(n for n in prepared.notes if n != NOT_WEIGHED)
         prepared = replace(prepared, problem=replace(prepared.problem, base=base), notes=notes)
     found = compared(prepared.problem, within(progress, 0.1, 0.85), diagnosing)
-    named = prepared if diagnosing else replace(prepared, too_little="")  # nothing is to be named
-    found, distrust = _judged(asked, named, found)
+    return Searched(case, asked, prepared, found, screening)
+
+
+def explained(
+    case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
+) -> Explained:
+    """Diagnose (or, without ``diagnosing``, only calibrate) one state of a case."""
+    made = searched(case, diagnosing, progress, known)
+    asked, prepared, screening = made.asked, made.prepared, made.screening
+    found, distrust = _judged(made, diagnosing)
     if screening is not None and screening.faults and not diagnosing:
         distrust = (*distrust, f"{screening.sentence}; what is fitted to it bends the model")
     return Explained(case, asked, prepared, found, distrust, screening)
@@ -147,15 +169,16 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
     )
 
 
-def _judged(
-    asked: Question, prepared: Prepared, found: Diagnosis
-) -> tuple[Diagnosis, tuple[str, ...]]:
+def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
     """The verdict by all data, and reasons not to trust it."""
-    decision, known = decided(prepared, found, partial(renewed, asked, prepared))
-    found, distrust = concluded(prepared, found, decision, known)
+    prepared = made.prepared
+    if not diagnosing:  # nothing is to be named
+        prepared = replace(prepared, too_little="")
+    decision, known = decided(prepared, made.found, made.renew)
+    found, distrust = concluded(prepared, made.found, decision, known)
     if found.found is not None:
         return found, distrust
-    plain = renewed(asked, prepared, found.plain, held=found.as_the_null)
+    plain = renewed(made.asked, prepared, found.plain, held=found.as_the_null)
     found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
     return found, plain.distrust
 

@@ -1,0 +1,139 @@
+"""The reduced problem of a recorded case, row by row, and its evidence under another likelihood.
+
+A row is its responses, what the model leaves of them (∂ by all parameters beside it), and what is
+known of the parameters without them. Evidence has the parameters linear about the fit that is
+there, as :mod:`chladni.updating.held_out_evidence` has it; no fit is made again.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from chladni.errors import ModelError
+from chladni.updating.deciding import Measured
+from chladni.updating.diagnosis import Diagnosis
+from chladni.updating.discrepancy import learned
+from chladni.updating.hypothesis_fit import HypothesisFit
+from chladni.updating.likelihood import Responses
+from chladni.updating.map_fit import MassMeasurement, beside, constants
+from chladni.updating.reduced_model import State, evaluate
+from chladni.updating.rising import Dissipated
+from chladni.updating.sensor_errors import SensorErrors, Side
+
+Arrays = dict[str, np.ndarray]
+Likelihood = Callable[[Responses], Responses]
+KEPT = {c.__name__: c for c in (Responses, State, SensorErrors, Side, Dissipated)}
+LEFT_OUT = {"error", "known", "bent"}  # made anew from the state that errors spread from
+CLASS = "class"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRow:
+    """One hypothesis at its fit.
+
+    Attributes
+    ----------
+    data : without the errors of form, which spread from ``data.about`` with ``delta``
+    deviation : (n_f, n_out, n_in) complex        log10 of model over test
+    slopes : (n_p, n_f, n_out, n_in) complex      by the parameters
+    r0, J0 : what is known of the parameters beside the data
+    constants : of -2 ln evidence
+    """
+
+    data: Responses
+    delta: float
+    deviation: np.ndarray
+    slopes: np.ndarray
+    r0: np.ndarray
+    J0: np.ndarray
+    constants: float
+
+    def neg2_log_evidence(self, likelihood: Likelihood = lambda data: data) -> float:
+        """-2 ln evidence where a likelihood makes other data of these."""
+        assert self.data.about is not None
+        data = likelihood(self.data).allowing_errors(self.data.about, self.delta)
+        assert data.error is not None
+        sd = data.std()
+        r = data.stacked(self.deviation[None] / sd)[:, 0]
+        J = data.stacked(self.slopes / sd[None])
+        return learned(data.error, r, J, self.r0, self.J0).neg2_log_evidence + self.constants
+
+
+def rows_kept(
+    known: Measured, found: Diagnosis, mass: MassMeasurement | None, null: str
+) -> Iterator[tuple[str, RecordedRow]]:
+    """The rows of responses; natural frequencies have none.
+
+    Nor has a family far behind that gave up its model, where the common one cannot hold its effect.
+    """
+    for key, hypothesis in {null: found.null, **known.fits}.items():
+        data = hypothesis.data
+        if isinstance(data, Responses) and data.error is not None:
+            with suppress(ModelError):
+                yield key, _row(hypothesis, data, mass)
+
+
+def _row(hypothesis: HypothesisFit, data: Responses, mass: MassMeasurement | None) -> RecordedRow:
+    fit = hypothesis.fit
+    assert data.error is not None
+    state = evaluate(hypothesis.model, fit.effects, fit.x)
+    # of unit spread, unwhitened and on every line, so that any likelihood can be laid over them
+    plain = replace(data.exactly(), use=np.ones_like(data.use))
+    sd = plain.std()
+    J = plain.scaled(state, True)[1]
+    shape = (*data.use.shape, data.values.shape[2])
+    half = len(J) // 2
+    each = (J[:half] + 1j * J[half:]).T.reshape(-1, *shape) * sd
+    r0, J0 = beside(fit.effects, mass, fit.x, state)
+    return RecordedRow(
+        replace(data, outputs=None, inputs=None), data.error.delta, plain.deviation(state),
+        each.astype(np.complex64), r0, J0, constants(fit.effects),
+    )  # fmt: skip
+
+
+def packed(key: str, row: RecordedRow) -> Arrays:
+    """The arrays of a row, each under its path."""
+    out: Arrays = {}
+    _pack(f"{key}|", row, out)
+    return out
+
+
+def _pack(path: str, value: Any, out: Arrays) -> None:
+    if isinstance(value, np.ndarray):
+        out[path] = value
+    elif isinstance(value, (float, int, str)):
+        out[path] = np.array(value)
+    elif is_dataclass(value):
+        out[f"{path}{CLASS}"] = np.array(type(value).__name__)
+        for f in fields(value):
+            if f.name not in LEFT_OUT and not f.name.startswith("_"):
+                _pack(f"{path}{f.name}/", getattr(value, f.name), out)
+    elif isinstance(value, tuple) and value and sp.issparse(value[0]):
+        out[f"{path}{CLASS}"] = np.array("()")  # rows of the structure: the basis has them
+
+
+def unpacked(arrays: Mapping[str, np.ndarray]) -> dict[str, RecordedRow]:
+    """The rows of a recorded case."""
+    keys = dict.fromkeys(name.split("|")[0] for name in arrays)
+    return {key: _unpacked(f"{key}|", arrays) for key in keys}
+
+
+def _unpacked(path: str, arrays: Mapping[str, np.ndarray]) -> Any:
+    if path in arrays:
+        value = arrays[path]
+        return value.item() if value.ndim == 0 else value
+    name = str(arrays.get(f"{path}{CLASS}", "None"))
+    if name in ("None", "()"):
+        return () if name == "()" else None
+    made = RecordedRow if name == RecordedRow.__name__ else KEPT[name]
+    named = (f.name for f in fields(made) if any(k.startswith(f"{path}{f.name}/") for k in arrays))
+    given = {n: _unpacked(f"{path}{n}/", arrays) for n in named}
+    if made is Responses:
+        given = {"outputs": None, "inputs": None, **given}
+    if made is State:
+        given = {**dict.fromkeys(("dK", "dM", "offset", "doffset")), **given}
+    return made(**given)

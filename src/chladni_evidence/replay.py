@@ -1,0 +1,192 @@
+"""Recorded cases decided again, with every rule in turn switched off: what each one is worth."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from chladni.decision.decide import RULES, decide
+from chladni.decision.decision_rules import DecisionRules, rule
+from chladni.decision.hypothesis_table import HypothesisTable, Wanted
+from chladni.decision.reasons import Decision
+from chladni.updating.likelihood import Responses
+
+from .blind_diagnosis import Answer
+from .outcome_row import called, outcome_of
+from .pair_kinds import catalogued
+from .recorded_case import RecordedCase
+from .recorded_rows import Likelihood, unpacked
+
+Decide = Callable[[HypothesisTable], Decision | Wanted]
+RIGHT = ("right", "part", "among")
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What one decision says of a case.
+
+    Attributes
+    ----------
+    said : the name, or the verdict
+    one_of : what it cannot tell apart
+    outcome : held against the truth; "" where nobody knows it
+    wanted : what it asks for that was not recorded
+    """
+
+    said: str
+    one_of: tuple[str, ...] = ()
+    outcome: str = ""
+    wanted: str = ""
+
+
+@dataclass(frozen=True)
+class RuleWorth:
+    """What a rule changes, by switching it off.
+
+    Attributes
+    ----------
+    name, why : of the rule
+    changed : cases whose verdict it changes
+    saves, spoils : cases that are right only with it, and only without it
+    open : cases where the answer without it needs a fit that was not recorded
+    """
+
+    name: str
+    why: str
+    changed: tuple[str, ...]
+    saves: tuple[str, ...]
+    spoils: tuple[str, ...]
+    open: tuple[str, ...]
+
+
+def replayed(case: RecordedCase, decided: Decide = decide) -> Replayed:
+    """A recorded case decided again."""
+    found = decided(case.table)
+    if isinstance(found, Wanted):
+        return Replayed("", wanted=f"{found.ask.value}, of {found.key}")
+    names = case.table.rows[found.order[0]].names if found.named else ()
+    return _scored(case, found.verdict, names, found.one_of)
+
+
+def recorded(case: RecordedCase) -> Replayed:
+    """What was said when the case was recorded."""
+    return _scored(case, case.verdict, case.names, case.one_of)
+
+
+def _scored(
+    case: RecordedCase, verdict: str, names: Sequence[str], one_of: Sequence[str]
+) -> Replayed:
+    result: dict[str, Any] = {
+        "verdict": verdict, "effects": [{"name": n} for n in names], "one_of": [list(one_of)],
+    }  # fmt: skip
+    said = called(result)
+    if not case.truth:
+        return Replayed(said, tuple(one_of))
+    truth = {"effect": catalogued(case.truth["effect"])}
+    outcome = outcome_of(Answer(0, 0.0, 0.0, "", result), said, truth)
+    return Replayed(said, tuple(one_of), outcome)
+
+
+def ablated(cases: Sequence[RecordedCase]) -> list[RuleWorth]:
+    """Every rule switched off in turn; most cases changed first."""
+    before = [replayed(case) for case in cases]
+    every = [_worth(f.name, cases, before) for f in fields(DecisionRules)]
+    return sorted(every, key=lambda w: (-len(w.changed), w.name))
+
+
+def _worth(name: str, cases: Sequence[RecordedCase], before: Sequence[Replayed]) -> RuleWorth:
+    rules = RULES.without(name)
+    after = [replayed(case, lambda table: decide(table, rules)) for case in cases]
+    pairs = [(c.name, a, b) for c, a, b in zip(cases, before, after, strict=True) if not b.wanted]
+    return RuleWorth(
+        name,
+        rule(name).metadata["why"],
+        _names((n, (a.said, a.one_of) != (b.said, b.one_of)) for n, a, b in pairs),
+        _names((n, is_right(a) and not is_right(b) and b.outcome != "") for n, a, b in pairs),
+        _names((n, not is_right(a) and is_right(b)) for n, a, b in pairs),
+        _names((c.name, b.wanted != "") for c, b in zip(cases, after, strict=True)),
+    )
+
+
+def _names(each: Iterable[tuple[str, bool]]) -> tuple[str, ...]:
+    return tuple(name for name, chosen in each if chosen)
+
+
+def is_right(answer: Replayed) -> bool:
+    """Whether an answer is right, or has the truth among what it cannot tell apart."""
+    return answer.outcome in RIGHT
+
+
+def case_lines(cases: Sequence[RecordedCase]) -> list[str]:
+    """A line a case: what was hidden, what was said when it was recorded, and what is said now."""
+    head = f"{'case':22} {'hidden':26} {'recorded':40} now"
+    return [head, *(_line(case) for case in cases)]
+
+
+def _line(case: RecordedCase) -> str:
+    then, now = recorded(case), replayed(case)
+    hidden = case.truth.get("effect", "-")
+    same = (then.said, then.one_of) == (now.said, now.one_of)
+    text = "the same" if same else (now.wanted and f"needs {now.wanted}") or _text(now)
+    return f"{case.name:22} {hidden:26} {_text(then):40} {text}"
+
+
+def _text(answer: Replayed) -> str:
+    return f"{answer.said} ({answer.outcome})" if answer.outcome else answer.said
+
+
+def rule_lines(cases: Sequence[RecordedCase]) -> list[str]:
+    """A line a rule: verdicts changed without it, right to wrong, wrong to right, not recorded."""
+    head = f"{'rule switched off':22} changed  right->wrong  wrong->right  not recorded"
+    return [
+        head,
+        *(
+            f"{w.name:22} {len(w.changed):7}  {len(w.saves):12}  {len(w.spoils):12}  "
+            f"{len(w.open):12}  {w.why}"
+            for w in ablated(cases)
+        ),
+    ]
+
+
+def another_likelihood(case: RecordedCase, likelihood: Likelihood) -> RecordedCase:
+    """The case with the evidence of its rows under another likelihood.
+
+    What was measured of them otherwise (tests, votes, Q) stays as it was recorded. A family far
+    behind lost vectors of its basis before it was kept, so differences of evidence are taken.
+    """
+    rows = {}
+    for key, row in unpacked(case.arrays).items():
+        was = case.table.rows[key]
+        more = row.neg2_log_evidence(likelihood) - row.neg2_log_evidence()
+        rows[key] = replace(was, neg2_log_evidence=was.neg2_log_evidence + more)
+    table = case.table.having(*rows.values())
+    order = sorted(table.singles, key=lambda k: table.rows[k].neg2_log_evidence)
+    return replace(case, table=replace(table, singles=tuple(order)))
+
+
+def narrower(noise: float, floor: float | None) -> Likelihood:
+    """Responses with their noise scaled, and another floor [decades]."""
+
+    def made(data: Responses) -> Responses:
+        sd = None if data.noise is None else noise * data.noise
+        return replace(data, noise=sd, sigma_model=data.sigma_model if floor is None else floor)
+
+    return made
+
+
+def likelihood_lines(cases: Sequence[RecordedCase], likelihood: Likelihood) -> list[str]:
+    """A line a case: the gain of its leader and the answer, as recorded and under a likelihood."""
+    head = f"{'case':22} {'hidden':26} {'gain':>8} {'then':>8}  recorded -> then"
+    return [head, *(_shadow(case, another_likelihood(case, likelihood)) for case in cases)]
+
+
+def _shadow(case: RecordedCase, other: RecordedCase) -> str:
+    gains = []
+    for each in (case, other):
+        lead = each.table.singles[:1]
+        gains.append(each.table.gain(each.table.rows[lead[0]]) if lead else 0.0)
+    now = replayed(other)
+    text = f"needs {now.wanted}" if now.wanted else _text(now)
+    return (
+        f"{case.name:22} {case.truth.get('effect', '-'):26} {gains[0]:8.1f} {gains[1]:8.1f}  "
+        f"{_text(recorded(case))} -> {text}"
+    )
