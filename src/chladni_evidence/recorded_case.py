@@ -50,14 +50,15 @@ class RecordedCase:
 
 def write_case(case: RecordedCase, path: Path) -> None:
     """Write a recorded case."""
+    table = asdict(case.table)
+    table["decks"] = {d.name: Q for d, Q in case.table.decks.items()}
     text = {
         "name": case.name, "truth": case.truth, "verdict": case.verdict, "names": case.names,
-        "one_of": case.one_of, "table": asdict(case.table),
+        "one_of": case.one_of, "table": table,
     }  # fmt: skip
-    text["table"]["decks"] = {d.name: Q for d, Q in case.table.decks.items()}
     packed = np.frombuffer(json.dumps(text, default=_plain).encode(), np.uint8)
     with path.open("wb") as file:
-        np.savez_compressed(file, **{TEXT: packed}, **case.arrays)
+        np.savez_compressed(file, allow_pickle=False, **{TEXT: packed, **case.arrays})
 
 
 def read_case(path: Path) -> RecordedCase:

@@ -37,30 +37,33 @@ class RecordedRow:
 
     Attributes
     ----------
-    data : without the errors of form, which spread from ``data.about`` with ``delta``
     deviation : (n_f, n_out, n_in) complex        log10 of model over test
     slopes : (n_p, n_f, n_out, n_in) complex      by the parameters
     r0, J0 : what is known of the parameters beside the data
     constants : of -2 ln evidence
+    data : of calibration alone: all rows are compared with the errors of form that spread from it
     """
 
-    data: Responses
-    delta: float
     deviation: np.ndarray
     slopes: np.ndarray
     r0: np.ndarray
     J0: np.ndarray
     constants: float
+    data: Responses | None = None
 
-    def neg2_log_evidence(self, likelihood: Likelihood = lambda data: data) -> float:
-        """-2 ln evidence where a likelihood makes other data of these."""
-        assert self.data.about is not None
-        data = likelihood(self.data).allowing_errors(self.data.about, self.delta)
+    def neg2_log_evidence(self, data: Responses) -> float:
+        """-2 ln evidence of some data, with the errors of the model's form in them."""
         assert data.error is not None
         sd = data.std()
         r = data.stacked(self.deviation[None] / sd)[:, 0]
         J = data.stacked(self.slopes / sd[None])
         return learned(data.error, r, J, self.r0, self.J0).neg2_log_evidence + self.constants
+
+    def spread(self, likelihood: Likelihood = lambda data: data) -> Responses:
+        """The data under a likelihood, errors of form spreading from calibration alone."""
+        assert self.data is not None
+        assert self.data.about is not None
+        return likelihood(self.data).allowing_errors(self.data.about)
 
 
 def rows_kept(
@@ -79,7 +82,7 @@ def rows_kept(
 
 def _row(hypothesis: HypothesisFit, data: Responses, mass: MassMeasurement | None) -> RecordedRow:
     fit = hypothesis.fit
-    assert data.error is not None
+    bare = replace(data, outputs=None, inputs=None)
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     # of unit spread, unwhitened and on every line, so that any likelihood can be laid over them
     plain = replace(data.exactly(), use=np.ones_like(data.use))
@@ -90,8 +93,8 @@ def _row(hypothesis: HypothesisFit, data: Responses, mass: MassMeasurement | Non
     each = (J[:half] + 1j * J[half:]).T.reshape(-1, *shape) * sd
     r0, J0 = beside(fit.effects, mass, fit.x, state)
     return RecordedRow(
-        replace(data, outputs=None, inputs=None), data.error.delta, plain.deviation(state),
-        each.astype(np.complex64), r0, J0, constants(fit.effects),
+        plain.deviation(state), each.astype(np.complex64), r0, J0, constants(fit.effects),
+        None if hypothesis.effect in fit.effects else bare,
     )  # fmt: skip
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 from chladni.decision.decide import RULES, decide
 from chladni.decision.decision_rules import DecisionRules, rule
-from chladni.decision.hypothesis_table import HypothesisTable, Wanted
+from chladni.decision.hypothesis_table import NULL, HypothesisTable, Wanted
 from chladni.decision.reasons import Decision
+from chladni.errors import FileError
 from chladni.updating.likelihood import Responses
 
 from .blind_diagnosis import Answer
@@ -151,13 +152,17 @@ def another_likelihood(case: RecordedCase, likelihood: Likelihood) -> RecordedCa
     """The case with the evidence of its rows under another likelihood.
 
     What was measured of them otherwise (tests, votes, Q) stays as it was recorded. A family far
-    behind lost vectors of its basis before it was kept, so differences of evidence are taken.
+    behind lost vectors of its basis before it was kept, so differences of evidence are taken, to
+    that of calibration alone, for widths of the data are in none.
     """
-    rows = {}
-    for key, row in unpacked(case.arrays).items():
+    kept, rows = unpacked(case.arrays), {}
+    if not kept:
+        raise FileError(f"{case.name}: natural frequencies are compared; there are no responses")
+    before, after = (kept[NULL].spread(made) for made in (lambda data: data, likelihood))
+    more = {k: r.neg2_log_evidence(after) - r.neg2_log_evidence(before) for k, r in kept.items()}
+    for key in kept:
         was = case.table.rows[key]
-        more = row.neg2_log_evidence(likelihood) - row.neg2_log_evidence()
-        rows[key] = replace(was, neg2_log_evidence=was.neg2_log_evidence + more)
+        rows[key] = replace(was, neg2_log_evidence=was.neg2_log_evidence + more[key] - more[NULL])
     table = case.table.having(*rows.values())
     order = sorted(table.singles, key=lambda k: table.rows[k].neg2_log_evidence)
     return replace(case, table=replace(table, singles=tuple(order)))
