@@ -72,6 +72,15 @@ def test_json_of_a_command_is_the_result_of_its_function(
     assert written(command, name, folder, tmp_path / "out", *options) == due
 
 
+def test_a_diagnosis_compares_its_name_with_what_calibrate_answers(diagnosed, calibrated):
+    assert diagnosed.effects
+    for one, other in (
+        (diagnosed.agreement.fitted, calibrated.agreement.fitted),
+        (diagnosed.agreement.held_out, calibrated.agreement.held_out),
+    ):
+        assert one.calibrated == pytest.approx(other.calibrated, rel=0.01)
+
+
 def test_json_of_a_calibration_is_the_result_of_its_function(calibrated, folder, tmp_path):
     """E, rho and t stand for a mass here and foretell worse, so that the exit code is 3."""
     found = written("calibrate", "diagnosis.json", folder, tmp_path / "out", code=3)

@@ -87,6 +87,12 @@ class Diagnosis:
         return self.hypotheses[0] if named and self.hypotheses else None
 
     @property
+    def without_effects(self) -> "Diagnosis":
+        """What calibration alone finds."""
+        table = replace(self.table, singles=(), sets=())
+        return replace(self, hypotheses=(), sets=(), table=table)
+
+    @property
     def as_deck(self) -> HypothesisFit | None:
         """The named effect as the updated deck holds it, if anything is named."""
         return self.deck or self.written or self.found

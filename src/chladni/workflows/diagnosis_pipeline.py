@@ -176,11 +176,15 @@ def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...
         prepared = replace(prepared, too_little="")
     decision, known = decided(prepared, made.found, made.renew)
     found, distrust = concluded(prepared, made.found, decision, known)
+    if decision.named:  # it is compared with what calibrate answers
+        alone = made.found.without_effects
+        calibration = concluded(prepared, alone, *decided(prepared, alone, made.renew))[0]
+        found = replace(found, plain=calibration.plain)
+    plain = renewed(made.asked, prepared, found.plain, held=found.as_the_null)
+    found = replace(found, plain=plain.hypothesis)
     if found.found is not None:
         return found, distrust
-    plain = renewed(made.asked, prepared, found.plain, held=found.as_the_null)
-    found = replace(found, plain=plain.hypothesis, notes=(*found.notes, plain.note))
-    return found, plain.distrust
+    return replace(found, notes=(*found.notes, plain.note)), plain.distrust
 
 
 def _updated(
