@@ -69,12 +69,16 @@ def unseen(hypothesis):
 
 @pytest.fixture(scope="module")
 def learned(hypothesis, unseen):
-    """The hypothesis with a scatter that is felt, found on the lines that were not held out."""
+    """The hypothesis with a scatter that is felt, found on the lines that were not held out.
+
+    Its numbers are as uncertain as before the test.
+    """
     own, x = hypothesis.fit, hypothesis.fit.x.copy()
     (scatter,) = [e for e in own.effects if not e.writable]
     x[own.slice(scatter)] = 3 * np.eye(len(scatter.parameters))[2]
     data = hypothesis.data.using(hypothesis.data.use & ~unseen)
-    return replace(hypothesis, fit=replace(own, x=x, data=data))
+    prior = np.diag([p.sd**2 for e in own.effects for p in e.parameters])
+    return replace(hypothesis, fit=replace(own, x=x, data=data, covariance=prior))
 
 
 def off(deck, whole, use):
@@ -103,6 +107,21 @@ def test_a_deck_responds_as_what_was_found_does_on_lines_that_were_held_out_too(
     assert deck.fit.of(deck.effect) == pytest.approx(learned.fit.of(learned.effect), abs=5e-3)
 
 
+@pytest.mark.parametrize("share", [0.5, 0.0])
+def test_numbers_of_a_deck_stay_within_the_intervals_of_what_was_found(learned, unseen, share):
+    """As far as the narrowest lets them, all along the same line."""
+    kept = [e for e in learned.fit.effects if e.writable]
+    found = np.concatenate([learned.fit.of(e) for e in kept])
+    free = as_foretold(learned, None, unseen).fit.x - found
+    at = learned.fit.slice(kept[0])
+    covariance = learned.fit.covariance.copy()
+    covariance[at, at] = np.diag((share * free[:1] / 1.96) ** 2)
+    narrow = replace(learned, fit=replace(learned.fit, covariance=covariance))
+    np.testing.assert_allclose(
+        as_foretold(narrow, None, unseen).fit.x - found, share * free, atol=1e-9
+    )
+
+
 def test_what_was_held_out_does_not_enter_the_deck(learned, unseen):
     """Its recorded values may be anything."""
     values = np.where(unseen[:, :, None], 7.0 + 3.0j, learned.data.values)
@@ -119,7 +138,10 @@ def test_what_the_mesh_hides_is_made_up_for_and_still_known(learned, unseen, red
     effects, x = (E, over, effect), np.concatenate([[0.0], [4.0], learned.fit.of(effect)])
     model = reduced.model_for(over, np.array([4.0]))
     state = evaluate(model, effects, x, False)
-    own = replace(learned.fit, effects=effects, x=x, state=state, data=learned.data.over(model))
+    own = replace(
+        learned.fit, effects=effects, x=x, state=state, data=learned.data.over(model),
+        covariance=np.eye(len(x)),
+    )  # fmt: skip
     found = HypothesisFit(effect, own, model)
     deck = as_foretold(found, None, unseen)
     assert deck.fit.of(over) == pytest.approx([4.0])
