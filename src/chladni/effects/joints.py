@@ -6,7 +6,7 @@ bead. What a joint has in K is kept as rows b with K_j = bᵀ b, so that its los
 rank.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,6 +22,8 @@ from ..model.properties import BeamSection, Isotropic, Part, SolidSection
 from .model_families import SOFT
 
 MOST_SOLIDS = 27  # of a weld: more of them in one piece are a casting
+NEXT = 2.0  # median distances to the nearest: fasteners farther apart are not in one line
+MOST_RUN = 8  # fasteners in a run that is tried as one
 FLAT = 1e-9  # of the stiffest direction of a joint: softer ones are rounding
 
 
@@ -129,6 +131,61 @@ def beads(built: Structure) -> list[Connection]:
             joint = _of_solids(assembly, group, chosen)
             out.append(_held(assembly, none, joint, _touched(built, joint)))
     return [j for j in out if j.parts]
+
+
+def neighbours(joints: Sequence[Connection]) -> tuple[tuple[int, ...], ...]:
+    """Positions of the fasteners next to each along its line, two at most.
+
+    Fasteners of one kind between the same parts are linked, the nearest first. A line longer than
+    ``MOST_RUN`` may close.
+    """
+    out: list[list[int]] = [[] for _ in joints]
+    line = np.arange(len(joints))
+    alike: dict[tuple[object, ...], list[int]] = {}
+    for k, j in enumerate(joints):
+        alike.setdefault((j.kind, j.group, j.rigid, frozenset(j.parts)), []).append(k)
+    for at in (np.array(some) for some in alike.values() if len(some) > 1):
+        points = np.array([joints[k].point for k in at])
+        apart = np.linalg.norm(points[:, None] - points, axis=2)
+        np.fill_diagonal(apart, np.inf)
+        reach = NEXT * np.median(apart.min(axis=1))
+        first, second = np.nonzero(np.triu(apart <= reach))
+        for n in np.argsort(apart[first, second], kind="stable"):
+            a, b = int(at[first[n]]), int(at[second[n]])
+            closes = line[a] == line[b] and (line == line[a]).sum() <= MOST_RUN
+            if closes or max(len(out[a]), len(out[b])) > 1:
+                continue
+            out[a].append(b)
+            out[b].append(a)
+            line[line == line[b]] = line[a]
+    return tuple(map(tuple, out))
+
+
+def row_about(k: int, next_to: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
+    """Positions of the fasteners of every run that a fastener may be in, in their order."""
+    row, seen = [k], {k}
+    for way, begun in enumerate(next_to[k]):
+        at: int | None = begun
+        for _ in range(MOST_RUN - 1):
+            if at is None or at in seen:
+                break
+            seen.add(at)
+            row = [at, *row] if way else [*row, at]
+            at = next((n for n in next_to[at] if n not in seen), None)
+    return tuple(row)
+
+
+def joined(joints: Sequence[Connection]) -> Connection:
+    """Several fasteners of one kind as one."""
+    first = joints[0]
+    return replace(
+        first,
+        elements=np.concatenate([j.elements for j in joints]),
+        ids=tuple(i for j in joints for i in j.ids),
+        point=np.mean([j.point for j in joints], axis=0),
+        grids=tuple(dict.fromkeys(g for j in joints for g in j.grids)),
+        rows=sp.csr_array(sp.vstack([j.rows for j in joints])),
+    )
 
 
 def _moved(columns: sp.csc_array, joint: Connection) -> np.ndarray:

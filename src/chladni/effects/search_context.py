@@ -24,6 +24,23 @@ class Candidate:
     base: np.ndarray
 
 
+class FastenerRow(Protocol):
+    """Adjacent fasteners of one line, any run of which may be loosened as one."""
+
+    @property
+    def at(self) -> int:
+        """Number of the one that was asked about."""
+
+    def __len__(self) -> int:
+        """How many they are."""
+
+    def run(self, first: int, last: int) -> tuple[Connection, np.ndarray]:
+        """The fasteners from one to another as one, and the share z/(w + z) of its rows (r,)."""
+
+    def scores(self, about: int, first: int, last: int, left: np.ndarray) -> np.ndarray:
+        """Score of that run with some of its stiffness left (k,)."""
+
+
 class ResponseScan(Protocol):
     """Scores of many changes at once, where responses were measured.
 
@@ -68,6 +85,9 @@ class ResponseScan(Protocol):
 
         ``left`` (n, k) is in units of what the fastener has; nothing is linearised.
         """
+
+    def fastener_row(self, k: int) -> FastenerRow:
+        """The context's fasteners of every run that the one numbered k may be in."""
 
 
 class SearchContext(Protocol):

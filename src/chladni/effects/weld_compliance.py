@@ -20,9 +20,9 @@ from ..model.assembly import Assembly
 from .effect import Effect, MatrixTerm, Parameter
 from .estimate import Estimate
 from .family import Article, Family
-from .joints import Connection, fasteners, with_factor_on, with_solids
+from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_solids
 from .model_families import joint_families
-from .search_context import Candidate, SearchContext, best_places
+from .search_context import Candidate, FastenerRow, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
 MOST = 3.0  # ln of what is left over s, at most
@@ -31,6 +31,8 @@ STARTS = (-1.5, 0.0, 1.5)
 SOUND = 40.0  # x of the deck's own
 BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
+SINGLE = 2  # half of the odds are those of one fastener, wherever it is ...
+RUNS = 2 * (MOST_RUN - 1)  # ... the others those of a run, wherever it begins, however long it is
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
 NEEDS = "welds, screws or bushes between sheets or beams"
 
@@ -112,11 +114,13 @@ def of_one(
     share: np.ndarray,
     families: JointFamilies,
     tried: int,
+    count: int = 1,
 ) -> WeldCompliance:
-    """The effect of one of as many fasteners as were tried.
+    """The effect of one of as many fasteners, or runs of them, as were tried.
 
     Parameters
     ----------
+    count : of fasteners in the run
     share : (r,)   z/(w + z) of the joint's rows, see :func:`.joints.softness`
     families : {name: what all joints of a kind have in K, prior sd of ln of their factor}
     """
@@ -129,8 +133,11 @@ def of_one(
         unknown = (*unknown, Parameter("K of the others", "-", 0.0, sd, step=0.5))
     word = "weld" if joint.kind == "solids" else "fastener"
     x, y, z = joint.point.tolist()
+    named = f"{word} {joint.ids[0]}"
+    if count > 1:
+        named = f"{count} {word}s in a row, elements {joint.ids[0]} to {joint.ids[-1]},"
     return kind(
-        unknown, f"{word} {joint.ids[0]} {joint.where}", joint.parts, joint.grids,
+        unknown, f"{named} {joint.where}", joint.parts, joint.grids,
         point=(x, y, z), trials_factor=tried, replaces=(text,) if text in families else (),
         joint=joint, operator=own, others=others,
     )  # fmt: skip
@@ -146,7 +153,7 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
     families = {text: (K, sd) for text, K, sd in joint_families(built)}
 
     def effect(k: int) -> WeldCompliance:
-        return of_one(kind, *tried[k], families, len(own))
+        return of_one(kind, *tried[k], families, SINGLE * len(own))
 
     if context.scan is None:
         points = np.array([tried[k][0].point for k in own])
@@ -165,7 +172,56 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
             if k not in out:
                 found = effect(k)
                 out[k] = Candidate(found, found.starts()[int(np.argmin(score[k]))], base)
+    about = len(context.bases) - 1
+    runs = [r for k in out if (r := best_run(kind, context.scan.fastener_row(k), about))]
+    if runs:
+        best = min(runs, key=lambda r: r.score)
+        found = of_one(kind, best.joint, best.share, families, len(own) * RUNS, best.count)
+        out[-1] = Candidate(found, found.starts()[best.start], context.bases[about])
     return list(out.values())
+
+
+@dataclass(frozen=True, eq=False)
+class FastenerRun:
+    """Adjacent fasteners as one joint, its shares (r,), the best of the starts and its score."""
+
+    score: float
+    count: int
+    joint: Connection
+    share: np.ndarray
+    start: int
+
+
+def best_run(kind: type[WeldCompliance], row: FastenerRow, about: int) -> FastenerRun | None:
+    """The run about a fastener that explains most: it grows to the side that explains more.
+
+    All lengths up to ``MOST_RUN`` are compared, for two neighbours share their load and the loss of
+    the second alone may explain little. None: the fastener has no neighbour.
+    """
+    first = last = row.at
+    grown: list[FastenerRun] = []
+    while last - first + 1 < MOST_RUN:
+        sides = [
+            (a, b) for a, b in ((first - 1, last), (first, last + 1)) if 0 <= a and b < len(row)
+        ]
+        if not sides:
+            break
+        runs = [_run(kind, row, about, a, b) for a, b in sides]
+        best = int(np.argmin([r.score for r in runs]))
+        grown.append(runs[best])
+        first, last = sides[best]
+    return min(grown, key=lambda r: r.score, default=None)
+
+
+def _run(
+    kind: type[WeldCompliance], row: FastenerRow, about: int, first: int, last: int
+) -> FastenerRun:
+    joint, share = row.run(first, last)
+    alone = kind((kind.strength(float(share.min())),))
+    left = np.array([alone.left(x[0])[0] for x in alone.starts()])
+    score = row.scores(about, first, last, left)
+    k = int(np.argmin(score))
+    return FastenerRun(float(score[k]), last - first + 1, joint, share, k)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:

@@ -8,13 +8,13 @@ from typing import Self
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.joints import Connection
+from ..effects.joints import Connection, neighbours, row_about
 from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
 from ..effects.surroundings import ElementGrids, Surroundings
 from ..errors import ModelError
 from ..side_by_side import side_by_side
-from .fastener_scan import Loosened, fastener_scores, loosened
+from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened, together
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
@@ -272,6 +272,19 @@ class Scan:
         context, base = self.context, self.context.baselines[about]
         reduced = context.problem.reduced
         return fastener_scores(base, reduced, self.data, context.loosened, left)
+
+    @cached_property
+    def next_to(self) -> tuple[tuple[int, ...], ...]:
+        """Positions of the fasteners next to each."""
+        return neighbours([one.joint for one in self.context.loosened])
+
+    def fastener_row(self, k: int) -> LoosenedRow:
+        """The fasteners of every run that the fastener k may be in."""
+        context, row = self.context, row_about(k, self.next_to)
+        joints = tuple(context.loosened[n].joint for n in row)
+        reduced = context.problem.reduced
+        whole = context.loosened[k] if len(row) == 1 else together(reduced, joints)
+        return LoosenedRow(context.baselines, reduced, self.data, joints, row.index(k), whole)
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 
 from ..dynamics.modal_sum import modal_sum
 from ..dynamics.reduction import attachments
-from ..effects.joints import Connection, fasteners
+from ..effects.joints import Connection, fasteners, joined
 from ..geometry.sampling import farthest_point_sample
 from .likelihood import Responses
 from .reduced_model import State
@@ -67,6 +67,48 @@ def loosened(reduced: ReducedProblem) -> tuple[Loosened, ...]:
             out.append(Loosened(joint, _rest(joint.rows @ own), own.T @ (M @ own)))
             start = stop
     return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class LoosenedRow:
+    """Adjacent fasteners, all of them loosened together, and runs among them.
+
+    See :class:`..effects.search_context.FastenerRow`.
+    """
+
+    base: Sequence[Baseline]
+    reduced: ReducedProblem
+    data: Responses
+    joints: tuple[Connection, ...]
+    at: int
+    whole: Loosened
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def run(self, first: int, last: int) -> tuple[Connection, np.ndarray]:
+        """The fasteners from one to another as one, and the share z/(w + z) of its rows (r,)."""
+        found = self._loosened(first, last)
+        return found.joint, found.share
+
+    def scores(self, about: int, first: int, last: int, left: np.ndarray) -> np.ndarray:
+        """Score of a run with some of its stiffness left (k,)."""
+        one = [self._loosened(first, last)]
+        return fastener_scores(self.base[about], self.reduced, self.data, one, left[None])[0]
+
+    def _loosened(self, first: int, last: int) -> Loosened:
+        ends = np.cumsum([0, *(j.rows.shape[0] for j in self.joints)])
+        some = np.s_[ends[first] : ends[last + 1]]
+        R, N = self.whole.R[some, some], self.whole.N[some, some]
+        return Loosened(joined(self.joints[first : last + 1]), R, N)
+
+
+def together(reduced: ReducedProblem, joints: Sequence[Connection]) -> Loosened:
+    """Several fasteners as one, with what the sheets give between them as well."""
+    one = joined(joints)
+    static = attachments(reduced.factor, one.rows)
+    M = reduced.structure.system.M
+    return Loosened(one, _rest(one.rows @ static), static.T @ (M @ static))
 
 
 def _rest(flexibility: np.ndarray) -> np.ndarray:
