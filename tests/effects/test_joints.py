@@ -15,7 +15,12 @@ from chladni.effects.ordinary import ordinary
 from chladni.effects.weld_compliance import MOST, NONE_LEFT, SOUND, WeldCompliance, of_one
 from chladni.effects.weld_missing import WeldMissing
 from chladni.fem.assemble import structure
-from chladni.updating.fastener_scan import fastener_scores, loosened, loosened_receptance
+from chladni.updating.fastener_scan import (
+    fastener_scores,
+    loosened_receptance,
+    loosened_rows,
+    singles,
+)
 from chladni.updating.likelihood import Responses
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
@@ -28,7 +33,7 @@ FLEXIBLE = slice(6, 12)
 
 @pytest.fixture(scope="module")
 def found(reduced):
-    return loosened(reduced)
+    return singles(loosened_rows(reduced))
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +161,7 @@ def test_the_scan_becomes_the_full_solve(deck, found, scanned):
     for reach in (2.5, 5.0):
         ground = reduced_problem(deck, TOP, data.outputs, reach=reach)
         lines = replace(data, s=s, use=data.use[: len(s)], values=data.values[: len(s)])
-        over[reach] = ground, lines.over(ground.model), loosened(ground)
+        over[reach] = ground, lines.over(ground.model), singles(loosened_rows(ground))
 
     def solved(system):
         K, M = system.K.toarray(), system.M.toarray()

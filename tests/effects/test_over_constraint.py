@@ -16,7 +16,7 @@ from chladni.fem.assemble import structure
 from chladni.fem.modelled import modelled
 from chladni.model.added_points import next_id, with_points
 from chladni.model.assembly import RigidBody
-from chladni.updating.fastener_scan import loosened
+from chladni.updating.fastener_scan import loosened_rows, singles
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem
 from chladni.workflows.diagnosis_pipeline import as_it_is
@@ -67,7 +67,7 @@ def reduced(plates):
 
 @pytest.fixture(scope="module")
 def effect(reduced):
-    every = loosened(reduced)
+    every = singles(loosened_rows(reduced))
     assert [each.joint.rigid for each in every] == [True] * 3
     return over_constraint(reduced.structure.assembly, every[1].joint, every[1].share, 3)
 

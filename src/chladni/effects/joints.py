@@ -161,18 +161,24 @@ def neighbours(joints: Sequence[Connection]) -> tuple[tuple[int, ...], ...]:
     return tuple(map(tuple, out))
 
 
-def row_about(k: int, next_to: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
-    """Positions of the fasteners of every run that a fastener may be in, in their order."""
-    row, seen = [k], {k}
-    for way, begun in enumerate(next_to[k]):
-        at: int | None = begun
-        for _ in range(MOST_RUN - 1):
-            if at is None or at in seen:
-                break
+def lines(joints: Sequence[Connection]) -> list[tuple[int, ...]]:
+    """Positions of all fasteners by the lines they stand in, each in its order.
+
+    A line that closes is cut, and begun once more, so that every run of it is there.
+    """
+    next_to, seen, out = neighbours(joints), set[int](), list[tuple[int, ...]]()
+    for k in sorted(range(len(joints)), key=lambda k: len(next_to[k])):  # the ends first
+        at: int | None = k if k not in seen else None
+        row: list[int] = []
+        while at is not None:
             seen.add(at)
-            row = [at, *row] if way else [*row, at]
+            row.append(at)
             at = next((n for n in next_to[at] if n not in seen), None)
-    return tuple(row)
+        if len(row) > 2 and row[0] in next_to[row[-1]]:
+            row += row[: MOST_RUN - 1]
+        if row:
+            out.append(tuple(row))
+    return out
 
 
 def joined(joints: Sequence[Connection]) -> Connection:

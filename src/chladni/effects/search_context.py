@@ -24,21 +24,26 @@ class Candidate:
     base: np.ndarray
 
 
-class FastenerRow(Protocol):
-    """Adjacent fasteners of one line, any run of which may be loosened as one."""
+class Loose(Protocol):
+    """A fastener, or several as one, as it is loosened."""
 
     @property
-    def at(self) -> int:
-        """Number of the one that was asked about."""
+    def joint(self) -> Connection:
+        """What it is in the deck."""
+
+    @property
+    def share(self) -> np.ndarray:
+        """Share z/(w + z) of the sheets in the stiffness of both (r,)."""
+
+
+class FastenerRow(Protocol):
+    """Adjacent fasteners of one line, any run of which may be loosened as one."""
 
     def __len__(self) -> int:
         """How many they are."""
 
-    def run(self, first: int, last: int) -> tuple[Connection, np.ndarray]:
-        """The fasteners from one to another as one, and the share z/(w + z) of its rows (r,)."""
-
-    def scores(self, about: int, first: int, last: int, left: np.ndarray) -> np.ndarray:
-        """Score of that run with some of its stiffness left (k,)."""
+    def run(self, first: int, last: int) -> Loose:
+        """The fasteners from one to another as one."""
 
 
 class ResponseScan(Protocol):
@@ -86,8 +91,14 @@ class ResponseScan(Protocol):
         ``left`` (n, k) is in units of what the fastener has; nothing is linearised.
         """
 
-    def fastener_row(self, k: int) -> FastenerRow:
-        """The context's fasteners of every run that the one numbered k may be in."""
+    @property
+    def fastener_rows(self) -> Sequence[FastenerRow]:
+        """The context's fasteners by the lines in which they stand."""
+
+    def run_scores(
+        self, about: int, row: int, first: int, last: int, left: np.ndarray
+    ) -> np.ndarray:
+        """Score of a run of a row with some of its stiffness left (k,)."""
 
 
 class SearchContext(Protocol):

@@ -22,7 +22,7 @@ from .estimate import Estimate
 from .family import Article, Family
 from .joints import MOST_RUN, Connection, fasteners, with_factor_on, with_solids
 from .model_families import joint_families
-from .search_context import Candidate, FastenerRow, SearchContext, best_places
+from .search_context import Candidate, ResponseScan, SearchContext, best_places
 
 NONE_LEFT = -3.0  # ln of what is left over s: below it the joint is missing
 MOST = 3.0  # ln of what is left over s, at most
@@ -33,6 +33,8 @@ BY_POLES = 12  # fasteners tried where each costs eigenproblems
 FOLLOWED = 2  # about the calibrated model, and one more about the deck's
 SINGLE = 2  # half of the odds are those of one fastener, wherever it is ...
 RUNS = 2 * (MOST_RUN - 1)  # ... the others those of a run, wherever it begins, however long it is
+REFINED = 3  # runs whose ends are moved
+RUNS_FOLLOWED = 2, 1  # about the deck's own model, where a gap is sharper, and the calibrated one
 FAMILY_OF = {"solids": "welds", "bushes": "bushes"}  # the nuisance that scales all of a kind
 NEEDS = "welds, screws or bushes between sheets or beams"
 
@@ -172,12 +174,13 @@ def proposed(kind: type[WeldCompliance], context: SearchContext) -> list[Candida
             if k not in out:
                 found = effect(k)
                 out[k] = Candidate(found, found.starts()[int(np.argmin(score[k]))], base)
-    about = len(context.bases) - 1
-    runs = [r for k in out if (r := best_run(kind, context.scan.fastener_row(k), about))]
-    if runs:
-        best = min(runs, key=lambda r: r.score)
-        found = of_one(kind, best.joint, best.share, families, len(own) * RUNS, best.count)
-        out[-1] = Candidate(found, found.starts()[best.start], context.bases[about])
+    followed: set[tuple[int, ...]] = set()
+    for about, (base, count) in enumerate(zip(context.bases, RUNS_FOLLOWED, strict=False)):
+        for run in best_runs(kind, context.scan, about, count):
+            if run.joint.ids not in followed:
+                followed.add(run.joint.ids)
+                found = of_one(kind, run.joint, run.share, families, len(own) * RUNS, run.count)
+                out[-len(followed)] = Candidate(found, found.starts()[run.start], base)
     return list(out.values())
 
 
@@ -192,36 +195,54 @@ class FastenerRun:
     start: int
 
 
-def best_run(kind: type[WeldCompliance], row: FastenerRow, about: int) -> FastenerRun | None:
-    """The run about a fastener that explains most: it grows to the side that explains more.
+def best_runs(
+    kind: type[WeldCompliance], scan: ResponseScan, about: int, count: int
+) -> list[FastenerRun]:
+    """The runs that explain most, wherever they begin and however long they are, best first.
 
-    All lengths up to ``MOST_RUN`` are compared, for two neighbours share their load and the loss of
-    the second alone may explain little. None: the fastener has no neighbour.
+    Runs of 2, 4 and 8 fasteners are tried at every half of their length, for neighbours share their
+    load and the loss of one may be felt nowhere. The best ``REFINED`` are moved, lengthened and
+    shortened by one fastener while that explains more.
     """
-    first = last = row.at
-    grown: list[FastenerRun] = []
-    while last - first + 1 < MOST_RUN:
-        sides = [
-            (a, b) for a, b in ((first - 1, last), (first, last + 1)) if 0 <= a and b < len(row)
-        ]
-        if not sides:
-            break
-        runs = [_run(kind, row, about, a, b) for a, b in sides]
-        best = int(np.argmin([r.score for r in runs]))
-        grown.append(runs[best])
-        first, last = sides[best]
-    return min(grown, key=lambda r: r.score, default=None)
+    found: dict[tuple[int, int, int], FastenerRun] = {}
+
+    def score(at: tuple[int, int, int]) -> float:
+        if at not in found:
+            found[at] = _run(kind, scan, about, *at)
+        return found[at].score
+
+    for n, row in enumerate(scan.fastener_rows):
+        if row.run(0, 0).joint.rigid:
+            continue
+        for length in (2, 4, MOST_RUN):
+            for first in range(0, len(row) - length + 1, length // 2):
+                score((n, first, first + length - 1))
+    for n, first, last in sorted(found, key=score)[:REFINED]:
+        best = (n, first, last)
+        while (better := min(_next_to(best, len(scan.fastener_rows[n])), key=score)) != best:
+            if score(better) >= score(best):
+                break
+            best = better
+    return sorted(found.values(), key=lambda run: run.score)[:count]
+
+
+def _next_to(at: tuple[int, int, int], length: int) -> list[tuple[int, int, int]]:
+    """Runs whose ends lie one fastener away, and the run itself."""
+    n, first, last = at
+    ends = [(first + a, last + b) for a in (0, -1, 1) for b in (0, -1, 1)]
+    inside = [(a, b) for a, b in ends if 0 <= a < b < length and b - a < MOST_RUN]
+    return [(n, a, b) for a, b in inside]
 
 
 def _run(
-    kind: type[WeldCompliance], row: FastenerRow, about: int, first: int, last: int
+    kind: type[WeldCompliance], scan: ResponseScan, about: int, n: int, first: int, last: int
 ) -> FastenerRun:
-    joint, share = row.run(first, last)
-    alone = kind((kind.strength(float(share.min())),))
+    loose = scan.fastener_rows[n].run(first, last)
+    alone = kind((kind.strength(float(loose.share.min())),))
     left = np.array([alone.left(x[0])[0] for x in alone.starts()])
-    score = row.scores(about, first, last, left)
+    score = scan.run_scores(about, n, first, last, left)
     k = int(np.argmin(score))
-    return FastenerRun(float(score[k]), last - first + 1, joint, share, k)
+    return FastenerRun(float(score[k]), last - first + 1, loose.joint, loose.share, k)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:

@@ -8,13 +8,13 @@ from typing import Self
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.joints import Connection, neighbours, row_about
+from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
 from ..effects.surroundings import ElementGrids, Surroundings
 from ..errors import ModelError
 from ..side_by_side import side_by_side
-from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened, together
+from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses
 from .pole_starts import global_starts
@@ -167,7 +167,12 @@ class UpdatingContext:
     @cached_property
     def loosened(self) -> tuple[Loosened, ...]:
         """Welds and fasteners with what the sheets give where they are loaded."""
-        return loosened(self.problem.reduced)
+        return singles(self.loosened_rows)
+
+    @cached_property
+    def loosened_rows(self) -> tuple[LoosenedRow, ...]:
+        """The same by the lines in which they stand."""
+        return loosened_rows(self.problem.reduced)
 
     def ready(self) -> Self:
         """The same, with what most families ask for made before they ask side by side."""
@@ -273,18 +278,17 @@ class Scan:
         reduced = context.problem.reduced
         return fastener_scores(base, reduced, self.data, context.loosened, left)
 
-    @cached_property
-    def next_to(self) -> tuple[tuple[int, ...], ...]:
-        """Positions of the fasteners next to each."""
-        return neighbours([one.joint for one in self.context.loosened])
+    @property
+    def fastener_rows(self) -> tuple[LoosenedRow, ...]:
+        """Adjacent fasteners, any run of which may be loosened as one."""
+        return self.context.loosened_rows
 
-    def fastener_row(self, k: int) -> LoosenedRow:
-        """The fasteners of every run that the fastener k may be in."""
-        context, row = self.context, row_about(k, self.next_to)
-        joints = tuple(context.loosened[n].joint for n in row)
-        reduced = context.problem.reduced
-        whole = context.loosened[k] if len(row) == 1 else together(reduced, joints)
-        return LoosenedRow(context.baselines, reduced, self.data, joints, row.index(k), whole)
+    def run_scores(
+        self, about: int, row: int, first: int, last: int, left: np.ndarray
+    ) -> np.ndarray:
+        """Score of a run of a row with some of its stiffness left (k,)."""
+        base, run = self.context.baselines[about], self.fastener_rows[row].run(first, last)
+        return fastener_scores(base, self.context.problem.reduced, self.data, [run], left[None])[0]
 
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 
 from ..dynamics.modal_sum import modal_sum
 from ..dynamics.reduction import attachments
-from ..effects.joints import Connection, fasteners, joined
+from ..effects.joints import MOST_RUN, Connection, fasteners, joined, lines
 from ..geometry.sampling import farthest_point_sample
 from .likelihood import Responses
 from .reduced_model import State
@@ -49,71 +49,87 @@ class Loosened:
         return np.asarray(np.linalg.eigvalsh(self.R))
 
 
-def loosened(reduced: ReducedProblem) -> tuple[Loosened, ...]:
-    """Every fastener of the structure with what the sheets give where it is loaded."""
-    joints = fasteners(reduced.structure)
-    if len(joints) > MOST:
-        spread = farthest_point_sample(np.array([j.point for j in joints]), MOST)
-        joints = [joints[k] for k in spread]
-    out: list[Loosened] = []
-    M = reduced.structure.system.M
-    for k in range(0, len(joints), AT_ONCE):
-        some = joints[k : k + AT_ONCE]
-        rows = sp.csr_array(sp.vstack([j.rows for j in some]))
-        static, start = attachments(reduced.factor, rows), 0
-        for joint in some:
-            stop = start + joint.rows.shape[0]
-            own = static[:, start:stop]
-            out.append(Loosened(joint, _rest(joint.rows @ own), own.T @ (M @ own)))
-            start = stop
-    return tuple(out)
-
-
 @dataclass(frozen=True, eq=False)
 class LoosenedRow:
-    """Adjacent fasteners, all of them loosened together, and runs among them.
+    """Adjacent fasteners of one line, loosened together.
 
-    See :class:`..effects.search_context.FastenerRow`.
+    Attributes
+    ----------
+    positions : of the fasteners among all that are tried
     """
 
-    base: Sequence[Baseline]
-    reduced: ReducedProblem
-    data: Responses
+    positions: tuple[int, ...]
     joints: tuple[Connection, ...]
-    at: int
     whole: Loosened
 
     def __len__(self) -> int:
         return len(self.joints)
 
-    def run(self, first: int, last: int) -> tuple[Connection, np.ndarray]:
-        """The fasteners from one to another as one, and the share z/(w + z) of its rows (r,)."""
-        found = self._loosened(first, last)
-        return found.joint, found.share
-
-    def scores(self, about: int, first: int, last: int, left: np.ndarray) -> np.ndarray:
-        """Score of a run with some of its stiffness left (k,)."""
-        one = [self._loosened(first, last)]
-        return fastener_scores(self.base[about], self.reduced, self.data, one, left[None])[0]
-
-    def _loosened(self, first: int, last: int) -> Loosened:
+    def run(self, first: int, last: int) -> Loosened:
+        """The fasteners from one to another as one."""
         ends = np.cumsum([0, *(j.rows.shape[0] for j in self.joints)])
         some = np.s_[ends[first] : ends[last + 1]]
-        R, N = self.whole.R[some, some], self.whole.N[some, some]
-        return Loosened(joined(self.joints[first : last + 1]), R, N)
+        joints = self.joints[first : last + 1]
+        joint = joints[0] if len(joints) == 1 else joined(joints)
+        return Loosened(joint, _rest(self.whole.R[some, some]), self.whole.N[some, some])
 
 
-def together(reduced: ReducedProblem, joints: Sequence[Connection]) -> Loosened:
-    """Several fasteners as one, with what the sheets give between them as well."""
-    one = joined(joints)
-    static = attachments(reduced.factor, one.rows)
-    M = reduced.structure.system.M
-    return Loosened(one, _rest(one.rows @ static), static.T @ (M @ static))
+def loosened_rows(reduced: ReducedProblem) -> tuple[LoosenedRow, ...]:
+    """Every fastener of the structure with what the sheets give where it is loaded, by lines.
+
+    Long lines are divided so that every run of ``MOST_RUN`` fasteners lies in one row.
+    """
+    joints = fasteners(reduced.structure)
+    if len(joints) > MOST:
+        spread = farthest_point_sample(np.array([j.point for j in joints]), MOST)
+        joints = [joints[k] for k in spread]
+    rows = [
+        line[begin : begin + AT_ONCE]
+        for line in lines(joints)
+        for begin in range(0, max(1, len(line) - MOST_RUN + 1), AT_ONCE - MOST_RUN + 1)
+    ]
+    out: list[LoosenedRow] = []
+    for some in batched(rows):
+        every = [tuple(joints[k] for k in at) for at in some]
+        for at, row, whole in zip(some, every, together(reduced, every), strict=True):
+            out.append(LoosenedRow(at, row, whole))
+    return tuple(out)
 
 
-def _rest(flexibility: np.ndarray) -> np.ndarray:
+def batched(rows: Sequence[tuple[int, ...]]) -> list[list[tuple[int, ...]]]:
+    """Rows in groups of about ``AT_ONCE`` fasteners, which are solved for together."""
+    out: list[list[tuple[int, ...]]] = []
+    for row in rows:
+        if not out or sum(map(len, out[-1])) + len(row) > AT_ONCE:
+            out.append([])
+        out[-1].append(row)
+    return out
+
+
+def singles(rows: Sequence[LoosenedRow]) -> tuple[Loosened, ...]:
+    """Every fastener alone, in the order of their positions."""
+    found = {k: (row, n) for row in rows for n, k in enumerate(row.positions)}
+    return tuple(row.run(n, n) for row, n in (found[k] for k in sorted(found)))
+
+
+def together(reduced: ReducedProblem, rows: Sequence[Sequence[Connection]]) -> list[Loosened]:
+    """The fasteners of each row as one, with what the sheets give between them as well."""
+    every, M = [joined(row) for row in rows], reduced.structure.system.M
+    static = attachments(reduced.factor, sp.csr_array(sp.vstack([one.rows for one in every])))
+    out, start = [], 0
+    for one in every:
+        stop = start + one.rows.shape[0]
+        own = static[:, start:stop]
+        flexibility = one.rows @ own
+        rest = _rest(np.eye(len(flexibility)) - flexibility)
+        out.append(Loosened(one, rest, own.T @ (M @ own)))
+        start = stop
+    return out
+
+
+def _rest(R: np.ndarray) -> np.ndarray:
     """1 - b P⁻¹ bᵀ, symmetric, between ``LEAST`` and one."""
-    w, V = np.linalg.eigh(np.eye(len(flexibility)) - (flexibility + flexibility.T) / 2)
+    w, V = np.linalg.eigh((R + R.T) / 2)
     return (V * np.clip(w, LEAST, 1.0)) @ V.T
 
 
