@@ -91,7 +91,7 @@ def _article(
 ) -> BenchArticle:  # fmt: skip
     """Its modes at true places; of rotations at the shaker nothing is known, so none is held."""
     a = hidden.article
-    true = _true(bench.outputs, kind, rng)
+    true = true_places(bench.outputs, kind, rng)
     out, drive = still_there(a, whole, true), still_there(a, whole, bench.drive)
     hung = nearest_points(a.points, bench.deck.points[bench.deck.rows(list(bench.hangers))])
     rows = np.concatenate([out.rows.ravel(), hung])
@@ -118,7 +118,7 @@ def _along(modes: ArticleModes, foot: Footing, way: np.ndarray) -> np.ndarray:
     return seen(modes, foot, np.tile(way, (len(foot.rows), 1)))
 
 
-def _true(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Spots:
+def true_places(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Spots:
     """Where sensors truly sit and which way they feel."""
     u, v = tangents(spots.directions)
     off, tilt = kind.place_sd * rng.normal(size=(2, len(spots))), rng.normal(size=(2, len(spots)))

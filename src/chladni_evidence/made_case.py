@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from chladni.bench.accelerometers import AccelerometerType, drawn_gains
 from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
 from chladni.effects.ordinary import value
@@ -24,7 +25,14 @@ from chladni.units import units
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import ZETA, Bench
-from .benched_recording import PLAIN, Benched, Recorder, benched_recording, can_be_benched
+from .benched_recording import (
+    PLAIN,
+    Benched,
+    Recorder,
+    benched_recording,
+    can_be_benched,
+    true_places,
+)
 from .footing import Spots, still_there
 from .held_kinds import HELD
 from .hidden import Hidden, Site
@@ -66,6 +74,7 @@ class _Rig:
     """Solves articles of one case for their noiseless responses at the sensors."""
 
     bench: Bench
+    outputs: Spots  # where sensors truly sit and which way they feel
     article: Assembly  # before anything is hidden in it
     zeta: np.ndarray
     cache: Path | None
@@ -76,7 +85,7 @@ class _Rig:
     ) -> tuple[np.ndarray, ArticleModes]:
         """Accelerance (n_f, n_out, 1) and the modes it was made of."""
         a = hidden.article
-        out = still_there(a, self.article, self.bench.outputs)
+        out = still_there(a, self.article, self.outputs)
         drive = still_there(a, self.article, self.bench.drive)
         tied = [c.rows for c in hidden.couplings]
         modes = article_modes(
@@ -88,7 +97,7 @@ class _Rig:
             self.cache,
             self.residual_bending,
         )
-        phi_o = seen(modes, out, self.bench.outputs.directions)
+        phi_o = seen(modes, out, self.outputs.directions)
         phi_i = seen(modes, drive, self.bench.drive.directions)
         zeta = self.zeta[np.minimum(np.arange(phi_o.shape[1]), len(self.zeta) - 1)]
         H = accelerance(modes, phi_o, phi_i, zeta, lines, hidden.couplings, hidden.law)
@@ -116,7 +125,11 @@ def made_case(
     plain = bench.meshes[mesh]()
     article, scales = scattered(plain, rng)  # one article a seed: whatever is hidden, it is in it
     zeta = ZETA * np.exp(DAMPING_SPREAD * rng.normal(size=2000))
-    rig = _Rig(bench, article, zeta, cache, bool(rng.integers(2)))
+    bending = bool(rng.integers(2))
+    kind_of_sensor = AccelerometerType()
+    outputs = true_places(bench.outputs, kind_of_sensor, rng)
+    gains = drawn_gains(kind_of_sensor, len(outputs), rng)
+    rig = _Rig(bench, outputs, article, zeta, cache, bending)
     site = _site(bench, article)
     band = bench.lines[(bench.lines >= bench.fit[0]) & (bench.lines <= bench.fit[1])]
     band = band[:: max(1, len(band) // COARSE)]
@@ -141,6 +154,7 @@ def made_case(
         )
         frf = tested.frf
     else:
+        H = H * gains[:, None]
         frf = recorded(H, bench.lines, CHAIN, noise, bench.outputs.labels, bench.drive.labels)
         frf = _spoiled(frf, hidden)
     weight = mass_properties(hidden.article)[0] - hidden.unweighed

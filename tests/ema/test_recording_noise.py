@@ -7,7 +7,7 @@ import pytest
 
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import equalised, identify
-from chladni.ema.recording_noise import equalised_noise, sample_noise
+from chladni.ema.recording_noise import equalised_error, equalised_noise, sample_noise
 
 F = np.arange(5, 120, 0.25)
 POLES = np.array([12.0, 31.0, 44.0, 80.0, 101.0])
@@ -23,19 +23,37 @@ def response(s, phi, damping=0.008):
 
 @pytest.fixture(scope="module")
 def drawn():
-    """|Δ log10 H|² of many recordings of the same structure, and what is foretold of each."""
+    """|Δ log10 H|² of many recordings of the same structure, and what is foretold of each.
+
+    Last, χ² of Δ ln H within the columns of its error, and their number.
+    """
     rng = np.random.default_rng(7)
     phi = rng.normal(size=(3, len(POLES)))
     H, true = response(2j * np.pi * F, phi), response(S, phi, 0.0)
     sd = 0.01 * np.abs(H) + 1e-3 * np.sqrt((np.abs(H) ** 2).mean(axis=0))
-    found, due = [], []
+    found, due, within = [], [], []
     for _ in range(DRAWS):
         noise = (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) * sd / np.sqrt(2)
         frf = FRF(H + noise, F, ("a", "b", "c"), ("a",), "accelerance", variance=sd**2)
         modal = identify(frf)
         found.append(np.abs(np.log10(equalised(modal, S) / true)) ** 2)
         due.append(equalised_noise(modal, frf, S, np.ones(len(F), bool)))
-    return np.array(found), np.array(due)
+        error = equalised_error(modal, frf, S, np.ones(len(F), bool))
+        within.append(chi2(np.log(true / equalised(modal, S)), error))
+    return np.array(found), np.array(due), np.array(within)
+
+
+def chi2(delta, error):
+    """δᵀ C⁺ δ of a complex deviation (n_s, n_out, n_in), and the rank of its covariance C."""
+    each = [error.own * (np.arange(3) == o)[:, None] for o in range(3)]
+    V = np.concatenate([*each, error.common]).reshape(-1, delta.size).T
+    V, r = (
+        np.concatenate([V.real, V.imag]),
+        np.concatenate([delta.real.ravel(), delta.imag.ravel()]),
+    )
+    U, sd, _ = np.linalg.svd(V, full_matrices=False)
+    kept = sd > 1e-3 * sd[0]  # beyond, second order is larger than the noise
+    return ((U[:, kept].T @ r / sd[kept]) ** 2).sum(), kept.sum()
 
 
 def test_is_the_mean_square_of_what_is_drawn(drawn):
@@ -43,9 +61,15 @@ def test_is_the_mean_square_of_what_is_drawn(drawn):
 
     All samples of a channel may be as one, so each channel's mean is held to three of these.
     """
-    found, due = drawn
+    found, due, _ = drawn
     ratio = (found / due).mean(axis=(0, 1, 3))
     np.testing.assert_allclose(ratio, 1.0, atol=3 * np.sqrt(2 / DRAWS))
+
+
+def test_columns_of_the_error_hold_its_whole_covariance(drawn):
+    """Dependence included: χ² over the number of columns has mean 1 and sd √(2 / columns)."""
+    found, columns = drawn[2].T
+    np.testing.assert_allclose(found.sum() / columns.sum(), 1, atol=4 * np.sqrt(2 / columns.sum()))
 
 
 def test_is_in_proportion_to_the_variance_of_the_recording():

@@ -7,6 +7,8 @@ a prediction with slopes g_c, g_p has the variance |R⁻ᵀ g_c|² + hᴴ S⁻¹
 (Seber and Wild 1989, Nonlinear Regression, section 5.1; the linear unknowns are eliminated).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
@@ -18,10 +20,28 @@ from .response_variance import frf_variance
 LN10 = np.log(10.0)
 
 
-def equalised_noise(
+@dataclass(frozen=True, eq=False)
+class EqualisedError:
+    """Error of an equalised response: d ln H per standard deviation of each identified number.
+
+    Its covariance is that of all columns together, each with a factor of unit variance.
+
+    Attributes
+    ----------
+    own : (k, n_s, n_out, n_in)      a channel's own linear unknowns, independent between channels
+    common : (m, n_s, n_out, n_in)   the poles, one factor for all channels
+    upper : (n_s, n_out, n_in)       the whole upper residual of each channel
+    """
+
+    own: np.ndarray
+    common: np.ndarray
+    upper: np.ndarray
+
+
+def equalised_error(
     identified: Identified, frf: FRF, s: np.ndarray, use: np.ndarray, averages: int = 1
-) -> np.ndarray:
-    """E|Δ log10 H|² of the equalised response (n_s, n_out, n_in), to first order.
+) -> EqualisedError:
+    """Columns of the error of the equalised response, to first order.
 
     Parameters
     ----------
@@ -40,19 +60,31 @@ def equalised_noise(
     line = 2j * np.pi * frf.frequency[keep] / omega_max
     F, second = linear(line, p, q), basis(line, p, q, 2)
     known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]
-    S = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)
-    H, out = np.zeros((len(s), w.shape[1]), complex), np.empty((len(s), w.shape[1]))
-    near = identified.moved
-    columns = _equalised_columns(s / omega_max, p, q, near)
-    for c, (root, tied, _) in enumerate(known):
+    information = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)
+    value, vector = np.linalg.eigh(information)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    columns = _equalised_columns(s / omega_max, p, q, identified.moved)
+    own, common, upper = [], [], []
+    for c, (triangle, tied, _) in enumerate(known):
         x = np.concatenate([_pairs(R[:, c]), identified.lower.ravel()[c : c + 1] / omega_max**2,
                             identified.upper.ravel()[c : c + 1]])  # fmt: skip
-        H[:, c] = columns @ x
-        own = solve_triangular(root, columns.T, trans="T")
-        shared = _equalised_slopes(s / omega_max, p, R[:, c], q, near).T - tied.T @ own
-        variance = (np.abs(own) ** 2).sum(axis=0)
-        out[:, c] = variance + np.einsum("ks,kl,ls->s", shared.conj(), S, shared).real
-    return (out / (np.abs(H) * LN10) ** 2).reshape(len(s), *identified.lower.shape)
+        H = columns @ x
+        own.append(solve_triangular(triangle, columns.T, trans="T") / H)
+        slopes = _equalised_slopes(s / omega_max, p, R[:, c], q, identified.moved).T
+        common.append(root.T @ (slopes / H - tied.T @ own[-1]))
+        upper.append(columns[:, -1] * x[-1] / H)
+    shape = len(s), *identified.lower.shape
+    local, shared = (np.stack(z, axis=-1).reshape(-1, *shape) for z in (own, common))
+    return EqualisedError(local, shared, np.stack(upper, axis=-1).reshape(shape))
+
+
+def equalised_noise(
+    identified: Identified, frf: FRF, s: np.ndarray, use: np.ndarray, averages: int = 1
+) -> np.ndarray:
+    """E|Δ log10 H|² of the equalised response (n_s, n_out, n_in): all columns of its error."""
+    error = equalised_error(identified, frf, s, use, averages)
+    variance = sum((np.abs(z) ** 2).sum(axis=0) for z in (error.own, error.common))
+    return np.asarray(variance / LN10**2)
 
 
 def sample_noise(identified: Identified, frf: FRF, s: np.ndarray) -> np.ndarray:

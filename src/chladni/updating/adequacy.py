@@ -6,6 +6,7 @@ p value is the rank of the recording's least likely statistic among those of the
 and Stern 1996, Statistica Sinica 6, 733-807, with the prior in place of the posterior, so that p is
 uniform where the model is true).
 
+A residual smaller than known errors leave is said and refuses nothing: errors were overstated.
 A model that fits only with an error of form far beyond what formulations differ by does not fit.
 Nor does one whose modes would have to be damped more unevenly than those of one structure are.
 """
@@ -24,13 +25,12 @@ from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
 from .reduced_model import State, evaluate
 from .result import FitStatistic
+from .whitening import Span, Whitening
 
 LEAST = 0.01  # p below which an explanation does not fit
 DRAWS = 300
+ALIKE = 0.88  # correlation of noise on neighbouring lines, where no span says it
 BELOW = 0.7  # of the first flexible mode: what rings lower swings on its suspension
-ALIKE = (
-    0.88  # correlation of noise on neighbouring lines, which the same modes were identified from
-)
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,38 @@ class _Linear:
     """A fit, linearised: residuals of data and of all that is known beside them."""
 
     error: Discrepancy
+    known: Whitening | None
     J: np.ndarray
     J0: np.ndarray
     use: np.ndarray
     inputs: int
 
+    @property
+    def span(self) -> Span | None:
+        """Space of the data, where it is known."""
+        return None if self.known is None else self.known.span
+
     def noise(self, rng: np.random.Generator) -> np.ndarray:
-        """Noise of unit variance (n,), alike on neighbouring lines: it came through the modes."""
+        """Noise of unit variance (n,): white in the space of the data.
+
+        Without one it is alike on neighbouring lines, for it came through the same modes.
+        """
+        if self.span is not None:
+            return self.span.projected(rng.normal(size=len(self.J)))
         fresh = np.sqrt(1 - ALIKE**2) * rng.normal(size=(*self.use.shape, self.inputs, 2))
         fresh[0] /= np.sqrt(1 - ALIKE**2)
         return np.moveaxis(lfilter([1.0], [1.0, -ALIKE], fresh, axis=0)[self.use], -1, 0).ravel()
+
+    def misfit(self, error: Discrepancy, z: np.ndarray) -> float:
+        """Mean square of the whitened residual z.
+
+        Within a span it is rᵀ C⁻¹ V Vᵀ C⁻¹ r = rᵀ C⁻¹ r - |C⁻¹ r|² of C = I + V Vᵀ: directions
+        in which known errors are smaller than the unexplained rest I do not count.
+        """
+        if self.known is None or self.span is None:
+            return float(z @ z) / len(z)
+        q = self.known.transposed(error.whitened(z))
+        return float(z @ z - q @ q) / len(z)
 
     def statistics(self, r: np.ndarray, r0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Size of the error, misfit, worst line, worst channel (4,).
@@ -76,17 +98,17 @@ class _Linear:
         square = (square**2).mean(axis=(2, 3))
         used = np.maximum(self.use.sum(axis=1), 1), np.maximum(self.use.sum(axis=0), 1)
         line, channel = square.sum(axis=1) / used[0], square.sum(axis=0) / used[1]
-        values = (error.delta, float(z @ z) / len(z), line.max(), channel.max())
+        values = (error.delta, self.misfit(error, z), line.max(), channel.max())
         return np.array(values), square
 
 
 STATISTICS = ("error of form", "misfit", "worst line", "worst channel")
+TWO_SIDED = (0, 1)  # within a span: a fit better than its errors allow has wrong errors
 NAMES = (
-    "an error of the model's form of {0:.1%} is needed; formulations of one structure differ by "
-    "0.3 to 4 %",
-    "what is left is {0:.1f} times what noise leaves",
-    "one line leaves {0:.1f} times what noise leaves",
-    "one channel leaves {0:.1f} times what noise leaves",
+    "the model's form must be off by {0:.1%}; formulations of one structure differ by 0.3 to 4 %",
+    "the residual is {2:.1f} times what the known errors leave",
+    "one line leaves {2:.1f} times what the known errors leave",
+    "one channel leaves {2:.1f} times what the known errors leave",
 )
 
 
@@ -113,20 +135,21 @@ def adequacy(
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
     r0, J0 = beside(fit.effects, mass_measurement, fit.x, state)
-    model = _Linear(data.error, J, J0, data.use, data.values.shape[2])
+    model = _Linear(data.error, data.known, J, J0, data.use, data.values.shape[2])
     seen, square = model.statistics(r, r0)
     rng = np.random.default_rng(20250103)
     sd = np.array([p.sd for p in unknowns(fit.effects)])
     own = [_drawn(model, sd, len(r0), rng) for _ in range(draws)]
-    p, least = ranked(seen, np.array(own))
+    p, least, better = ranked(seen, np.array(own), TWO_SIDED if model.span else ())
     where, worst = _where(data, square, labels)
     ranges = np.quantile(own, (0.5, 0.005, 0.995), axis=0).T
     rows = tuple(
         FitStatistic(name, float(value), *map(float, row))
         for name, value, row in zip(STATISTICS, seen, ranges, strict=True)
     )
-    what = NAMES[least].format(seen[least])
-    test = FitTest(p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
+    usual = rows[least].median
+    what = NAMES[least].format(seen[least], usual, seen[least] / usual)
+    test = FitTest(better or p >= LEAST, p, what, where, rows, _modes_near(worst, fit.state))
     if damping is not None:
         test = _evenly_damped(test, damping.above(_first(data, fit.state)))
     return test if coupling is None else _coupled_by_damping(test, coupling)
@@ -209,16 +232,23 @@ def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator)
     return model.statistics(r, r0)[0]
 
 
-def ranked(seen: np.ndarray, drawn: np.ndarray) -> tuple[float, int]:
+def ranked(
+    seen: np.ndarray, drawn: np.ndarray, two_sided: tuple[int, ...] = ()
+) -> tuple[float, int, bool]:
     """P of the least likely statistic of ``seen`` (k,) among ``drawn`` (n, k), and which it is.
 
-    Each statistic is ranked (large = unlikely); the smallest rank is ranked again among those that
-    the draws have, so that the p value is uniform however the statistics depend on each other.
+    Last, whether it is smaller than the draws have it. Each statistic is ranked (large = unlikely;
+    of those that are ``two_sided`` small as well); the smallest rank is ranked again among those
+    that the draws have, so that p is uniform however the statistics depend on each other.
     """
     every = np.vstack([seen, drawn])
     share = (every[None] >= every[:, None]).mean(axis=1)
-    least = share.min(axis=1)
-    return float(np.mean(least <= least[0])), int(np.argmin(share[0]))
+    below = (every[None] <= every[:, None]).mean(axis=1)[:, two_sided]
+    small = below < share[:, two_sided]
+    share[:, two_sided] = 2 * np.minimum(share[:, two_sided], below)
+    least = int(np.argmin(share[0]))
+    better = least in two_sided and bool(small[0, two_sided.index(least)])
+    return float(np.mean(share.min(axis=1) <= share[0, least])), least, better
 
 
 WORST = 3  # lines whose nearest modes are told

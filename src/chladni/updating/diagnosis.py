@@ -25,7 +25,7 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
-from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted
+from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted
 from .leaning import leaning
 from .likelihood import Poles, Responses
 from .lossy_place import heard_of_damping
@@ -33,6 +33,8 @@ from .reduced_model import evaluate
 from .rows_of_fits import row_of, row_of_null
 from .search_round import on_common_basis, search_round, taken
 from .several import PAIRED, Several, several
+
+PASSES = 4  # fits of the null, until the size of the error of form stays
 
 Progress = Callable[[str, float], None]
 
@@ -140,7 +142,7 @@ def diagnose(
         return _calibrated(problem, nominal, null)
     plain = _plain(problem, null)
     progress("scan of the catalogue", 0.2)
-    tried = candidates(problem, null)
+    tried = candidates(problem.begun_wide(), null)
     give_back_freed_memory()
     hypotheses = search_round(problem, null, tried, within(progress, 0.3, 0.8))
     null = _restarted(problem, null, hypotheses)
@@ -248,12 +250,16 @@ def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, Hypothes
     model, delta = problem.reduced.model, MEDIAN
     state = evaluate(model, problem.base, problem.mean(), False)
     starts = _null_starts(problem)
-    for _ in range(2):
+    identified = getattr(problem.data, "identified", None)
+    for k in range(2 if identified is None else PASSES):
         problem = problem.allowing_errors(state, delta)
         null = _base_fit(problem, problem.base, starts)
         if not isinstance(null.data, Responses) or null.data.error is None:
             break
-        state, delta, starts = null.fit.state, null.data.error.delta, [null.fit.x]
+        before, delta = delta, null.data.error.delta
+        if k and abs(np.log(delta / before)) < CLOSE:
+            break
+        state, starts = null.fit.state, [null.fit.x]
     return problem, null
 
 

@@ -166,7 +166,7 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
     return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
 
 
-def curvature(data: Lines, state: State) -> np.ndarray:
+def curvature(data: Lines, state: State, delta: float = USUAL) -> np.ndarray:
     """Standard deviation of log10 H beyond what is linear in G (n_f, n_out, n_in).
 
     For H = H_0 (1 + z), z of variance σ², ln(1 + z) = z - z²/2: near a zero of H, where σ is no
@@ -175,7 +175,7 @@ def curvature(data: Lines, state: State) -> np.ndarray:
     """
     every = data.only(np.ones(data.use.shape, bool))
     var = (columns(every, state, form(state, float(data.s.imag.max()))) ** 2).sum(axis=1)
-    sd = every.std() * np.log(10) * USUAL
+    sd = every.std() * np.log(10) * min(delta, USUAL)
     sigma2 = sd**2 * var.reshape(2, *data.values.shape).sum(axis=0) + data.wrong(state)
     return BENT * sigma2 / (2 * np.log(10)) * (1 + (sigma2 / WRAPS**2) ** 2)
 

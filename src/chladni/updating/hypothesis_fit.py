@@ -141,6 +141,11 @@ class UpdatingProblem:
             return self
         return replace(self, data=self.data.exactly())
 
+    def begun_wide(self) -> "UpdatingProblem":
+        """The same problem with the likelihood in which searches begin."""
+        wide = getattr(self.data, "wide", None)
+        return self if wide is None else replace(self, data=wide)
+
     def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
         """The same problem with effects in its base, and in its model what they move."""
         problem = self
@@ -202,8 +207,13 @@ def _fit_responses(
     model: Reduced, effects: Sequence[Effect], data: Responses,
     mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int,
 ) -> Fit:  # fmt: skip
-    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
+    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out.
+
+    Narrow basins are entered from the wide likelihood of independent samples.
+    """
     assert data.error is not None
+    if data.wide is not None:
+        x = _fit_responses(model, effects, data.wide, mass_measurement, x, max_steps).x
     for _ in range(ROUNDS):
         found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
         r0, J0 = beside(effects, mass_measurement, found.x, found.state)

@@ -15,12 +15,17 @@ import numpy as np
 from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
-from .discrepancy import MEDIAN, Discrepancy, curvature, discrepancy
+from ..ema.recording_noise import EqualisedError
+from .discrepancy import MEDIAN, USUAL, Discrepancy, curvature, discrepancy
+from .matrix_stack import along
 from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
-from .sensor_errors import SensorErrors, Whitening, variance, whitening
+from .sensor_errors import SensorErrors, columns, variance
+from .whitening import Span, Whitening, by_input, spanned, whitening
 
 LN10 = np.log(10.0)
+RESOLVED = 3e-4  # sd of log10 H below which no model of a structure is known to be right
+LOCAL = 0.1  # of the upper residual of a channel: the compliance round a point knows the mesh
 
 
 class Data(Protocol):
@@ -48,6 +53,9 @@ class Responses:
     direct : (n_out, n_in)                 what a moving base carries along, 0 for forces
     use : (n_f, n_out) bool                lines and channels the fit may see
     sigma_model : float                    sd of log10 H that neither noise nor δ explains
+    noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
+    spread : (n_f, n_out, n_in)            sd of log10 H between repeats or articles
+    identified : EqualisedError            of H_X, whose columns span the data; replaces ``noise``
     """
 
     values: np.ndarray
@@ -59,13 +67,16 @@ class Responses:
     sigma_model: float = 0.003
     a: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # outputs in the basis
     b: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    noise: np.ndarray | None = None  # sd of log10 H from the noise of the recording
+    noise: np.ndarray | None = None
+    spread: np.ndarray | None = None
+    identified: EqualisedError | None = None
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
     direct: np.ndarray | float = 0.0
     sensors: SensorErrors | None = None  # what sensors and gauges show wrongly by themselves
     known: Whitening | None = None  # of what those errors do to the lines and channels in use
+    wide: "Responses | None" = None  # the same with independent noise: fits begin there
 
     @property
     def power(self) -> int:
@@ -75,8 +86,9 @@ class Responses:
     def over(self, model: Reduced) -> Self:
         """Rows of sensors and shakers in the basis of this model."""
         sensors = None if self.sensors is None else self.sensors.over(model)
+        wide = None if self.wide is None else self.wide.over(model)
         a, b = model.rows(self.outputs), model.rows(self.inputs)  # type: ignore[arg-type]
-        return replace(self, a=a, b=b, sensors=sensors)
+        return replace(self, a=a, b=b, sensors=sensors, wide=wide)
 
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
@@ -119,12 +131,14 @@ class Responses:
         return wrapped(delta)
 
     def std(self) -> np.ndarray:
-        """Standard deviation of δ: sigma_model, inflated where the response itself is small."""
-        rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
-        out = self.sigma_model**2 + (0.6 * self.sigma_model * rms / np.abs(self.values)) ** 2
-        for more in (self.noise, self.bent):
-            out = out + (0.0 if more is None else more**2)
-        return np.sqrt(out)
+        """Standard deviation of δ of each sample, dependence apart."""
+        if self.about is not None and self.identified is not None:
+            out, more = np.full(self.values.shape, RESOLVED**2), [self.spread, self.bent]
+        else:
+            rms = np.sqrt((np.abs(self.values) ** 2).mean(axis=0, keepdims=True))
+            out = self.sigma_model**2 * (1 + (0.6 * rms / np.abs(self.values)) ** 2)
+            more = [self.noise, self.bent]
+        return np.sqrt(sum((z**2 for z in more if z is not None), out))
 
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
         """The same responses of a model whose form is off by about δ, as seen from a state.
@@ -132,15 +146,40 @@ class Responses:
         What sensors show wrongly by themselves is allowed for as well.
         """
         plain = self.exactly()
-        data = replace(plain, bent=curvature(plain, state), about=state)
+        if plain.identified is not None:
+            wide = replace(plain, identified=None).allowing_errors(state, delta)
+            plain = replace(plain, wide=wide)
+        size = USUAL if plain.identified is None else delta
+        data = replace(plain, bent=curvature(plain, state, size), about=state)
         return data._spread(state, delta)
 
     def _spread(self, about: State, delta: float) -> Self:
         """Covariance of the lines and channels in use."""
         data = replace(self, known=None, error=None)
-        if data.sensors is not None:
-            data = replace(data, known=whitening(data.sensors, data, about))
+        own, common = data._errors(about)
+        if len(own) + len(common):
+            data = replace(data, known=whitening(data, own, common, data._span()))
         return replace(data, error=discrepancy(data, about).with_delta(delta))
+
+    def _errors(self, about: State) -> tuple[np.ndarray, np.ndarray]:
+        """d log10 H over its spread per standard deviation: of each output, common to all."""
+        own, common, scale = [], [], LN10 * self.std()
+        if self.sensors is not None:
+            outputs, inputs = columns(self.sensors, self, about, scale)
+            own, common = [outputs], [inputs]
+        if (known := self.identified) is not None:
+            every = np.concatenate([known.own, LOCAL * known.upper[None]])
+            own.append(by_input(every) / scale)
+            common.append(known.common / scale)
+        no = np.zeros((0, *self.values.shape))
+        return np.concatenate([no, *own]), np.concatenate([no, *common])
+
+    def _span(self) -> Span | None:
+        """Span of all that the identification can say of the lines and channels in use."""
+        known, sd = self.identified, self.std()
+        if known is None:
+            return None
+        return spanned(self, by_input(known.own) / sd, known.common / sd)
 
     def wrong(self, state: State) -> np.ndarray | float:
         """E|d ln H|² of what sensors show wrongly by themselves (n_f, n_out, n_in)."""
@@ -148,7 +187,7 @@ class Responses:
 
     def exactly(self) -> Self:
         """The same responses of a model and a test that are right but for its parameters."""
-        return replace(self, bent=None, error=None, about=None, known=None)
+        return replace(self, bent=None, error=None, about=None, known=None, wide=None)
 
     def using(self, use: np.ndarray) -> Self:
         """Other lines and channels, with the same errors of the model's form."""
@@ -235,11 +274,6 @@ def _each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
     for p in np.flatnonzero(A.any(axis=(1, 2))):
         out[p] = (A[p] @ both).view(complex)
     return out
-
-
-def along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
-    return np.einsum("rk,prk->pk", phi, A @ phi)
 
 
 SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes

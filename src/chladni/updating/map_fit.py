@@ -13,7 +13,8 @@ import numpy as np
 
 from ..effects.effect import Effect, Parameter
 from ..errors import ModelError
-from .likelihood import Data, along
+from .likelihood import Data
+from .matrix_stack import along
 from .reduced_model import Reduced, State, evaluate, slices
 
 

@@ -112,3 +112,8 @@ class Bordered:
             target[:r, r:] += side
             target[r:, :r] += side.T
             target[r:, r:] += corner
+
+
+def along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
+    return np.einsum("rk,prk->pk", phi, A @ phi)

@@ -67,6 +67,7 @@ class Question:
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
     control: Control = "force"  # what was held at it
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
+    identified_noise: bool = False  # whiten with the covariance of the identification
 
     def tested(self, assembly: Assembly) -> Assembly:
         """An article with the sensors of known mass on it, as it was measured."""

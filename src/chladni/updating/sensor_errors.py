@@ -83,60 +83,18 @@ def sensor_errors(
     return SensorErrors(side(outputs, inputs, built, known), side(inputs, inputs, built, known))
 
 
-@dataclass(frozen=True, eq=False)
-class Whitening:
-    """C^-½ of C = I + V Vᵀ: what belongs to one output first, what the inputs do after it.
-
-    Attributes
-    ----------
-    own : (n, k) sparse, orthonormal    columns that live on one output each
-    own_less : (k,)                     1 - 1/√(1 + s)
-    common : (n, m) orthonormal
-    common_less : (m,)
-    """
-
-    own: sp.csc_array
-    own_less: np.ndarray
-    common: np.ndarray
-    common_less: np.ndarray
-
-    def whitened(self, r: np.ndarray) -> np.ndarray:
-        """Residuals or columns of slopes (n, ...)."""
-        return _less(self.common, self.common_less, _less(self.own, self.own_less, r))
-
-
-def _less(U: np.ndarray | sp.csc_array, less: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """R less what lies along each column, by its share."""
-    along = U.T @ r
-    return r - U @ (less[:, None] * along if along.ndim > 1 else less * along)
-
-
-def whitening(errors: SensorErrors, data: Lines, state: State) -> Whitening:
-    """As the errors spread over the residuals of a state, which are not whitened yet."""
-    H, scale = data.model(state), data.std() * LN10
-    n_out = H.shape[1]
-    channel = np.tile(np.broadcast_to(np.arange(n_out)[:, None], H.shape)[data.use].ravel(), 2)
-    V = data.stacked(_of_outputs(errors.outputs, data, state, H, scale))
-    columns, less = [], []
-    for k in np.unique(channel):
-        at = np.flatnonzero(channel == k)
-        U, share = _orthonormal(V[at])
-        columns.append(sp.coo_array((U.ravel(), _grid(at, U.shape[1])), shape=(len(V), U.shape[1])))
-        less.append(share)
-    own = sp.csc_array(sp.hstack(columns)) if columns else sp.csc_array((len(V), 0))
-    own_less = np.concatenate([*less, np.zeros(0)])
-    common = data.stacked(_of_inputs(errors.inputs, data, state, H, scale))
-    return Whitening(own, own_less, *_orthonormal(_less(own, own_less, common)))
+def columns(
+    errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """d ln H / scale per standard deviation: of each output (5, *H), of the inputs (k, *H)."""
+    H = data.model(state)
+    outputs = _of_outputs(errors.outputs, data, state, H, scale)
+    return outputs, _of_inputs(errors.inputs, data, state, H, scale)
 
 
 def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
     """|d ln H|² that is to be expected of them (n_f, n_out, n_in)."""
-    H = data.model(state)
-    one = np.ones(H.shape)
-    both = (
-        _of_outputs(errors.outputs, data, state, H, one),
-        _of_inputs(errors.inputs, data, state, H, one),
-    )
+    both = columns(errors, data, state, np.ones(data.values.shape))
     return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
 
 
@@ -166,15 +124,3 @@ def _of_inputs(
             z = data.s[:, None, None] ** data.power * G / (H * scale)
             out.append(z * one)
     return np.stack(out)
-
-
-def _grid(rows: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of a dense block (n, k) on some rows."""
-    return np.repeat(rows, columns), np.tile(np.arange(columns), len(rows))
-
-
-def _orthonormal(V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """U (n, k) of V Vᵀ = U diag(s) Uᵀ, and 1 - 1/√(1 + s)."""
-    s, Q = np.linalg.eigh(V.T @ V)
-    kept = s > 1e-9 * max(float(s.max(initial=0.0)), 1e-9)
-    return V @ (Q[:, kept] / np.sqrt(s[kept])), 1 - 1 / np.sqrt(1 + s[kept])
