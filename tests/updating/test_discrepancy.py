@@ -104,13 +104,14 @@ def test_evidence_is_the_sum_over_sizes_of_the_dense_one(reduced, softer, state)
     error = discrepancy(data, state)
     (r, J), (r0, J0) = data.scaled(state, True), beside(effects, None, np.zeros(2), state)
     U, s, S = error.U, error.s, []
-    for delta in dis.GRID:
+    prior = dis.FORMULATIONS
+    for delta in prior.grid:
         C = np.eye(len(r)) + (U * delta**2 * s) @ U.T
         A = J.T @ np.linalg.solve(C, J) + J0.T @ J0
         g = J.T @ np.linalg.solve(C, r) + J0.T @ r0
         cost = r @ np.linalg.solve(C, r) + r0 @ r0 - g @ np.linalg.solve(A, g)
-        S.append(cost + np.linalg.slogdet(C)[1] + np.linalg.slogdet(A)[1] + dis.prior(delta))
-    total = -2 * np.log(np.exp(-np.array(S) / 2).sum() * np.log(dis.GRID[1] / dis.GRID[0]))
+        S.append(cost + np.linalg.slogdet(C)[1] + np.linalg.slogdet(A)[1] + prior.neg2_log(delta))
+    total = -2 * np.log(np.exp(-np.array(S) / 2).sum() * np.log(prior.grid[1] / prior.grid[0]))
     assert learned(error, r, J, r0, J0).neg2_log_evidence == pytest.approx(total, abs=1e-6)
 
 

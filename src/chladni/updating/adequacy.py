@@ -19,7 +19,7 @@ from scipy.stats import norm
 
 from .complex_modes import ModeCoupling
 from .damping_scatter import FEWEST, ModalDamping
-from .discrepancy import LOG_SD, MEDIAN, RIGID, Discrepancy, learned
+from .discrepancy import RIGID, Discrepancy, learned
 from .hypothesis_fit import HypothesisFit
 from .likelihood import SCALE, SCALE_SD, Poles, Responses
 from .map_fit import MassMeasurement, beside, unknowns
@@ -223,8 +223,8 @@ def at_least(count: int, chance: np.ndarray) -> float:
 def _drawn(model: _Linear, sd: np.ndarray, known: int, rng: np.random.Generator) -> np.ndarray:
     """Statistics of a recording drawn from the model: x at its prior mean, the truth beside it."""
     dx = sd * rng.normal(size=len(sd))
-    delta = MEDIAN * np.exp(LOG_SD * rng.normal())
     error = model.error
+    delta = error.prior.drawn(rng)
     r = delta * error.U @ (np.sqrt(error.s) * rng.normal(size=len(error.s)))
     r = r + model.noise(rng) - model.J @ dx
     r0 = np.zeros(known)

@@ -25,7 +25,7 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
-from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted
+from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, begun, fitted
 from .leaning import leaning
 from .likelihood import Poles, Responses
 from .lossy_place import heard_of_damping
@@ -215,7 +215,8 @@ class FitChances:
 
 def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
     """What a hypothesis predicts itself, held against the data."""
-    winner = _about_itself(problem, hypothesis)
+    alone = hypothesis.effect not in hypothesis.fit.effects  # errors spread from the null as it is
+    winner = hypothesis if alone else problem.about_itself(hypothesis, ROUGH)
     lost, damping = winner.fit.state.dissipated, problem.damping
     damping = None if damping is None else damping.beyond(winner.fit.state)
     fits = adequacy(
@@ -226,23 +227,6 @@ def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
         return FitChances(None, np.nan, np.nan)
     both = heard_of_damping(fits, winner, damping)
     return FitChances(both, fits.p, both.p if both.p != fits.p else np.nan)
-
-
-def _about_itself(problem: UpdatingProblem, winner: HypothesisFit) -> HypothesisFit:
-    """The winner with errors of the model's form as they spread from its own state.
-
-    While hypotheses are compared they spread from the null's; a strong effect makes it another
-    structure (a support turns rigid modes into flexible ones, which err as those do).
-    """
-    data = winner.data
-    if winner.effect not in winner.fit.effects:  # the null: errors spread from it as it is
-        return winner
-    if not isinstance(data, Responses) or data.error is None:
-        return winner
-    data = data.allowing_errors(winner.fit.state, data.error.delta)
-    mass = problem.mass_measurement
-    fit = fitted(winner.model, winner.fit.effects, data, mass, winner.fit.x, ROUGH)
-    return replace(winner, fit=fit)
 
 
 def without_effects(problem: UpdatingProblem) -> tuple[UpdatingProblem, HypothesisFit]:
@@ -303,7 +287,8 @@ def _base_fit(
     model, fits = problem.reduced.model, []
     for k, x in enumerate(starts):
         try:
-            fits.append(fitted(model, effects, problem.data, problem.mass_measurement, x))
+            data, mass = problem.data, problem.mass_measurement
+            fits.append(fitted(model, effects, data, mass, begun(model, effects, data, mass, x)))
         except ModelError:
             if not fits and k == len(starts) - 1:
                 raise

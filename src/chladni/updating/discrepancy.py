@@ -19,15 +19,43 @@ import scipy.linalg as sl
 
 from ..dynamics.modal_sum import modal_sum
 from .reduced_model import Reduced, State
+from .whitening import Span
 
-MEDIAN, LOG_SD = 0.01, 0.7  # prior of δ: two formulations of one sheet differ by 0.3 to 4 %
-GRID = np.geomspace(0.0008, 0.16, 16)  # values of δ over which an evidence is integrated
+MEDIAN = 0.01  # of δ before it is learned
 REACH = 1.5  # modes up to this many times the highest line take part
 RIGID = 0.02  # of the highest line: below it a mode counts as rigid and is known
 MOST = 2000  # pairs of modes, or samples, that are decomposed
 CUT = 0.02  # variances below this share of the noise, at the largest δ, are left out
 USUAL, BENT = 0.015, 3.0  # δ at which, and how often, terms of second order are counted
 WRAPS = 0.4  # relative deviation of H from which its phase may wrap
+
+
+@dataclass(frozen=True)
+class FormPrior:
+    """Log-normal prior of δ, and the values over which an evidence is integrated."""
+
+    median: float
+    log_sd: float
+    least: float
+    count: int
+
+    @property
+    def grid(self) -> np.ndarray:
+        """Values of δ, evenly in their logarithm."""
+        return np.geomspace(self.least, 0.16, self.count)
+
+    def neg2_log(self, delta: np.ndarray | float) -> np.ndarray:
+        """-2 ln of the density of ln δ."""
+        z = (np.log(delta) - np.log(self.median)) / self.log_sd
+        return z**2 + np.log(2 * np.pi * self.log_sd**2)
+
+    def drawn(self, rng: np.random.Generator) -> float:
+        """One δ."""
+        return float(self.median * np.exp(self.log_sd * rng.normal()))
+
+
+FORMULATIONS = FormPrior(0.01, 0.7, 0.0008, 16)  # two of one sheet differ by 0.3 to 4 %
+LEARNED = FormPrior(0.0016, 1.0, 0.0002, 20)  # of 42 tuning articles without an effect: 0.04-0.6 %
 
 
 class Lines(Protocol):
@@ -44,6 +72,10 @@ class Lines(Protocol):
     @property
     def use(self) -> np.ndarray:
         """Lines and channels in use (n_f, n_out)."""
+
+    @property
+    def span(self) -> Span | None:
+        """Space of the residuals, where it is smaller than the samples."""
 
     @property
     def power(self) -> int:
@@ -122,11 +154,13 @@ class Discrepancy:
     U : (n, k)       orthonormal
     s : (k,)         variance along each column for δ = 1
     delta : float    standard deviation of the diagonal of G
+    prior : FormPrior   of δ
     """
 
     U: np.ndarray
     s: np.ndarray
     delta: float = MEDIAN
+    prior: FormPrior = FORMULATIONS
 
     def with_delta(self, delta: float) -> Self:
         """The same shapes of error, larger or smaller."""
@@ -142,18 +176,20 @@ class Discrepancy:
         return float(np.log1p(self.delta**2 * self.s).sum())
 
 
-def prior(delta: np.ndarray | float) -> np.ndarray:
-    """-2 ln of the prior density of ln δ."""
-    z = (np.log(delta) - np.log(MEDIAN)) / LOG_SD
-    return z**2 + np.log(2 * np.pi * LOG_SD**2)
-
-
 def discrepancy(data: Lines, state: State) -> Discrepancy:
     """How errors of modal stiffness and mass at a state spread over the whitened residual.
 
-    The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs.
+    The smaller of W Wᵀ and Wᵀ W is decomposed; the latter over the ``MOST`` strongest pairs. Where
+    the residuals have a span of their own, W is met in its coordinates.
     """
     W = columns(data, state, form(state, float(data.s.imag.max())))
+    if data.span is not None:
+        error = _decomposed(data.span.coordinates(W))
+        return replace(error, U=data.span.columns(error.U), prior=LEARNED)
+    return _decomposed(W)
+
+
+def _decomposed(W: np.ndarray) -> Discrepancy:
     if not W.size:  # no flexible mode of the model is near what was measured
         return Discrepancy(np.zeros((len(W), 0)), np.zeros(0))
     if len(W) <= MOST:
@@ -162,7 +198,7 @@ def discrepancy(data: Lines, state: State) -> Discrepancy:
         W = W[:, np.argsort(-(W**2).sum(axis=0))[:MOST]]
         s, V = sl.eigh(W.T @ W, overwrite_a=True, check_finite=False, driver="evd")
         U = W @ (V / np.sqrt(np.maximum(s, 1e-300)))
-    kept = s > CUT / GRID[-1] ** 2
+    kept = s > CUT / FORMULATIONS.grid[-1] ** 2
     return Discrepancy(np.ascontiguousarray(U[:, kept]), s[kept])
 
 
@@ -230,24 +266,25 @@ def learned(
     """
     u, V = error.U.T @ r, error.U.T @ J
     A0, g0, c0 = J.T @ J + J0.T @ J0, J.T @ r + J0.T @ r0, float(r @ r + r0 @ r0)
-    S = np.empty(len(GRID))
-    for k, delta in enumerate(GRID):
+    grid, prior = error.prior.grid, error.prior.neg2_log
+    S = np.empty(len(grid))
+    for k, delta in enumerate(grid):
         v = delta**2 * error.s
         w = v / (1 + v)
         A, g = A0 - (V.T * w) @ V, g0 - V.T @ (w * u)
         L = np.linalg.cholesky(A)
         cost = c0 - w @ u**2 - float((sl.solve_triangular(L, g, lower=True) ** 2).sum())
         S[k] = cost + 2 * np.log(np.diag(L)).sum() + np.log1p(v).sum() + prior(delta)
-    width = np.log(GRID[1] / GRID[0])
+    width = np.log(grid[1] / grid[0])
     best = int(np.argmin(S))
     total = S[best] - 2 * np.log(np.exp(-(S - S[best]) / 2).sum() * width)
-    return Learned(float(total), _peak(S, best))
+    return Learned(float(total), _peak(grid, S, best))
 
 
-def _peak(S: np.ndarray, best: int) -> float:
+def _peak(grid: np.ndarray, S: np.ndarray, best: int) -> float:
     """Where the parabola through the best three values has its foot."""
     if not 0 < best < len(S) - 1:
-        return float(GRID[best])
+        return float(grid[best])
     a, b, c = S[best - 1 : best + 2]
     shift = 0.5 * (a - c) / max(a - 2 * b + c, 1e-12)
-    return float(GRID[best] * (GRID[1] / GRID[0]) ** np.clip(shift, -1, 1))
+    return float(grid[best] * (grid[1] / grid[0]) ** np.clip(shift, -1, 1))

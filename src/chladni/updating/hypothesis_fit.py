@@ -133,7 +133,11 @@ class UpdatingProblem:
         """Responses with errors of the model's form as they spread from this state."""
         if not isinstance(self.data, Responses):
             return self
-        return replace(self, data=self.data.allowing_errors(state, delta))
+        data = self.data.allowing_errors(state, delta)
+        if data.identified is not None:
+            wide = replace(self.data, identified=None).allowing_errors(state, delta)
+            data = replace(data, wide=wide)
+        return replace(self, data=data)
 
     def exactly(self) -> "UpdatingProblem":
         """The same problem with a model that is taken to be right but for its parameters."""
@@ -177,8 +181,23 @@ class UpdatingProblem:
         kept = self.without(effect)
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
-        fit = fitted(model, [*kept, effect], data, self.mass_measurement, x0, max_steps)
+        effects, mass = [*kept, effect], self.mass_measurement
+        fit = fitted(model, effects, data, mass, begun(model, effects, data, mass, x0), max_steps)
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
+
+    def about_itself(self, hypothesis: HypothesisFit, max_steps: int = 30) -> HypothesisFit:
+        """A hypothesis with errors of the model's form as they spread from its own state.
+
+        While many are compared they spread from the null's; a strong effect makes it another
+        structure (a support turns rigid modes into flexible ones, which err as those do).
+        """
+        data, begun = hypothesis.data, hypothesis.fit
+        if not isinstance(data, Responses) or data.error is None:
+            return hypothesis
+        data = data.allowing_errors(begun.state, data.error.delta)
+        mass = self.mass_measurement
+        fit = fitted(hypothesis.model, begun.effects, data, mass, begun.x, max_steps)
+        return replace(hypothesis, fit=fit)
 
     def without(self, effect: Effect) -> list[Effect]:
         """The base less what the effect makes superfluous; what was found stays."""
@@ -200,6 +219,15 @@ def fitted(
     return found.kept()
 
 
+def begun(
+    model: Reduced, effects: Sequence[Effect], data: Data,
+    mass_measurement: MassMeasurement | None, x: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Where a fit begins: narrow basins are entered from the likelihood of independent samples."""
+    wide = data.wide if isinstance(data, Responses) else None
+    return x if wide is None else fitted(model, effects, wide, mass_measurement, x, ROUGH).x
+
+
 ROUNDS, CLOSE = 3, 0.15  # fits in turn with δ, until ln δ changes by no more
 
 
@@ -207,20 +235,15 @@ def _fit_responses(
     model: Reduced, effects: Sequence[Effect], data: Responses,
     mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int,
 ) -> Fit:  # fmt: skip
-    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out.
-
-    Narrow basins are entered from the wide likelihood of independent samples.
-    """
+    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
     assert data.error is not None
-    if data.wide is not None:
-        x = _fit_responses(model, effects, data.wide, mass_measurement, x, max_steps).x
     for _ in range(ROUNDS):
         found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
         r0, J0 = beside(effects, mass_measurement, found.x, found.state)
         likely = learned(data.error, *data.scaled(found.state, True), r0, J0)
         change = abs(np.log(likely.delta / data.error.delta))
         data = replace(data, error=data.error.with_delta(likely.delta))
-        S = likely.neg2_log_evidence + constants(effects)
+        S = likely.neg2_log_evidence + constants(effects) + data.log_det
         found = replace(found, neg2_log_evidence=S, data=data)
         if max_steps <= ROUGH or change < CLOSE:
             break

@@ -146,9 +146,6 @@ class Responses:
         What sensors show wrongly by themselves is allowed for as well.
         """
         plain = self.exactly()
-        if plain.identified is not None:
-            wide = replace(plain, identified=None).allowing_errors(state, delta)
-            plain = replace(plain, wide=wide)
         size = USUAL if plain.identified is None else delta
         data = replace(plain, bent=curvature(plain, state, size), about=state)
         return data._spread(state, delta)
@@ -179,7 +176,7 @@ class Responses:
         known, sd = self.identified, self.std()
         if known is None:
             return None
-        return spanned(self, by_input(known.own) / sd, known.common / sd)
+        return spanned(self, by_input(known.own), known.common, sd)
 
     def wrong(self, state: State) -> np.ndarray | float:
         """E|d ln H|² of what sensors show wrongly by themselves (n_f, n_out, n_in)."""
@@ -195,6 +192,16 @@ class Responses:
         if self.error is None or self.about is None:
             return data
         return data._spread(self.about, self.error.delta)
+
+    @property
+    def span(self) -> Span | None:
+        """Space of the residuals, where it is smaller than the samples."""
+        return None if self.known is None else self.known.span
+
+    @property
+    def log_det(self) -> float:
+        """Ln det of the covariance that known errors leave, where evidence counts it."""
+        return 0.0 if self.known is None or self.identified is None else self.known.log_det
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
         """δ over its spread, with the errors of the model's form whitened out."""

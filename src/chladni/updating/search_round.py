@@ -26,6 +26,7 @@ from .rows_of_fits import simplest_first
 BEHIND = 30.0  # price of any effect, in -2 ln evidence, with room to spare
 RUNNING = 3  # families that are fitted to the end, at rest or not; more where they are tied
 LATER = 2  # of them in later rounds
+PASSES = 4  # fits about its own state, until the evidence of a hypothesis stays
 WHOLE = 6  # that keep their model, 10 to 300 MB each on a tailgate
 
 Say = Callable[[str, float], None]
@@ -141,7 +142,19 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
     model, begun = hypothesis.model, hypothesis.fit
     fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
     if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
-        return replace(hypothesis, fit=fit)
+        hypothesis = replace(hypothesis, fit=fit)
+    return _settled(problem, hypothesis) if running else hypothesis
+
+
+def _settled(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
+    """A hypothesis with errors that spread from where it rests, where data count them exactly."""
+    data = hypothesis.data
+    if not isinstance(data, Responses) or data.identified is None:
+        return hypothesis
+    for _ in range(PASSES):
+        before, hypothesis = hypothesis, problem.about_itself(hypothesis)
+        if abs(hypothesis.neg2_log_evidence - before.neg2_log_evidence) < 1:
+            break
     return hypothesis
 
 
@@ -156,6 +169,7 @@ def _closer(
             break
         try:
             hypothesis = problem.fitted_with(again.effect, again.start, again.base)
+            hypothesis = _settled(problem, hypothesis)
         except ModelError:
             break
         out.append(hypothesis)

@@ -38,14 +38,25 @@ class Span:
     ----------
     own : (n, k) sparse      columns on one output each
     common : (n, m)          columns of the poles beyond them
+    log_det : float          ln of the volume of an orthonormal basis of the span, over the spreads
     """
 
     own: sp.csc_array
     common: np.ndarray
+    log_det: float = 0.0
 
     def projected(self, r: np.ndarray) -> np.ndarray:
         """Part of residuals or of columns of slopes (n, ...) within the span."""
-        return self.own @ (self.own.T @ r) + self.common @ (self.common.T @ r)
+        return self.columns(self.coordinates(r))
+
+    def coordinates(self, r: np.ndarray) -> np.ndarray:
+        """Components of residuals or of columns of slopes along the span (k + m, ...)."""
+        return np.concatenate([self.own.T @ r, self.common.T @ r])
+
+    def columns(self, c: np.ndarray) -> np.ndarray:
+        """Residuals or columns of slopes (n, ...) with these components."""
+        k = self.own.shape[1]
+        return np.asarray(self.own @ c[:k] + self.common @ c[k:])
 
     @property
     def leverage(self) -> np.ndarray:
@@ -72,6 +83,13 @@ class Whitening:
     common_less: np.ndarray
     span: Span | None = None
 
+    @property
+    def log_det(self) -> float:
+        """Ln det C of data in units that do not depend on the spread of each sample."""
+        less = np.concatenate([self.own_less, self.common_less])
+        volume = 0.0 if self.span is None else self.span.log_det
+        return float(-2 * np.log1p(-less).sum() - 2 * volume)
+
     def whitened(self, r: np.ndarray) -> np.ndarray:
         """Residuals or columns of slopes (n, ...)."""
         if self.span is not None:
@@ -89,13 +107,27 @@ def by_input(own: np.ndarray) -> np.ndarray:
     return np.concatenate([own * each for each in np.eye(own.shape[-1])])
 
 
-def spanned(data: Stacks, own: np.ndarray, common: np.ndarray) -> Span:
-    """Span of complex columns: those of one channel each (k, ...) and those of all (m, ...)."""
-    blocks = _by_output(data, own)
-    basis = _sparse([(at, _basis(V)) for at, V in blocks], data)
+def spanned(data: Stacks, own: np.ndarray, common: np.ndarray, sd: np.ndarray) -> Span:
+    """Span of complex columns over the spread of each sample.
+
+    Parameters
+    ----------
+    own : (k, n_f, n_out, n_in)      of one output each
+    common : (m, n_f, n_out, n_in)   of all outputs
+    sd : (n_f, n_out, n_in)
+    """
+    spread = np.tile(sd[data.use].ravel(), 2)
+    basis, within, log_det = [], [], 0.0
+    for at, V in _by_output(data, own):
+        basis.append((at, _basis(V)))
+        Q, size = _orthogonal(basis[-1][1] / spread[at, None])
+        within.append((at, Q))
+        log_det += size
+    of_outputs, scaled = _sparse(basis, data), _sparse(within, data)
     rest = data.stacked(common)
-    rest = rest - basis @ (basis.T @ rest)
-    return Span(basis, _basis(rest))
+    rest = _basis(rest - of_outputs @ (of_outputs.T @ rest)) / spread[:, None]
+    Q, size = _orthogonal(rest - scaled @ (scaled.T @ rest))
+    return Span(scaled, Q, log_det + size)
 
 
 def whitening(
@@ -157,6 +189,12 @@ def _basis(V: np.ndarray) -> np.ndarray:
     length = np.sqrt((V**2).sum(axis=0))
     U, s, _ = np.linalg.svd(V / np.maximum(length, 1e-300), full_matrices=False)
     return U[:, s > KNOWN * s.max(initial=0.0)]
+
+
+def _orthogonal(V: np.ndarray) -> tuple[np.ndarray, float]:
+    """Orthonormal basis of independent columns, and ln of the volume that they span."""
+    Q, R = np.linalg.qr(V)
+    return Q, float(np.log(np.abs(np.diag(R))).sum())
 
 
 def _orthonormal(V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
