@@ -194,7 +194,7 @@ class UpdatingProblem:
         data, begun = hypothesis.data, hypothesis.fit
         if not isinstance(data, Responses) or data.error is None:
             return hypothesis
-        data = data.allowing_errors(begun.state, data.error.delta)
+        data = data.allowing_errors(begun.state, data.error.delta, data.curved)
         mass = self.mass_measurement
         fit = fitted(hypothesis.model, begun.effects, data, mass, begun.x, max_steps)
         return replace(hypothesis, fit=fit)

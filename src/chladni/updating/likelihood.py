@@ -16,8 +16,8 @@ from ..dynamics.modal_sum import modal_sum
 from ..ema.correlation import wrapped
 from ..ema.identification import DERIVATIVES
 from ..ema.recording_noise import EqualisedError
-from .discrepancy import MEDIAN, USUAL, Discrepancy, curvature, discrepancy
-from .matrix_stack import along
+from .discrepancy import LARGEST, MEDIAN, USUAL, Discrepancy, curvature, discrepancy
+from .matrix_stack import along, each_times
 from .pole_assignment import SPURIOUS, paired, price_missed, price_spurious
 from .reduced_model import Reduced, State
 from .sensor_errors import SensorErrors, columns, variance
@@ -70,6 +70,7 @@ class Responses:
     noise: np.ndarray | None = None
     spread: np.ndarray | None = None
     identified: EqualisedError | None = None
+    curved: float = USUAL  # δ of those errors
     bent: np.ndarray | None = None  # sd of log10 H from what errors of form do beyond first order
     error: Discrepancy | None = None  # covariance of the lines and channels in use
     about: State | None = None  # from which the errors of form spread
@@ -140,14 +141,20 @@ class Responses:
             more = [self.noise, self.bent]
         return np.sqrt(sum((z**2 for z in more if z is not None), out))
 
-    def allowing_errors(self, state: State, delta: float = MEDIAN) -> Self:
+    def allowing_errors(
+        self, state: State, delta: float = MEDIAN, curved: float | None = None
+    ) -> Self:
         """The same responses of a model whose form is off by about δ, as seen from a state.
 
-        What sensors show wrongly by themselves is allowed for as well.
+        Errors of the sensors are included. ``curved`` is the δ that terms of second order take,
+        where it is not δ: common to hypotheses whose evidence is compared, for these terms count as
+        independent, and a smaller δ would gain on every sample.
         """
         plain = self.exactly()
-        size = USUAL if plain.identified is None else delta
-        data = replace(plain, bent=curvature(plain, state, size), about=state)
+        if curved is None:
+            curved = USUAL if plain.identified is None else min(delta, LARGEST)
+        bent = curvature(plain, state, curved)
+        data = replace(plain, bent=bent, about=state, curved=curved)
         return data._spread(state, delta)
 
     def _spread(self, about: State, delta: float) -> Self:
@@ -155,7 +162,10 @@ class Responses:
         data = replace(self, known=None, error=None)
         own, common = data._errors(about)
         if len(own) + len(common):
-            data = replace(data, known=whitening(data, own, common, data._span()))
+            span, known = None, self.identified
+            if known is not None:
+                span = spanned(data, by_input(known.own), known.common, data.std())
+            data = replace(data, known=whitening(data, own, common, span))
         return replace(data, error=discrepancy(data, about).with_delta(delta))
 
     def _errors(self, about: State) -> tuple[np.ndarray, np.ndarray]:
@@ -170,13 +180,6 @@ class Responses:
             common.append(known.common / scale)
         no = np.zeros((0, *self.values.shape))
         return np.concatenate([no, *own]), np.concatenate([no, *common])
-
-    def _span(self) -> Span | None:
-        """Span of all that the identification can say of the lines and channels in use."""
-        known, sd = self.identified, self.std()
-        if known is None:
-            return None
-        return spanned(self, by_input(known.own), known.common, sd)
 
     def wrong(self, state: State) -> np.ndarray | float:
         """E|d ln H|² of what sensors show wrongly by themselves (n_f, n_out, n_in)."""
@@ -211,10 +214,7 @@ class Responses:
         return self.error.whitened(r), self.error.whitened(J) if gradient else J
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Real and imaginary part of δ over its spread, on the lines and channels in use.
-
-        Errors of the sensors are whitened out of them.
-        """
+        """δ over its spread on what is in use, real and imaginary, sensors' errors whitened out."""
         sd = self.std()
         r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
         if not gradient:
@@ -244,8 +244,8 @@ class Responses:
         from_basis, vectors = left @ state.vectors.T, state.vectors
         for j in range(len(phi_i)):
             q = vectors @ (phi_i[j] * d).T
-            W = _each_times(state.dK, q)
-            W += _each_times(state.dM, q * self.s**2)
+            W = each_times(state.dK, q)
+            W += each_times(state.dM, q * self.s**2)
             W = np.ascontiguousarray(W.transpose(2, 1, 0))  # or it is no product of BLAS
             out[:, :, :, j] = -(from_basis @ W).transpose(2, 0, 1)
             if state.ddrive is not None:
@@ -272,15 +272,6 @@ class Responses:
         if not use.any():
             return float("nan")
         return float(np.mean(np.abs(self.deviation(state)[use]) ** 2))
-
-
-def _each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A_p z of real matrices (n_p, r, r), many of them zero, and a complex z (r, n_f)."""
-    out = np.zeros((*A.shape[:2], z.shape[1]), complex)
-    both = np.ascontiguousarray(z).view(float)  # real and imaginary parts side by side
-    for p in np.flatnonzero(A.any(axis=(1, 2))):
-        out[p] = (A[p] @ both).view(complex)
-    return out
 
 
 SCALE = 0.012  # prior median of that spread: plates of wood, panels of steel, coarse meshes

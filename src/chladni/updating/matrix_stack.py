@@ -117,3 +117,12 @@ class Bordered:
 def along(A: np.ndarray, phi: np.ndarray) -> np.ndarray:
     """φ_kᵀ A_p φ_k of matrices (n_p, r, r) and each column of φ (r, k): (n_p, k)."""
     return np.einsum("rk,prk->pk", phi, A @ phi)
+
+
+def each_times(A: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """A_p z of real matrices (n_p, r, r), many of them zero, and a complex z (r, n_f)."""
+    out = np.zeros((*A.shape[:2], z.shape[1]), complex)
+    both = np.ascontiguousarray(z).view(float)  # real and imaginary parts side by side
+    for p in np.flatnonzero(A.any(axis=(1, 2))):
+        out[p] = (A[p] @ both).view(complex)
+    return out
