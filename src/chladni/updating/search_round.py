@@ -57,7 +57,7 @@ def search_round(
     progress("closing in on the place", 0.8)
     running = running if later else max(running, _in_the_running(hypotheses[:whole]))
     ahead, rest = hypotheses[:running], hypotheses[running:]
-    finished = list(side_by_side(lambda t: _finished(problem, t, True), ahead))
+    finished = list(side_by_side(lambda t: _settled(problem, _finished(problem, t, True)), ahead))
     rest = rest if later else [_finished(problem, t, False) for t in rest]
     hypotheses = by_family([*finished, *rest])
     give_back_freed_memory()
@@ -142,8 +142,8 @@ def _finished(problem: UpdatingProblem, hypothesis: HypothesisFit, running: bool
     model, begun = hypothesis.model, hypothesis.fit
     fit = fitted(model, begun.effects, hypothesis.data, problem.mass_measurement, begun.x)
     if fit.neg2_log_evidence < hypothesis.neg2_log_evidence:
-        hypothesis = replace(hypothesis, fit=fit)
-    return _settled(problem, hypothesis) if running else hypothesis
+        return replace(hypothesis, fit=fit)
+    return hypothesis
 
 
 def _settled(problem: UpdatingProblem, hypothesis: HypothesisFit) -> HypothesisFit:
