@@ -85,7 +85,9 @@ def test_a_leader_goes_on_to_where_its_family_finds_it_closer(monkeypatch, gains
 def hypothesis_at(name, evidence):
     effect = SimpleNamespace(name=name, recentred=lambda x, where: None)
     fit = SimpleNamespace(effects=(), of=lambda effect: np.zeros(1))
-    return SimpleNamespace(effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence)
+    return SimpleNamespace(
+        effect=effect, effects=(effect,), fit=fit, neg2_log_evidence=evidence, data=None
+    )
 
 
 def test_what_is_one_answer_with_the_best_is_in_the_running():

@@ -25,6 +25,7 @@ from .named_sets import largest_named
 from .reasons import ALONE, Decision, Reason, Step, steps
 
 RULES = DecisionRules()
+WITH_KNOWN_NOISE = RULES.without("most_left")  # the test of fit knows what may be left
 
 
 def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:

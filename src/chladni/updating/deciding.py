@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..decision.decide import decide
+from ..decision.decide import RULES, WITH_KNOWN_NOISE, decide
 from ..decision.hypothesis_table import (
     Ask,
     CalibratedDeck,
@@ -82,7 +82,9 @@ def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decisio
     renew : a hypothesis on a reduced model that bears it
     """
     known = begun(prepared, found)
-    while isinstance(decision := decide(known.table), Wanted):
+    noise = getattr(prepared.problem.data, "identified", None)
+    rules = RULES if noise is None else WITH_KNOWN_NOISE
+    while isinstance(decision := decide(known.table, rules), Wanted):
         known = measured(prepared, found, renew, known, decision)
     return decision, known
 
