@@ -34,7 +34,11 @@ PLACES = {  # name of a figure: (section it belongs to, caption)
         "frf",
         "A typical channel: test, model before, model after; frequencies were compared, not this.",
     ),
-    "frf_fitted": ("frf", "A channel that was fitted."),
+    "frf_fitted": (
+        "frf",
+        "A channel that was fitted. Each mode of a deck has the damping identified of its partner "
+        "in the test.",
+    ),
     "frf_held_out": ("frf", "A channel the fit never saw."),
     "frf_grid": ("frf", "Channels spread evenly over the list."),
     "nyquist": ("frf", "Nyquist."),

@@ -18,10 +18,11 @@ DAMPING = 0.01  # where neither case nor test says
 REACH = 3.0  # times the band: the two-term residual is then right to (1/3)⁴ of itself
 
 
-def model_frf(case: Case, model: Modelled, damping: float, test: FRF) -> FRF:
+def model_frf(case: Case, model: Modelled, damping: float | np.ndarray, test: FRF) -> FRF:
     """The model's responses on the lines, labels and quantity of a recording.
 
-    Modes up to ``REACH`` times the highest line, the static rest of the others.
+    Modes up to ``REACH`` times the highest line, the static rest of the others. ``damping`` is one
+    ratio, or one of each mode.
     """
     s, f = model.structure, test.frequency
     modal = model.modes.with_damping(damping)

@@ -33,6 +33,7 @@ from ..updating.joint_fit import Posterior, informed
 from ..updating.leaning import in_doubt, leaning, strained
 from ..updating.left_where import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
+from ..updating.measured_modes import MeasuredModes, measured_modes
 from ..updating.other_recordings import scored_others
 from ..updating.outcome import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.preparation import NOT_WEIGHED, prepare
@@ -197,8 +198,9 @@ def _updated(
     if stages.final is not stages.calibrated:
         final, lost = _deck(case, asked, nominal, stages.final)
         final = _commented(final, found.as_deck)
-    made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared))
-    return replace(made, curves=_curves(case, made)), lost
+    test = measured_modes(prepared)
+    made = UpdatedModels(nominal, calibrated, final, held_out=_unseen(prepared), test=test)
+    return replace(made, curves=_curves(case, made, test)), lost
 
 
 def as_it_is(asked: Question, searched: Modelled) -> Modelled:
@@ -245,18 +247,26 @@ def _unseen(prepared: Prepared) -> tuple[str, ...]:
     return tuple(label for k, label in enumerate(labels) if not data.use[:, k].any())
 
 
-def _curves(case: Case, made: UpdatedModels) -> dict[str, FRF]:
-    """The recording and the responses of the deck before and after, over all that was compared."""
+def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, FRF]:
+    """The recording and the responses of the deck before and after, over all that was compared.
+
+    The decks' modes have the damping of their partners in the test: a default one would make their
+    peaks too low or too high, which is no error of the deck.
+    """
     if not case.frfs:
         return {}
     low, high = case.band or (0.0, np.inf)
     if case.held_band is not None:
         high = max(high, case.held_band[1])
     test = case.frfs[0].sel(band=(max(low, 1e-6), high))
-    zeta = case.damping or DAMPING
-    after = before = model_frf(case, made.nominal, zeta, test)
+
+    def response(model: Modelled) -> FRF:
+        damping = modes.damping_of(case.outputs, model, case.damping or DAMPING)
+        return model_frf(case, model, damping, test)
+
+    after = before = response(made.nominal)
     if made.final.model is not made.nominal:
-        after = model_frf(case, made.final.model, zeta, test)
+        after = response(made.final.model)
     return {"test": test, "before": before, "after": after}
 
 
@@ -271,7 +281,7 @@ def _result(
         ("calibrated", stages.calibrated.model),
         ("after", stages.final.model),
     )
-    rows = frequency_rows(asked, prepared, every, real)
+    rows = frequency_rows(asked, prepared, stages.test, every, real)
     fitted, held = _scores(asked, prepared, found, stages, real)
     left, away = (
         remainder(prepared, found),

@@ -6,6 +6,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from ..dynamics.frf import FRF
 from ..ema.finding import Screening
 from ..ema.level_table import LevelTable
@@ -14,6 +16,7 @@ from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
 from ..updating.left_where import LeftWhere
 from ..updating.level_effects import LinearJoint
+from ..updating.measured_modes import MeasuredModes
 from ..updating.result import (
     Adequacy,
     Agreement,
@@ -51,6 +54,7 @@ class UpdatedModels:
     calibrated, final : ChangedDeck    without and with the effect; one where none is named
     curves : {"test", "before", "after": FRF}, empty where no FRF exists
     held_out : labels of outputs that were not fitted
+    test : the modes of the recording
     """
 
     nominal: Modelled
@@ -58,6 +62,7 @@ class UpdatedModels:
     final: ChangedDeck
     curves: dict[str, FRF] = field(default_factory=dict)
     held_out: tuple[str, ...] = ()
+    test: MeasuredModes = field(default_factory=lambda: MeasuredModes(np.zeros(0)))
 
 
 @dataclass(frozen=True, eq=False)
