@@ -8,6 +8,7 @@ import typer
 from ..output import run_folder
 from ..report.blocks import Links, Section
 from ..report.diagnosis_json import read_diagnosis
+from ..report.drawings import drawings_of
 from ..report.page import write_page
 from .console import say
 from .run import folder_named
@@ -25,10 +26,11 @@ def run(
     result = read_diagnosis(folder)
     figures = {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in (".png", ".gif", ".svg")}
     tables = [Section("Pictures as files", [Links([(p.name, n) for n, p in figures.items()])])]
+    old = drawings_of(folder / "report.html")
     if out is None or out.resolve() == folder.resolve():
-        page = write_page(folder, result, figures, result.notes, tables, title=title)
+        page = write_page(folder, result, figures, result.notes, tables, title=title, drawings=old)
     else:
         with run_folder(out, "report", [folder / "diagnosis.json"]) as part:
-            write_page(part, result, figures, result.notes, tables, title=title)
+            write_page(part, result, figures, result.notes, tables, title=title, drawings=old)
         page = out / "report.html"
     say(f"results in {page}")

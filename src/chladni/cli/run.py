@@ -16,6 +16,7 @@ from ..errors import FileError
 from ..output import run_folder, write_json
 from ..progress import Progress, within
 from ..report.blocks import Block, Code, Items, Links, PageParts, Section, Table
+from ..report.drawings import Drawings
 from ..report.page import write_sections
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.loaded_model import is_case
@@ -84,6 +85,7 @@ class Run:
     sections: list[Section] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     files: list[tuple[str, str]] = field(default_factory=list)
+    drawings: Drawings = field(default_factory=Drawings)
 
     def json(self, name: str, data: Any, what: str = "the result for other programs") -> Path:
         """Write ``name`` beside the page and list it there."""
@@ -109,7 +111,7 @@ class Run:
         """Add a page's sections, notes and files, and say its lead."""
         self.sections += parts.sections
         self.files += parts.files
-        self.lead = parts.lead
+        self.lead, self.drawings = parts.lead, parts.drawings
         say_sections(parts.lead, parts.sections)
         self.note(parts.notes)
 
@@ -129,7 +131,8 @@ class Run:
         ]
         title = f"{self.command} – {self.source.name}"
         path = self.folder / "report.html"
-        return write_sections(path, title, [*self.sections, *foot], lead=self.lead)
+        body = [*self.sections, *foot]
+        return write_sections(path, title, body, lead=self.lead, drawings=self.drawings)
 
 
 @contextmanager

@@ -2,10 +2,11 @@
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import FileError
+from .drawings import Drawings
 
 _MIME = {".png": "image/png", ".gif": "image/gif", ".svg": "image/svg+xml", ".jpg": "image/jpeg"}
 
@@ -76,6 +77,20 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Live:
+    """What the page draws itself; its pictures stand for it on paper and where no script runs.
+
+    ``name`` is the one of its numbers, ``draw`` the function of ``page.js`` that draws them.
+    """
+
+    name: str
+    draw: str
+    pictures: Sequence[Picture] = ()
+    caption: str = ""
+    kind: str = "live"
+
+
+@dataclass(frozen=True)
 class Links:
     """Files beside the page: (name, what it is)."""
 
@@ -91,7 +106,7 @@ class Code:
     kind: str = "code"
 
 
-Block = Text | Items | Facts | Table | Picture | Links | Code
+Block = Text | Items | Facts | Table | Picture | Live | Links | Code
 
 
 @dataclass(frozen=True)
@@ -110,9 +125,11 @@ class PageParts:
     ----------
     lead : the result in one sentence
     files : (name, what it is) of what was written beside the page
+    drawings : what the page draws itself, by the names in its sections
     """
 
     lead: str
     sections: Sequence[Section] = ()
     notes: Sequence[str] = ()
     files: Sequence[tuple[str, str]] = ()
+    drawings: Drawings = field(default_factory=Drawings)

@@ -6,17 +6,21 @@ from itertools import count
 from pathlib import Path
 
 from ..case import Case
-from ..io.nastran import write_deck
+from ..io.nastran import changed_lines, write_deck
 from ..io.nastran.edit.changes import Change
 from ..output import write_json
 from ..progress import Progress, silent
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.diagnosis_result import DiagnosisResult
+from .blocks import Code, Section, Text
 from .diagnosis_json import diagnosis_json
 from .figures import Shown, figures
+from .live_diagnosis import drawings, mac_of
 from .page import write_page
 from .states_table import state_folder
+
+_CHANGED = 80  # lines of the deck that the page shows
 
 
 def write_diagnosis(
@@ -42,9 +46,13 @@ def write_diagnosis(
     result = replace(result, files=files)
     write_json(folder / "diagnosis.json", diagnosis_json(result))
     progress("pictures", 0.0)
-    drawn = figures(folder, result, shown(case, result))
+    seen = shown(case, result)
+    drawn = figures(folder, result, seen)
     title = f"{'Diagnosis' if result.searched else 'Calibration'} – {case.path.parent.name}"
-    write_page(folder, result, drawn, result.notes, command=command, title=title)
+    live = drawings(case, result, seen)
+    write_page(
+        folder, result, drawn, result.notes, _changed(case, result), command, title, live
+    )  # fmt: skip
     return result
 
 
@@ -83,9 +91,23 @@ def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dic
     return found
 
 
+def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
+    """Cards before and after."""
+    if result.models is None or not (changes := result.models.final.changes):
+        return []
+    lines = changed_lines(case.deck, changes)
+    more = len(lines) - _CHANGED
+    text = f"Lines of the deck, as they were (-) and as they are in {result.files['deck']} (+)."
+    if more > 0:
+        text += f" {more} lines more differ."
+    return [Section("What changed in the deck", [Text([text]), Code(lines[:_CHANGED])])]
+
+
 def shown(case: Case, result: DiagnosisResult) -> Shown:
     """What the pictures need: the mesh, the sensors, test and model responses."""
     models, compared = result.models, result.compared == "responses"
+    likeness = list(mac_of(case, result).values())  # the last one is after
+    mac, f_model, pairs = likeness[-1] if likeness else (None, None, [])
     return Shown(
         surface(case.assembly),
         [p.name for p in case.assembly.parts],
@@ -98,4 +120,6 @@ def shown(case: Case, result: DiagnosisResult) -> Shown:
         markers(case.outputs),
         markers(case.inputs),
         cords(case),
+        None if models is None or mac is None else (mac, models.test.frequency, f_model),
+        pairs,
     )

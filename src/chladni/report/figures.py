@@ -106,7 +106,7 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
     if result.agreement is not None:
         sides = (("waterfall", result.agreement.fitted), ("held_out", result.agreement.held_out))
         for name, q in sides:
-            if len(steps := _steps(q, bool(result.effects))) > 1:
+            if len(steps := q_steps(q, bool(result.effects))) > 1:
                 made[name] = plots.waterfall(folder / f"{name}.png", steps, q.floor)
     named = {" and ".join(e.name for e in result.effects): e for e in result.effects[:1]}
     tried: dict[str, NamedEffect | Alternative] = named | {a.name: a for a in result.alternatives}
@@ -139,7 +139,7 @@ def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path
     return {"left": path}
 
 
-def _steps(q: Scores, named: bool) -> dict[str, float]:
+def q_steps(q: Scores, named: bool) -> dict[str, float]:
     """Q of the decks, in the order in which they came about; without an effect there are two."""
     steps = {"nominal": q.nominal, "calibrated": q.calibrated}
     if named:

@@ -12,9 +12,12 @@ from urllib.parse import quote
 
 from ..output import own_version, write_text
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Picture, Section
+from .blocks import Block, Facts, Picture, Section
+from .drawings import Drawings, library
+from .glossary import meaning
+from .next_steps import next_steps
 from .sentence import sentence
-from .verdict import HEADING, TONE, sections
+from .verdict import HEADING, TONE, live, sections, three_numbers
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -27,6 +30,7 @@ def write_page(
     tables: Sequence[Section] = (),
     command: str = "",
     title: str = "",
+    drawings: Drawings | None = None,
 ) -> Path:
     """Write ``report.html`` of a diagnosis into ``folder``.
 
@@ -38,16 +42,24 @@ def write_page(
     notes : sentences  what was done and why
     tables : sections  anything more, put before the files
     command : str      the line that makes this run again
+    drawings : Drawings    what the page draws itself; its pictures stand for it on paper
     """
     shown = {name: Path(path) for name, path in (figures or {}).items()}
+    drawings = drawings or Drawings()
+    hero: Block | None = Picture(shown["where"]) if "where" in shown else None
+    if "where" in drawings.by_name:
+        hero = live("where", drawings.by_name["where"], shown)
     return write_sections(
         Path(folder) / "report.html",
         title or "Diagnosis",
-        sections(result, shown, notes, tables, command),
+        sections(result, shown, notes, tables, command, drawings),
         lead=sentence(result),
         badge=HEADING.get(result.verdict, result.verdict),
         tone="warn" if result.distrust else TONE.get(result.verdict, "neutral"),
-        hero=shown.get("where"),
+        hero=hero,
+        facts=three_numbers(result),
+        steps=next_steps(result),
+        drawings=drawings,
     )
 
 
@@ -59,9 +71,18 @@ def write_sections(
     lead: str = "",
     badge: str = "",
     tone: str = "neutral",
-    hero: Path | None = None,
+    hero: Block | None = None,
+    facts: Sequence[tuple[str, str]] = (),
+    steps: Sequence[str] = (),
+    drawings: Drawings | None = None,
 ) -> Path:
-    """Write one page of titled sections; the page of every command but the diagnosis."""
+    """Write one page of titled sections; the page of every command but the diagnosis.
+
+    Parameters
+    ----------
+    hero, facts, steps : picture, numbers and next steps of the first screen
+    drawings : the numbers of the ``Live`` blocks
+    """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -72,12 +93,18 @@ def write_sections(
         lstrip_blocks=True,
     )
     environment.filters["beside"] = lambda name: "./" + quote(str(name))
+    environment.filters["meaning"] = meaning
+    drawn = drawings is not None and drawings.by_name
     html = environment.get_template("page.html").render(
         title=title,
         lead=lead,
         badge=badge,
         tone=tone,
-        hero=Picture(hero) if hero else None,
+        hero=hero,
+        first=Facts(facts),
+        steps=steps,
+        numbers=drawings.packed() if drawings is not None and drawn else "",
+        library=library() if drawn else "",
         sections=[s for s in body if s.blocks],
         made=made_with(),
     )

@@ -6,7 +6,8 @@ from pathlib import Path
 from ..effects.estimate import Estimate, Location
 from ..updating.result import Adequacy, Agreement, LeftPlace, NamedEffect
 from ..workflows.diagnosis_result import DiagnosisResult
-from .blocks import Block, Code, Facts, Items, Links, Picture, Section, Table, Text
+from .blocks import Block, Code, Facts, Items, Links, Live, Picture, Section, Table, Text
+from .drawings import Drawing, Drawings
 from .level_blocks import level_section
 from .recording_scores import recording_scores
 from .screening_blocks import screening_section
@@ -76,6 +77,41 @@ _FILES = {
 }
 
 
+def live(name: str, drawing: Drawing, figures: Mapping[str, Path]) -> Live:
+    """A drawing, with those of its pictures that were made."""
+    stills = [_picture(n, figures[n]) for n in drawing.instead_of if n in figures]
+    return Live(name, drawing.draw, stills, drawing.caption)
+
+
+def _picture(name: str, path: Path) -> Picture:
+    return Picture(path, PLACES.get(name, ("", ""))[1], wide=name not in _HALF)
+
+
+def three_numbers(result: DiagnosisResult) -> list[tuple[str, str]]:
+    """Held-out misfit, frequencies and mass, before and after."""
+    facts, agreement, mass = [], result.agreement or Agreement(), result.mass
+    held = agreement.held_out
+    if held.nominal is not None and held.after is not None:
+        change = percent(held.after, held.nominal)
+        text = f"{number(held.nominal, 3)} → {number(held.after, 3)} ({change})"
+        facts.append(("Held-out misfit Q", text))
+    off = [_mean_off(result, key) for key in ("before_hz", "after_hz")]
+    if off[0] is not None:
+        text = " → ".join(f"{number(100 * x, 2)} %" for x in off if x is not None)
+        facts.append(("Frequencies, mean deviation", text))
+    if mass is not None and mass.model_kg is not None:
+        weighed = f", weighed {number(mass.weighed_kg)} kg" if mass.weighed_kg else ", not weighed"
+        facts.append(("Mass", f"model {number(mass.model_kg)} kg{weighed}"))
+    return facts
+
+
+def _mean_off(result: DiagnosisResult, key: str) -> float | None:
+    """Mean |f/f_test - 1| over the modes with a partner."""
+    off = [abs(f / r.test_hz - 1) for r in result.frequencies if r.test_hz
+           if (f := getattr(r, key))]  # fmt: skip
+    return sum(off) / len(off) if off else None
+
+
 def _joints(result: DiagnosisResult) -> list[Block]:
     """What a linear deck would have in its joints at every level."""
     rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
@@ -99,15 +135,16 @@ def sections(
     notes: Sequence[str],
     more: Sequence[Section],
     command: str,
+    drawings: Drawings | None = None,
 ) -> list[Section]:
     """All of the page under its verdict, in the order an engineer asks."""
+    drawn = {} if drawings is None else drawings.by_name
+    replaced = {still for d in drawn.values() for still in d.instead_of}
 
     def shown(place: str) -> list[Block]:
-        return [
-            Picture(path, PLACES[name][1], wide=name not in _HALF)
-            for name, path in figures.items()
-            if name in PLACES and PLACES[name][0] == place
-        ]
+        own = [live(name, d, figures) for name, d in drawn.items() if d.place == place]
+        stills = [n for n in figures if n in PLACES and PLACES[n][0] == place]
+        return [*own, *(_picture(n, figures[n]) for n in stills if n not in replaced)]
 
     found = screening_section(result.screening)
     of_levels = _levels(figures)
@@ -140,16 +177,13 @@ def sections(
 
 
 def _glance(result: DiagnosisResult) -> list[Block]:
-    facts, agreement, mass = [], result.agreement or Agreement(), result.mass
-    for name, q in (
-        ("Q, fitted data", agreement.fitted), ("Q, held-out data", agreement.held_out)
-    ):  # fmt: skip
-        if q.nominal is not None and q.after is not None:
-            change = percent(q.after, q.nominal)
-            facts.append((name, f"{number(q.nominal, 3)} → {number(q.after, 3)}  ({change})"))
-    if mass is not None and mass.model_kg is not None:
-        weighed = f", weighed {number(mass.weighed_kg)}" if mass.weighed_kg else ""
-        facts.append(("Mass", f"model {number(mass.model_kg)} kg{weighed}"))
+    """Numbers beside the three of the first screen."""
+    facts, fit = [], (result.agreement or Agreement()).fitted
+    if fit.nominal is not None and fit.after is not None:
+        change = percent(fit.after, fit.nominal)
+        facts.append(
+            ("Q, fitted data", f"{number(fit.nominal, 3)} → {number(fit.after, 3)}  ({change})")
+        )
     rows = [r for r in result.frequencies if r.test_hz]
     for name, key in (("before", "before_hz"), ("after", "after_hz")):
         off = [abs(f / r.test_hz - 1) for r in rows if (f := getattr(r, key))]
@@ -278,6 +312,7 @@ def _frequencies(result: DiagnosisResult) -> list[Block]:
     rows = [
         (
             hertz(r.test_hz),
+            number(None if r.damping is None else 100 * r.damping, 3),
             hertz(r.before_hz),
             percent(r.before_hz, r.test_hz),
             hertz(r.after_hz),
@@ -287,7 +322,8 @@ def _frequencies(result: DiagnosisResult) -> list[Block]:
         )
         for r in result.frequencies
     ]
-    heads = ("test [Hz]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before", "MAC after")
+    heads = ("test [Hz]", "damping [%]", "before [Hz]", "off", "after [Hz]", "off ", "MAC before",
+             "MAC after")  # fmt: skip
     return [Table(heads, rows)] if rows else []
 
 

@@ -27,7 +27,10 @@ def frequency_rows(
     """Identified frequencies beside those of every stage ("before", "calibrated", "after")."""
     if not len(test.frequency):
         return ()
-    rows = [FrequencyRow(float(f)) for f in test.frequency]
+    none = [None] * len(test.frequency)
+    damping = none if test.damping is None else test.damping.tolist()
+    both = zip(test.frequency.tolist(), damping, strict=True)
+    rows = [FrequencyRow(f, damping=zeta) for f, zeta in both]
     for name, model in stages:
         modes = test.near(model)
         at, value = _paired(question, prepared, model, modes, test, real)

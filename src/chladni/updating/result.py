@@ -129,7 +129,10 @@ class MassComparison:
 
 @dataclass(frozen=True)
 class FrequencyRow:
-    """A frequency of the test and its partner in every deck [Hz]; None: it has none."""
+    """A frequency of the test and its partner in every deck [Hz]; None: it has none.
+
+    ``damping`` is the ratio that was identified.
+    """
 
     test_hz: float
     before_hz: float | None = None
@@ -138,6 +141,7 @@ class FrequencyRow:
     mac_calibrated: float | None = None
     after_hz: float | None = None
     mac_after: float | None = None
+    damping: float | None = None
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Nastran decks in and out."""
 
+from .edit.changed_deck import changed_lines as changed_lines
 from .edit.changed_deck import write_deck as write_deck
 from .edit.changes import Add as Add
 from .edit.changes import Delete as Delete

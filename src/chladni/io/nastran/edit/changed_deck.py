@@ -55,6 +55,21 @@ def write_deck(
     return path
 
 
+def changed_lines(deck: Deck, changes: Sequence[Change]) -> list[str]:
+    """What ``write_deck`` changes, line by line: "- " as it was, "+ " as it is, "@ " where."""
+    out, last = [], (-1, 0)
+    for k, edits in sorted(_edits(deck, changes).items()):
+        source = deck.sources[k]
+        for number, new in sorted(edits.items()):
+            if last != (k, number - 1):
+                out.append(f"@ {source.path.name}, line {number}")
+            last = (k, number)
+            out.append("- " + source.lines[number - 1].decode("latin-1").rstrip())
+            out += [f"+ {line}" for line in new]
+    added = [f"+ {line}" for line in _footer(deck, changes)]
+    return [*out, *(["@ added", *added] if added else [])]
+
+
 def _edits(deck: Deck, changes: Sequence[Change]) -> dict[int, Lines]:
     """New lines by file and line number."""
     wanted = plan(deck, changes)

@@ -1,0 +1,37 @@
+"""Words of the page that are explained where one points at them."""
+
+GLOSSARY = {
+    "Q": "Mean over channels and lines of |log10(H model / H test)|²; 0 is perfect, 0.1 a factor "
+    "of 2 (rms).",
+    "MAC": "Modal assurance criterion: squared cosine between two shapes at the sensors; 1: the "
+    "same shape.",
+    "CoMAC": "The same over all paired modes at one sensor. One that is low may sit or point "
+    "elsewhere.",
+    "held out": "Sensors and bands that no fit saw. They judge: a wrong explanation does not "
+    "improve them.",
+    "log evidence": "Logarithm of the probability of the recording under an explanation, all its "
+    "parameters averaged over. Free parameters that do not earn their keep lower it.",
+    "Bayes factor": "The ratio of two such probabilities: how many times better one explanation "
+    "foretells the recording than another.",
+    "95 % interval": "The value lies in it in 19 of 20 cases, if the explanation is right.",
+    "damping": "Ratio ζ to critical damping; a peak is 1/2ζ times as high as the static response.",
+    "drive point": "Where the force acts.",
+    "floor": "What the noise of the recording alone leaves.",
+    "off": "Deviation from the test.",
+    "FRF": "Frequency response function: motion over force at every frequency.",
+}
+_HEADS = {  # heads of tables and names of facts that hold a word of the glossary
+    "Q, fitted data": "Q", "Q, held-out data": "held out", "Held-out misfit Q": "held out",
+    "Q fitted": "Q", "Q held out": "held out", "MAC before": "MAC", "MAC after": "MAC",
+    "value (95 % interval)": "95 % interval", "found (95 % interval)": "95 % interval",
+    "against the best": "Bayes factor", "damping [%]": "damping", "off ": "off",
+}  # fmt: skip
+
+
+def meaning(head: str) -> str:
+    """What a head of a table or a fact means; "" where that is plain.
+
+    >>> meaning("MAC after") == GLOSSARY["MAC"], meaning("parameter")
+    (True, '')
+    """
+    return GLOSSARY.get(_HEADS.get(head, head), "")

@@ -1,0 +1,130 @@
+"""Curves, matrices and bars that can be pointed at."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.frf import FRF, UNIT
+from ..ema.correlation import deviation
+from ..updating.result import Alternative, FrequencyRow, NamedEffect, Scores
+from .drawings import rounded
+from .figures import Shown
+
+_VALUES = 1_200_000  # complex numbers on a page: about 5 MB
+_LINES = 300  # at least, of every channel
+_LOG_STEP, _DEGREE = 1e-3, 1.0  # a thousandth of a decade; a degree
+
+
+def frf(shown: Shown) -> dict[str, Any]:
+    """Magnitude and phase of every channel, of test and decks, and how far each is off."""
+    curves = dict(shown.curves)
+    test, held = curves["test"], set(shown.held_out)
+    channels = [(i, j) for j in range(len(test.inputs)) for i in range(len(test.outputs))]
+    per_channel = _VALUES // len(curves)
+    lines = thinned(test, max(_LINES, per_channel // len(channels)))
+    off = {name: _off(curve, test) for name, curve in curves.items() if name != "test"}
+    last = next((off[name] for name in ("after", "model", "before") if name in off), None)
+    room = max(1, per_channel // len(lines))
+    if len(channels) > room and last is not None:  # the worst ones are looked for
+        channels = sorted(sorted(channels, key=lambda c: -last[c])[:room], key=lambda c: c[::-1])
+    return {
+        "frequency": [float(f"{f:.7g}") for f in test.frequency[lines]],
+        "channels": [
+            {
+                "name": f"{test.outputs[i]} from {test.inputs[j]}",
+                "held": test.outputs[i] in held,
+                "off": {name: float(f"{q[i, j]:.3g}") for name, q in off.items()},
+                "curves": {name: _polar(c.values[lines, i, j]) for name, c in curves.items()},
+            }
+            for i, j in channels
+        ],
+        "unit": UNIT.get(test.quantity, ""),
+        "quantity": test.quantity,
+        "fitted": [list(band) for band in shown.fitted],
+        "excluded": [list(band) for band in shown.excluded],
+        "lines": [len(lines), len(test.frequency)],
+        "of": len(test.outputs) * len(test.inputs),
+    }
+
+
+def thinned(frf: FRF, most: int) -> np.ndarray:
+    """Positions of at most ``most`` lines: of every block the highest and the lowest."""
+    n = len(frf.frequency)
+    if n <= most:
+        return np.arange(n)
+    size = np.log(np.maximum((np.abs(frf.values) ** 2).sum(axis=(1, 2)), 1e-300))
+    ends = np.linspace(0, n, most // 2 + 1).astype(int)
+    blocks = list(pairwise(ends))
+    picked = [a + int(pick(size[a:b])) for a, b in blocks for pick in (np.argmin, np.argmax)]
+    return np.unique(picked)
+
+
+def _off(curve: FRF, test: FRF) -> np.ndarray:
+    """Q of every channel (n_out, n_in)."""
+    with np.errstate(invalid="ignore"):
+        q = np.nanmean(np.abs(deviation(curve, test)) ** 2, axis=0)
+    return np.nan_to_num(q)
+
+
+def _polar(H: np.ndarray) -> list[list[int | None]]:
+    """log10 |H| and the phase, None where H is zero."""
+    size = np.abs(H)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        level = np.where(size > 0, np.log10(size), np.nan)
+    return [rounded(level, _LOG_STEP), rounded(np.degrees(np.angle(H)), _DEGREE)]
+
+
+def mac_map(
+    test: np.ndarray, found: Mapping[str, tuple[np.ndarray, np.ndarray, Sequence[tuple[int, int]]]]
+) -> dict[str, Any]:
+    """MAC (test, model) of each deck, with the model's frequencies and the pairs."""
+    return {
+        "test": [round(float(f), 2) for f in test],
+        "maps": {
+            name: {
+                "model": [round(float(f), 2) for f in model],
+                "mac": [rounded(line, 1e-3) for line in mac],
+                "pairs": [list(p) for p in pairs],
+            }
+            for name, (mac, model, pairs) in found.items()
+        },
+    }
+
+
+def odds(
+    effects: Sequence[NamedEffect], alternatives: Sequence[Alternative]
+) -> list[dict[str, Any]]:
+    """2 ln Bayes factor of the best explanation against each, most probable first."""
+    named = " and ".join(e.name for e in effects)
+    rows = [(named, effects[0].log_evidence, "named")] if effects else []
+    rows += [(a.name, a.log_evidence, a.why_not) for a in alternatives]
+    known = [(name, float(value), why) for name, value, why in rows if value is not None]
+    best = max((value for _, value, _ in known), default=0.0)
+    bars = [{"name": n, "against": 2 * (best - v), "why": why} for n, v, why in known]
+    return sorted(bars, key=lambda bar: bar["against"])
+
+
+def steps(sides: Mapping[str, Mapping[str, float]], floors: Mapping[str, float]) -> dict[str, Any]:
+    """Q of the decks on each side of the data, and the noise alone."""
+    return {"sides": {name: dict(q) for name, q in sides.items()}, "floors": dict(floors)}
+
+
+def ladder(rows: Sequence[FrequencyRow]) -> dict[str, Any]:
+    """Deviation of each frequency from the test [%]."""
+
+    def off(f: float | None, test: float) -> float | None:
+        return None if not f else round(100 * (f / test - 1), 3)
+
+    return {
+        "test": [round(r.test_hz, 2) for r in rows],
+        "before": [off(r.before_hz, r.test_hz) for r in rows],
+        "after": [off(r.after_hz, r.test_hz) for r in rows],
+    }
+
+
+def floors(fitted: Scores, held: Scores) -> dict[str, float]:
+    """What the noise of the recording alone leaves, where it is known."""
+    both = {"fitted": fitted.floor, "held out": held.floor}
+    return {name: value for name, value in both.items() if value is not None}

@@ -1,0 +1,199 @@
+"""The next thing to do after every verdict, "no" included: the most useful one first."""
+
+from collections.abc import Sequence
+
+from ..effects.registry import families
+from ..ema.level_study import SETTLED_BY
+from ..errors import named
+from ..updating.result import CalibratedParameter
+from ..workflows.diagnosis_result import DiagnosisResult
+from .words import interval, percent, quantity
+
+_FAR = 0.05  # relative change of an ordinary parameter that is worth a measurement
+_MOST = 6  # steps
+
+
+def next_steps(result: DiagnosisResult) -> list[str]:
+    """Imperative sentences; of several states those of each."""
+    if result.states:
+        return [
+            f"{s.name or 'The first state'}: {step[0].lower()}{step[1:]}"
+            for s in result.states
+            for step in _steps(s.result)[:2]
+        ]
+    return _steps(result)[:_MOST]
+
+
+def _steps(result: DiagnosisResult) -> list[str]:
+    by_verdict = {
+        "missing physics": _confirm,
+        "measurement fault": _measure_again,
+        "nonlinear": _levels,
+        "not in catalogue": _look,
+        "calibration only": _check_values,
+        "nothing missing": _keep,
+    }
+    first = _settle(result) if result.one_of else []
+    of_verdict = by_verdict.get(result.verdict, _keep)(result)
+    steps = [*_mend(result), *first, *of_verdict, *_weigh(result)]
+    return list(dict.fromkeys(steps))
+
+
+def _mend(result: DiagnosisResult) -> list[str]:
+    """Faults of the recording come first: what is fitted to them bends the model."""
+    if result.screening is None:
+        return []
+    return [
+        f"Mend the recording, {f.kind}{' of ' + named(f.channels, 3) if f.channels else ''}: "
+        f"{f.repair or f.text}."
+        for f in result.screening.faults
+    ]
+
+
+def _settle(result: DiagnosisResult) -> list[str]:
+    """The measurements that tell apart what is tied."""
+    known = {f.name: f.settled_by for f in families()}
+    tried = {e.name: e.where.text for e in result.effects}
+    tried |= {a.name: a.where.text for a in result.alternatives if a.where is not None}
+    names = [name for group in result.one_of for name in group if known.get(name)]
+    return [_at(tried.get(name, ""), f"{known[name]}, which tells {name} apart") for name in names]
+
+
+def _at(place: str, what: str) -> str:
+    """A sentence with its place first."""
+    text = f"{place}: {what}" if place else what
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _confirm(result: DiagnosisResult) -> list[str]:
+    """A look at each place with the size that is expected, then what proves it."""
+    known = {f.name: f.settled_by for f in families()}
+    tied = {name for group in result.one_of for name in group}
+    steps = []
+    for e in result.effects:
+        size = ", ".join(f"{p.name} {interval(p.value, p.low, p.high, p.unit)}"
+                         for p in e.parameters[:2])  # fmt: skip
+        steps.append(
+            _at(e.where.text, f"look whether {e.claim or e.name}{f' ({size})' * bool(size)}")
+        )
+        if known.get(e.name) and e.name not in tied:
+            steps.append(_at("", f"{known[e.name]}, which confirms {e.name}"))
+    return [*steps, *_take_the_deck(result), *_validate(result)]
+
+
+def _take_the_deck(result: DiagnosisResult) -> list[str]:
+    deck = result.files.get("deck")
+    if not deck or not result.deck_changed:
+        return []
+    return [f"Use {deck}: it holds the change."]
+
+
+def _validate(result: DiagnosisResult) -> list[str]:
+    """A second test is worth more than a second fit."""
+    if result.recordings:
+        return []
+    return ["Measure once more with another drive point, and diagnose again with both recordings."]
+
+
+def _measure_again(result: DiagnosisResult) -> list[str]:
+    faults = [e for e in result.effects if e.where.channels]
+    again = [
+        f"Measure {named(e.where.channels, 3)} again with another sensor and another cable."
+        for e in faults
+    ]
+    until = [
+        f"Until then write no in the column use of sensors.csv for {named(e.where.channels, 3)}, "
+        "and diagnose the other channels."
+        for e in faults
+    ]
+    return [*again, *until] or ["Measure again once the fault is mended, and diagnose again."]
+
+
+def _levels(result: DiagnosisResult) -> list[str]:
+    moving = [t.sentence for t in result.levels if t.sentence]
+    steps = [f"{SETTLED_BY[0].upper()}{SETTLED_BY[1:]}."] if moving else []
+    if not result.levels:
+        steps.append("Measure at three levels and more, each in a recording of its own.")
+    if result.joints:
+        steps.append("Choose the level of service, and take K and GE of the joints at that level.")
+    return [*steps, *_take_the_deck(result)]
+
+
+def _look(result: DiagnosisResult) -> list[str]:
+    """Nothing of the catalogue fits: the place first, then the recording, then more data."""
+    spots = [w for w in (result.adequate.where if result.adequate else ())]
+    steps = [
+        f"Look at the structure {'near grid ' + str(w.grid) if w.grid else 'there'}"
+        f"{' on ' + named(w.parts, 3) if w.parts else ''} for what the deck does not have: "
+        f"{w.text}."
+        for w in spots
+    ]
+    steps += _odd_checks(result)
+    if not result.levels:
+        steps.append(
+            "Measure at half and at twice the level: what moves with the level is not linear, and "
+            "no linear effect explains it."
+        )
+    if any(w.grid for w in spots):
+        steps.append("Measure again with more sensors round that place, and another drive point.")
+    near = [a for a in result.alternatives if a.log_evidence is not None][:1]
+    known = {f.name: f.settled_by for f in families()}
+    steps += [
+        _at(a.where.text if a.where else "", f"{known[a.name]}, for {a.name} comes nearest")
+        for a in near
+        if known.get(a.name)
+    ]
+    steps.append(
+        "Check how the deck idealises the structure there: mesh, ties, supports. Physics of your "
+        "own is added as an effect (docs/extending.md)."
+    )
+    return steps
+
+
+def _odd_checks(result: DiagnosisResult) -> list[str]:
+    checks = [] if result.screening is None else result.screening.checks
+    return [f"Check the recording, {c.name}: {c.result}." for c in checks if c.passed is False]
+
+
+def _check_values(result: DiagnosisResult) -> list[str]:
+    if not result.searched:
+        return [*_take_the_deck(result), "Run chladni diagnose, which looks for missing physics."]
+    return [*_measured(result.calibrated), *_take_the_deck(result), *_validate(result)]
+
+
+def _measured(calibrated: Sequence[CalibratedParameter]) -> list[str]:
+    """The parameters that moved most, to be measured on the article."""
+    moved = [
+        (abs(c.estimate.value / c.deck_value - 1), c)
+        for c in calibrated
+        if c.deck_value and abs(c.estimate.value / c.deck_value - 1) > _FAR
+    ]
+    return [
+        f"Measure {c.where} on the article: the deck has "
+        f"{quantity(c.deck_value, c.estimate.unit)}, the recording asks for "
+        f"{quantity(c.estimate.value, c.estimate.unit)} "
+        f"({percent(c.estimate.value, c.deck_value)})."
+        for _, c in sorted(moved, key=lambda one: -one[0])[:2]
+    ]
+
+
+def _keep(result: DiagnosisResult) -> list[str]:
+    """Nothing is named."""
+    if result.distrust:
+        return ["Settle the reasons under Not to be trusted, and diagnose again.",
+                *_odd_checks(result)]  # fmt: skip
+    return [
+        "Keep the deck: the recording asks for no change that its errors do not allow.",
+        *_odd_checks(result),
+        "For a finer answer refine the mesh where it bends most, measure with more sensors, or "
+        "widen the band.",
+    ]
+
+
+def _weigh(result: DiagnosisResult) -> list[str]:
+    if result.mass is None or result.mass.weighed_kg:
+        return []
+    return [
+        "Weigh the structure as it was tested, and write mass and mass_sd under [test]: without "
+        "it mass and stiffness are told apart by their pattern alone."
+    ]

@@ -1,0 +1,379 @@
+"use strict";
+// Draws the numbers that the page holds. A name from a deck or a recording is text everywhere:
+// into the page it goes as textContent, into a drawing through said().
+
+const said = (text) => String(text).replace(/[&<>]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[c]);
+const wrapped = (text) => said(text).replace(/(.{60}\S*)\s/g, "$1<br>");
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+const hertz = (f) => (f == null ? "–" : f.toFixed(2) + " Hz");
+const scaled = (values, step) => values.map((v) => (v == null ? null : v * step));
+const CURVE = { test: "ink", before: "before", after: "after", model: "after" };
+
+async function unpacked(id) {
+  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+}
+
+// ---- controls
+
+function control(box, label, element) {
+  const around = document.createElement("label");
+  around.append(label + " ", element);
+  box.append(around);
+  return element;
+}
+
+function choice(box, label, options, changed) {
+  const list = document.createElement("select");
+  for (const [value, text] of options) list.add(new Option(text, value));
+  list.addEventListener("change", () => changed(list.value));
+  return control(box, label, list);
+}
+
+function button(box, text, pressed) {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.textContent = text;
+  made.addEventListener("click", () => pressed(made));
+  box.append(made);
+  return made;
+}
+
+// ---- what all drawings share
+
+function layout(more) {
+  const axis = { gridcolor: colour("line"), zerolinecolor: colour("line"), linecolor: colour("soft") };
+  const made = {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 15, t: 25, b: 45 },
+    font: { color: colour("ink"), size: 12, family: "system-ui, DejaVu Sans, sans-serif" },
+    hoverlabel: { align: "left", bgcolor: colour("sheet"), font: { color: colour("ink") } },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink") },
+    legend: { orientation: "h", y: -0.12 }, ...more,
+  };
+  for (const key of Object.keys(made)) if (/^[xy]axis/.test(key)) made[key] = { ...axis, automargin: true, ...made[key] };
+  return made;
+}
+
+const draw = (at, traces, more) =>
+  Plotly.react(at, traces, layout(more), { responsive: true, displaylogo: false, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] });
+
+// ---- the mesh
+
+function places(mesh, motion, by) {
+  const moved = (axis, k) => mesh[axis].map((v, n) => v * mesh.step + (motion ? by * motion[k][n] : 0));
+  return ["x", "y", "z"].map(moved);
+}
+
+function sheet(mesh, [x, y, z], more, kept) {
+  const some = (side) => (kept ? mesh[side].filter((_, t) => kept(mesh.face[t], t)) : mesh[side]);
+  return {
+    type: "mesh3d", x, y, z, i: some("i"), j: some("j"), k: some("k"), color: colour("steel"), flatshading: true,
+    hoverinfo: "text", hovertext: mesh.ids.map((id) => "grid " + id), showlegend: false,
+    lighting: { ambient: more.intensity ? 1 : 0.65, diffuse: more.intensity ? 0 : 0.55, specular: 0.05, roughness: 0.9, facenormalsepsilon: 0 }, ...more,
+  };
+}
+
+function ends(pairs, [x, y, z]) {
+  const of = (axis) => pairs.flatMap(([a, b]) => [axis[a], axis[b], null]);
+  return { x: of(x), y: of(y), z: of(z) };
+}
+
+const lines = (where, width, tint) => ({
+  type: "scatter3d", mode: "lines", ...where, line: { width, color: colour(tint) }, hoverinfo: "skip", showlegend: false,
+});
+
+function triad(mesh, [x, y, z]) {
+  const low = [x, y, z].map((axis) => axis.reduce((a, b) => Math.min(a, b), Infinity));
+  const long = 0.1 * mesh.size, start = low.map((v) => v - 0.05 * mesh.size);
+  return ["#d62728", "#2ca02c", "#1f77b4"].map((tint, k) => {
+    const tip = start.map((v, n) => v + (n === k ? long : 0));
+    const [a, b, c] = start.map((v, n) => [v, tip[n]]);
+    return { type: "scatter3d", mode: "lines+text", x: a, y: b, z: c, text: ["", "XYZ"[k]], textfont: { color: tint },
+      line: { width: 5, color: tint }, hoverinfo: "skip", showlegend: false };
+  });
+}
+
+// A box that holds pins and triad, so large that the structure fills its share of the picture.
+function space(at, mesh, key = "scene", domain = {}) {
+  const xyz = places(mesh), room = 0.12 * mesh.size, kept = at.layout?.[key];
+  const least = (axis) => axis.reduce((a, b) => Math.min(a, b), Infinity), most = (axis) => axis.reduce((a, b) => Math.max(a, b), -Infinity);
+  const range = xyz.map((axis) => [least(axis) - room, most(axis) + room]), long = range.map(([a, b]) => b - a), centre = range.map(([a, b]) => (a + b) / 2);
+  const [e, u] = [mesh.eye, mesh.up], right = [u[1] * e[2] - u[2] * e[1], u[2] * e[0] - u[0] * e[2], u[0] * e[1] - u[1] * e[0]];
+  const reach = (d) => most(xyz[0].map((_, n) => Math.abs(d.reduce((sum, v, k) => sum + v * (xyz[k][n] - centre[k]), 0)))) + room / 2;
+  const share = ([a, b] = [0, 1]) => b - a, wide = (at.clientWidth * share(domain.x)) / (at.clientHeight * share(domain.y));
+  const size = 0.95 * Math.min(wide / reach(right), 1 / reach(u)), vector = ([x, y, z]) => ({ x, y, z });
+  const far = 1.5 * Math.max(1, size * Math.max(...long)), axis = (k) => ({ visible: false, showspikes: false, range: range[k] });
+  return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", dragmode: "orbit", domain, aspectratio: kept?.aspectratio ?? vector(long.map((v) => size * v)),
+    camera: kept?.camera ?? { eye: vector(e.map((v) => far * v)), up: vector(u), projection: { type: "orthographic" } } };
+}
+
+function ball([x, y, z], r, name) {
+  const p = [[], [], []], rows = 9, round = 16, faces = [[], [], []];
+  for (let a = 0; a <= rows; a++)
+    for (let b = 0; b < round; b++) {
+      const u = (Math.PI * a) / rows, v = (2 * Math.PI * b) / round;
+      [x + r * Math.sin(u) * Math.cos(v), y + r * Math.sin(u) * Math.sin(v), z + r * Math.cos(u)].forEach((w, k) => p[k].push(w));
+      const [here, next, down] = [a * round + b, a * round + ((b + 1) % round), (a + 1) * round];
+      if (a < rows) [[here, next, down + b], [next, down + ((b + 1) % round), down + b]].forEach((t) => t.forEach((w, k) => faces[k].push(w)));
+    }
+  return { type: "mesh3d", x: p[0], y: p[1], z: p[2], i: faces[0], j: faces[1], k: faces[2], color: colour("found"), opacity: 0.25,
+    hoverinfo: "text", hovertext: name, showlegend: false };
+}
+
+function markers(list, name, tint, symbol, long) {
+  const tip = (k) => list.map((m) => m.at[k] + long * m.along[k]);
+  const arrow = (k) => list.flatMap((m) => [m.at[k], m.at[k] + long * m.along[k], null]);
+  return [
+    { type: "scatter3d", mode: "markers", name, x: tip(0), y: tip(1), z: tip(2), hoverinfo: "text", legendgroup: name,
+      hovertext: list.map((m) => `${name} ${said(m.label)}`), marker: { size: name === "drive point" ? 8 : 5, color: colour(tint), symbol } },
+    { ...lines({ x: arrow(0), y: arrow(1), z: arrow(2) }, 4, tint), legendgroup: name },
+  ];
+}
+
+const SYMBOLS = { sensors: ["neutral", "circle"], "held-out sensors": ["neutral", "circle-open"], "drive point": ["before", "diamond"], cords: ["calm", "square"] };
+
+function structure(at, data, shared) {
+  const mesh = shared.mesh, xyz = places(mesh), traces = [];
+  const meant = new Set(data.spots.flatMap((s) => s.parts));
+  if (mesh.i.length) {
+    traces.push(sheet(mesh, xyz, {}, meant.size ? (f) => !meant.has(mesh.part[f]) : null));
+    if (meant.size) traces.push(sheet(mesh, xyz, { color: colour("found"), hovertext: mesh.ids.map((id) => `grid ${id}, ${wrapped(data.spots[0].text)}`) }, (f) => meant.has(mesh.part[f])));
+  }
+  traces.push(lines(ends(mesh.fine, xyz), 1, "soft"), lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz));
+  for (const [name, list] of Object.entries(data.setup)) traces.push(...markers(list, name, ...SYMBOLS[name], name === "cords" ? 0 : 0.06 * mesh.size));
+  for (const spot of data.spots) {
+    const name = wrapped(spot.text);
+    if (spot.radius) for (const p of spot.at.slice(0, 3)) traces.push(ball(p, spot.radius, name));
+    if (spot.at.length) traces.push({ type: "scatter3d", mode: "markers", name: "finding", x: spot.at.map((p) => p[0]), y: spot.at.map((p) => p[1]), z: spot.at.map((p) => p[2]),
+      hoverinfo: "text", hovertext: name, marker: { size: 9, color: colour("found"), symbol: "cross" } });
+  }
+  return draw(at, traces, { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 }, legend: { orientation: "h", y: 0 } });
+}
+
+function remainder(at, data, shared) {
+  const mesh = shared.mesh, xyz = places(mesh), value = scaled(data.value, data.step);
+  const seen = (f) => value[f] != null, shown = mesh.face.filter(seen).map((f) => value[f]);
+  return draw(at, [
+    sheet(mesh, xyz, {}, (f) => !seen(f)),
+    sheet(mesh, xyz, { intensity: shown, intensitymode: "cell", cmin: 0, cmax: data.top, colorscale: "YlOrRd", reversescale: true, colorbar: { thickness: 12, len: 0.8, title: { text: "gain", side: "right" } },
+      hovertemplate: "gain %{intensity:.1f}<extra></extra>" }, seen),
+    lines(ends(mesh.edges, xyz), 3, "ink"), ...triad(mesh, xyz),
+  ], { scene: space(at, mesh), margin: { l: 0, r: 0, t: 0, b: 0 } });
+}
+
+function shapes(at, data, shared, box) {
+  const mesh = shared.mesh, decks = Object.keys(data.modes[0]).concat("before", "after").filter((name, k, all) => name !== "test" && all.indexOf(name) === k && data.modes.some((m) => m[name]));
+  const sensed = data.modes.some((m) => m.test.motion);
+  const state = { mode: 0, left: sensed ? "test" : decks[0], right: decks[decks.length - 1], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
+  const title = (m, name) => {
+    const one = m[name];
+    if (!one) return `${name}: no partner`;
+    return `${name} ${hertz(one.hz)}` + (one.damping != null ? `, damping ${(100 * one.damping).toFixed(2)} %` : "") + (one.mac != null ? `, MAC ${one.mac.toFixed(3)}` : "");
+  };
+  const names = (sensed ? ["test"] : []).concat(decks).map((n) => [n, n === "test" ? "test" : "deck " + n]);
+  const list = choice(box, "mode", data.modes.map((m, k) => [k, `${k + 1}: ${hertz(m.test.hz)}`]), (v) => show({ mode: Number(v) }));
+  const step = (by) => show({ mode: (list.value = (state.mode + by + data.modes.length) % data.modes.length) });
+  button(box, "previous", () => step(-1));
+  button(box, "next", () => step(1));
+  choice(box, "left", names, (v) => show({ left: v })).value = state.left;
+  choice(box, "right", names, (v) => show({ right: v })).value = state.right;
+  choice(box, "amplitude", [[0.03, "small"], [0.08, "medium"], [0.2, "large"]], (v) => show({ size: Number(v) })).value = state.size;
+  const stop = button(box, "", () => { state.run = !state.run; label(); tick(); });
+  const label = () => { stop.textContent = state.run ? "stop" : "play"; stop.setAttribute("aria-pressed", state.run); };
+
+  const motion = (name) => data.modes[state.mode][name]?.motion;
+  function side(name, phase) {  // coordinates of the traces of one side: sheet and edges, or sensors
+    const far = state.size * mesh.size * phase, m = motion(name);
+    if (name !== "test") {
+      const xyz = places(mesh, m, far / 1000);
+      return [{ x: xyz[0], y: xyz[1], z: xyz[2] }, ends(mesh.edges, xyz)];
+    }
+    const tip = (k) => data.sensors.map((s, n) => s.at[k] + ((m ? m[n] : 0) / 1000) * far * s.along[k]);
+    const [x, y, z] = [tip(0), tip(1), tip(2)], stick = (axis, k) => data.sensors.flatMap((s, n) => [s.at[k], axis[n], null]);
+    return [{ x, y, z }, { x: stick(x, 0), y: stick(y, 1), z: stick(z, 2) }];
+  }
+  function traces(name, scene) {
+    const [first, second] = side(name, 1), m = motion(name);
+    if (name === "test") {
+      const rest = places(mesh);
+      return [{ type: "scatter3d", mode: "markers", ...first, scene, showlegend: false, hoverinfo: "text",
+        hovertext: data.sensors.map((s, n) => `${said(s.label)}: ${m ? (m[n] / 1000).toFixed(2) : "–"} of the largest`), marker: { size: 5, color: m ? m.map(Math.abs) : 0, cmin: 0, cmax: 1000, colorscale: "Viridis" } },
+      { ...lines(second, 5, "before"), scene }, { ...sheet(mesh, rest, { opacity: 0.35 }), scene }, { ...lines(ends(mesh.edges, rest), 2, "soft"), scene }];
+    }
+    const size = m ? m[0].map((_, n) => Math.hypot(m[0][n], m[1][n], m[2][n])) : mesh.x.map(() => 0);
+    const surface = mesh.i.length ? sheet(mesh, [first.x, first.y, first.z], { intensity: size, cmin: 0, cmax: 1000, colorscale: "Viridis", showscale: false,
+      hovertext: mesh.ids.map((id, n) => `grid ${id}: ${(size[n] / 1000).toFixed(2)} of the largest`) }) : lines(first, 1, "line");
+    return [{ ...surface, scene }, { ...lines(second, 3, "ink"), scene }];
+  }
+  const narrow = at.clientWidth < 600;
+  async function show(change) {
+    Object.assign(state, change);
+    const m = data.modes[state.mode];
+    const note = (text, x, y) => ({ text: said(text), x, y, xref: "paper", yref: "paper", showarrow: false, xanchor: "left", yanchor: "top" });
+    const [one, two] = narrow ? [{ y: [0.52, 1] }, { y: [0, 0.48] }] : [{ x: [0, 0.5] }, { x: [0.5, 1] }];
+    await draw(at, [...traces(state.left, "scene"), ...traces(state.right, "scene2")], {
+      scene: space(at, mesh, "scene", one), scene2: space(at, mesh, "scene2", two), margin: { l: 0, r: 0, t: 0, b: 0 },
+      annotations: [note(title(m, state.left), 0.01, 1), note(title(m, state.right), narrow ? 0.01 : 0.51, narrow ? 0.48 : 1)],
+    });
+    label();
+  }
+  let busy = false, timer, inView = true;
+  const start = performance.now();
+  async function tick() {
+    clearTimeout(timer);
+    if (busy || !state.run || !inView || document.hidden) return;
+    busy = true;
+    const phase = Math.sin((performance.now() - start) / 250);
+    const left = side(state.left, phase), right = side(state.right, phase), first = state.left === "test" ? 4 : 2;
+    const moved = [...left, ...right], of = (axis) => moved.map((p) => p[axis]);
+    await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, [0, 1, first, first + 1]);
+    at.dataset.frames = Number(at.dataset.frames || 0) + 1;
+    busy = false;
+    timer = setTimeout(tick, 30);
+  }
+  at.redraw = () => show({});
+  document.addEventListener("visibilitychange", tick);
+  new IntersectionObserver(([seen]) => { inView = seen.isIntersecting; tick(); }).observe(at);
+  return show({}).then(() => { at.on("plotly_relayout", (to) => turned(at, to)); tick(); });
+}
+
+function turned(at, to) {  // both sides are seen from the same place
+  const change = {};
+  for (const [key, value] of Object.entries(to)) {
+    const found = key.match(/^scene(2?)\.(camera|aspectratio)$/);
+    if (found) change[`scene${found[1] ? "" : "2"}.${found[2]}`] = value;
+  }
+  if (at.following || !Object.keys(change).length) return;
+  at.following = true;
+  Plotly.relayout(at, change).then(() => { at.following = false; });
+}
+
+// ---- curves, matrices, bars
+
+function responses(at, data, shared, box) {
+  const names = Object.keys(data.channels[0].curves);
+  const text = (c) => c.name + (c.held ? " (held out)" : "") + Object.entries(c.off).map(([n, q]) => `, Q ${n} ${q}`).join("");
+  const list = choice(box, "channel", data.channels.map((c, k) => [k, text(c)]), (k) => show(Number(k)));
+  const step = (by) => show((list.value = (Number(list.value) + by + data.channels.length) % data.channels.length));
+  button(box, "previous", () => step(-1));
+  button(box, "next", () => step(1));
+  const last = names[names.length - 1];
+  if (last !== "test") button(box, "worst", () => show((list.value = data.channels.reduce((w, c, k, all) => (c.off[last] > all[w].off[last] ? k : w), 0))));
+  const [low, high] = [data.frequency[0], data.frequency[data.frequency.length - 1]];
+  const inside = ([a, b]) => [Math.max(a, low), Math.min(b, high)];
+  function grey() {
+    let free = data.fitted.length ? [] : [[low, high]], from = low;
+    for (const [a, b] of data.fitted.map(inside)) { if (a > from) free.push([from, a]); from = b; }
+    free = data.fitted.length ? free.concat(from < high ? [[from, high]] : []) : [];
+    return free.concat(data.excluded.map(inside)).map(([a, b]) => ({ type: "rect", xref: "x", yref: "paper", x0: a, x1: b, y0: 0, y1: 1, line: { width: 0 }, fillcolor: colour("soft"), opacity: 0.12, layer: "below" }));
+  }
+  function show(k) {
+    const c = data.channels[k], traces = [];
+    for (const name of names) {
+      const [level, phase] = c.curves[name], line = { color: colour(CURVE[name]), width: name === "test" ? 1.8 : 1.4 };
+      const cut = phase.map((p, n) => (n && Math.abs(p - phase[n - 1]) > 180 ? null : p));
+      traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, x: data.frequency, y: level.map((v) => (v == null ? null : 10 ** (v / 1000))), line, hovertemplate: `${name} %{y:.3g}<extra></extra>` });
+      traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, showlegend: false, x: data.frequency, y: cut, yaxis: "y2", line, hovertemplate: `${name} %{y}°<extra></extra>` });
+    }
+    return draw(at, traces, { title: { text: said(text(c)), font: { size: 13 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", shapes: grey(), uirevision: "kept",
+      xaxis: { title: { text: "frequency [Hz]" }, anchor: "y2", hoverformat: ".2f" }, yaxis: { type: "log", domain: [0.33, 1], exponentformat: "power", title: { text: said(`${data.quantity} [${data.unit}]`) } },
+      yaxis2: { domain: [0, 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } });
+  }
+  at.redraw = () => show(Number(list.value));
+  return show(0);
+}
+
+function assurance(at, data) {
+  const maps = Object.entries(data.maps), narrow = at.clientWidth < 700, traces = [], more = { shapes: [], annotations: [] };
+  maps.forEach(([name, map], k) => {
+    const n = k ? String(k + 1) : "", share = [k / maps.length + (k ? 0.06 : 0), (k + 1) / maps.length - (k < maps.length - 1 ? 0.04 : 0)];
+    const down = [1 - share[1], 1 - share[0]], value = map.mac.map((row) => scaled(row, 0.001));
+    const tip = value.map((row, i) => row.map((v, j) => `test ${hertz(data.test[i])}<br>${name} ${hertz(map.model[j])}<br>MAC ${v.toFixed(3)}`));
+    const ticks = (f) => ({ tickvals: f.map((_, i) => i), ticktext: f.map((v) => v.toFixed(1)), tickfont: { size: 10 }, showgrid: false, zeroline: false });
+    traces.push({ type: "heatmap", z: value, zmin: 0, zmax: 1, colorscale: "Viridis", showscale: k === 0, colorbar: { thickness: 10 }, text: tip, hoverinfo: "text", xaxis: "x" + n, yaxis: "y" + n });
+    more["xaxis" + n] = { ...ticks(map.model), domain: narrow ? [0, 1] : share, anchor: "y" + n, tickangle: -60, title: { text: `deck ${name} [Hz]` } };
+    more["yaxis" + n] = { ...ticks(data.test), domain: narrow ? down : [0, 1], anchor: "x" + n, autorange: "reversed", title: { text: "test [Hz]" } };
+    for (const [i, j] of map.pairs) more.shapes.push({ type: "rect", xref: "x" + n, yref: "y" + n, x0: j - 0.5, x1: j + 0.5, y0: i - 0.5, y1: i + 0.5, line: { color: "#ff5a36", width: 2 } });
+  });
+  return draw(at, traces, more);
+}
+
+function steps(at, data) {
+  const tints = ["neutral", "before"], traces = Object.entries(data.sides).map(([name, q], k) => ({ type: "bar", name, x: Object.keys(q), y: Object.values(q), marker: { color: colour(tints[k]) }, hovertemplate: `${name}, %{x}: Q %{y:.4g}<extra></extra>` }));
+  Object.entries(data.floors).forEach(([name, v], k) => traces.push({ type: "scatter", mode: "lines", name: `noise, ${name}`, x: Object.keys(Object.values(data.sides)[0]), y: Object.values(Object.values(data.sides)[0]).map(() => v), line: { dash: "dash", color: colour(tints[k]) }, hovertemplate: `noise, ${name}: ${v.toPrecision(3)}<extra></extra>` }));
+  return draw(at, traces, { barmode: "group", yaxis: { title: { text: "Q" }, rangemode: "tozero" } });
+}
+
+function odds(at, data) {
+  const bars = data.bars.slice().reverse(), marks = [0, 2, 10, 30, 100, 300, 1000, 3000, 10000];
+  at.style.height = 90 + 26 * bars.length + "px";
+  return draw(at, [{ type: "bar", orientation: "h", y: bars.map((_, k) => k), x: bars.map((b) => b.against + 1), base: 0, marker: { color: bars.map((b) => colour(b.why === "named" ? "found" : "steel")) },
+    text: bars.map((b) => b.against.toFixed(b.against < 10 ? 1 : 0)), textposition: "outside", cliponaxis: false, hoverinfo: "text",
+    hovertext: bars.map((b) => `<b>${said(b.name)}</b>, 2 ln B ${b.against.toFixed(1)}<br>${wrapped(b.why || "")}`) }], {
+    xaxis: { type: "log", range: [0, Math.log10(Math.max(...bars.map((b) => b.against)) + 1) * 1.08 + 0.05], tickvals: marks.map((v) => v + 1), ticktext: marks.map(String), title: { text: "2 ln Bayes factor of the best against it" } },
+    yaxis: { tickvals: bars.map((_, k) => k), ticktext: bars.map((b) => said(b.name)), showgrid: false } });
+}
+
+function ladder(at, data) {
+  const bar = (name) => ({ type: "bar", name, x: data.test.map((_, k) => k), y: data[name], marker: { color: colour(name) }, hovertext: data.test.map((f, k) => `test ${hertz(f)}<br>${name} ${data[name][k] == null ? "no partner" : (data[name][k] > 0 ? "+" : "") + data[name][k] + " %"}`), hoverinfo: "text" });
+  return draw(at, ["before", "after"].map(bar), { barmode: "group", xaxis: { tickvals: data.test.map((_, k) => k), ticktext: data.test.map((f) => f.toFixed(1)), title: { text: "frequency of the test [Hz]" } }, yaxis: { title: { text: "off [%]" } } });
+}
+
+// ---- tables that are sorted by a click on their heads
+
+function sortable(table) {
+  const body = table.tBodies[0], heads = [...table.tHead.rows[0].cells];
+  if (body.rows.length < 3) return;
+  const key = (row, k) => row.cells[k].textContent.trim();
+  heads.forEach((head, k) => {
+    const sort = () => {
+      const up = head.getAttribute("aria-sort") !== "ascending";
+      heads.forEach((h) => h.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", up ? "ascending" : "descending");
+      const order = (a, b) => {
+        const [x, y] = [key(a, k), key(b, k)], [p, q] = [parseFloat(x), parseFloat(y)];
+        if (isNaN(p) !== isNaN(q)) return isNaN(p) ? 1 : -1;
+        return (up ? 1 : -1) * (isNaN(p) ? x.localeCompare(y) : p - q);
+      };
+      body.append(...[...body.rows].sort(order));
+    };
+    head.tabIndex = 0;
+    head.classList.add("sorts");
+    head.addEventListener("click", sort);
+    head.addEventListener("keydown", (e) => { if (e.key === "Enter") sort(); });
+  });
+}
+
+// ---- all of it
+
+const DRAWN = { structure, remainder, shapes, responses, assurance, steps, odds, ladder };
+const SPATIAL = ["structure", "remainder", "shapes"];
+
+async function begin() {
+  document.querySelectorAll("table").forEach(sortable);
+  const figures = [...document.querySelectorAll(".live")];
+  if (!figures.length || !window.DecompressionStream) return;
+  const { shared, drawings } = JSON.parse(await unpacked("numbers"));
+  const script = document.createElement("script");
+  script.textContent = await unpacked("library");
+  document.head.append(script);
+  const turns = !!document.createElement("canvas").getContext("webgl");
+  async function start(figure) {
+    const { draw: name, data } = drawings[figure.dataset.name], at = figure.querySelector(".plot");
+    if (SPATIAL.includes(name) && !turns) return;
+    figure.classList.add("drawn");
+    try {
+      at.redraw = () => DRAWN[name](at, data, shared, document.createElement("div"));
+      await DRAWN[name](at, data, shared, figure.querySelector(".controls"));
+      figure.dataset.ready = "yes";
+    } catch (error) {
+      figure.classList.remove("drawn");  // its pictures stand for it
+      console.error(error);
+    }
+  }
+  const near = new IntersectionObserver((seen) => seen.filter((s) => s.isIntersecting).forEach((s) => { near.unobserve(s.target); start(s.target); }), { rootMargin: "300px" });
+  figures.forEach((figure) => near.observe(figure));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => figures.filter((f) => f.dataset.ready).forEach((f) => f.querySelector(".plot").redraw()));
+}
+
+begin();

@@ -1,0 +1,71 @@
+"""After every verdict something can be done, and the most useful comes first."""
+
+import pytest
+
+from chladni.report.diagnosis_json import from_json
+from chladni.report.next_steps import next_steps
+from chladni.report.verdict import HEADING
+
+MASS = {"name": "M", "value": 0.06, "unit": "kg", "low": 0.05, "high": 0.07}
+SPOT = {"text": "near grid 18"}
+LUMP = {"name": "point-mass", "claim": "a lump", "where": SPOT, "parameters": [MASS]}
+FAULT = {"name": "sensor-fault", "where": {"text": "channel 7", "channels": ["7:+Z"]}}
+
+
+def steps(**result):
+    return next_steps(from_json(result))
+
+
+@pytest.mark.parametrize("verdict", HEADING)
+@pytest.mark.parametrize("mass", [None, {"model_kg": 1.9}])
+def test_every_verdict_says_what_to_do(verdict, mass):
+    found = steps(verdict=verdict, mass=mass)
+    assert found
+    assert len(found) == len(set(found)) <= 6
+    assert all(s[0].isupper() and s.endswith(".") and "None" not in s for s in found)
+
+
+def test_a_finding_is_looked_for_first_at_its_place_and_with_its_size():
+    first, second, *_ = steps(verdict="missing physics", effects=[LUMP])
+    assert first.startswith("Near grid 18: look")
+    assert "0.05 to 0.07" in first or "50 to 70" in first
+    assert "confirms point-mass" in second
+
+
+def test_what_cannot_be_told_apart_is_settled_first():
+    tied = {"one_of": [["point-mass", "stiffness-patch"]], "effects": [LUMP]}
+    first, second, *_ = steps(verdict="missing physics", **tied)
+    assert "tells point-mass apart" in first
+    assert "tells stiffness-patch apart" in second
+
+
+def test_a_fault_is_measured_again():
+    found = steps(verdict="measurement fault", effects=[FAULT])
+    assert found[0] == "Measure 7:+Z again with another sensor and another cable."
+    assert any("column use of sensors.csv" in s for s in found)
+
+
+def test_outside_the_catalogue_the_place_that_does_not_fit_comes_first():
+    spot = {"text": "stiffness is missing", "grid": 9, "parts": ["hem"]}
+    test = {"passes": False, "p": 0.0, "what": "misfit", "where": [spot]}
+    found = steps(verdict="not in catalogue", adequate=test)
+    assert "near grid 9" in found[0]
+    assert "hem" in found[0]
+
+
+def test_a_calibration_measures_what_moved_most():
+    moved = [
+        {"where": f"t of {part}", "name": "t", "value": v, "unit": "m", "deck_value": 1e-3}
+        for part, v in (("hem", 1.01e-3), ("panel", 1.3e-3), ("frame", 1.1e-3))
+    ]
+    found = steps(verdict="calibration only", calibrated=moved)
+    assert "t of panel" in found[0]
+    assert "t of frame" in found[1]
+    assert not any("hem" in s for s in found)
+
+
+def test_a_structure_that_was_not_weighed_is_weighed():
+    weigh = [any(s.startswith("Weigh the structure as") for s in
+                 steps(verdict="nothing missing", mass={"model_kg": 2.0, "weighed_kg": kg}))
+             for kg in (None, 2.0)]  # fmt: skip
+    assert weigh == [True, False]

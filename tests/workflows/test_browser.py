@@ -1,0 +1,322 @@
+"""The page in a real Chromium, over the WebDriver protocol (W3C): the standard library will do."""
+
+import json
+import shutil
+import socket
+import subprocess
+import time
+from base64 import b64decode
+from contextlib import contextmanager
+from dataclasses import replace
+from urllib.error import URLError
+from urllib.request import Request, urlopen
+
+import pytest
+
+from chladni.report.diagnosis_folder import shown, write_diagnosis
+from chladni.report.live_diagnosis import drawings
+from chladni.report.page import write_page
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+ARGUMENTS = (
+    "--headless=new --no-sandbox --disable-gpu --enable-unsafe-swiftshader --disable-quic "
+    "--no-first-run --disable-background-networking --disable-component-update --disable-sync "
+    "--disable-dev-shm-usage --host-resolver-rules=MAP,*,~NOTFOUND"
+).split()
+_START, _WAIT = 120.0, 60.0  # [s] a busy machine is allowed
+
+
+class Browser:
+    """One page in one window."""
+
+    def __init__(self, base):
+        self.base = base
+
+    def call(self, method, path, body=None):
+        data = None if method == "GET" else json.dumps(body or {}).encode()
+        request = Request(self.base + path, data, {"Content-Type": "application/json"})
+        request.method = method
+        with urlopen(request, timeout=_WAIT) as answer:
+            return json.load(answer)["value"]
+
+    def open(self, page):
+        self.call("POST", "/url", {"url": page.resolve().as_uri()})
+
+    def run(self, script, *arguments):
+        """Value of a script's ``return``; a promise is waited for."""
+        return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def until(self, script, *arguments):
+        """The script's value as soon as it is true."""
+        end = time.monotonic() + _WAIT
+        while not (value := self.run(script, *arguments)):
+            assert time.monotonic() < end, f"never true: {script}"
+            time.sleep(0.2)
+        return value
+
+    def pointer(self, *steps):
+        """Move, press and release: ("pointerMove", x, y), ("pointerDown",), ("pointerUp",)."""
+        done = [
+            {"type": kind, "button": 0, "duration": 100}
+            | (dict(zip("xy", map(round, place), strict=True)) if place else {})
+            for kind, *place in steps
+        ]
+        mouse = {"type": "pointer", "id": "mouse", "actions": done}
+        self.call("POST", "/actions", {"actions": [mouse]})
+
+    def devtools(self, command, **parameters):
+        self.call("POST", "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def size(self, width, height):
+        self.devtools(
+            "Emulation.setDeviceMetricsOverride",
+            width=width, height=height, deviceScaleFactor=1, mobile=False,
+        )  # fmt: skip
+
+    def dark(self, on=True):
+        feature = {"name": "prefers-color-scheme", "value": "dark" if on else "light"}
+        self.devtools("Emulation.setEmulatedMedia", features=[feature])
+
+    def complaints(self):
+        """Console messages of level SEVERE and WARNING since the last call."""
+        return [m["message"] for m in self.call("POST", "/se/log", {"type": "browser"})]
+
+    def screenshot(self, path):
+        path.write_bytes(b64decode(self.call("GET", "/screenshot")))
+
+    def pdf(self):
+        return b64decode(self.call("POST", "/print", {"background": True}))
+
+
+@contextmanager
+def browser(profile):
+    """A browser with a profile of its own that reaches no network."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen([DRIVER, f"--port={port}"], stdout=quiet, stderr=quiet) as driver:
+        try:
+            yield from _session(f"http://127.0.0.1:{port}/session", profile)
+        finally:
+            driver.terminate()
+
+
+def _session(base, profile):
+    options = {"binary": CHROMIUM, "args": [*ARGUMENTS, f"--user-data-dir={profile}"]}
+    wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "WARNING"}}
+    asked, end = {"capabilities": {"alwaysMatch": wanted}}, time.monotonic() + _START
+    while True:
+        try:
+            made = Browser(base).call("POST", "", asked)
+            break
+        except URLError as error:
+            if time.monotonic() > end or not isinstance(error.reason, ConnectionRefusedError):
+                raise
+            time.sleep(0.1)
+    window = Browser(f"{base}/{made['sessionId']}")
+    try:
+        yield window
+    finally:
+        window.call("DELETE", "")
+
+
+pytestmark = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER), reason="needs chromium and chromedriver (Debian: chromium-driver)"
+)
+EVIL = (
+    '<b>e</b></script><img src=x onerror="window.hit=1"><a href="javascript:window.hit=1">evil</a>'
+)
+READY = "return document.querySelector(`[data-name='${arguments[0]}']`).dataset.ready == 'yes'"
+PLOT = "const plot = document.querySelector(`[data-name='${arguments[0]}'] .plot`);"
+NAMES = {"where", "frf", "mac", "shapes", "steps", "odds", "ladder", "left"}
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def folder_of_run(case, diagnosed, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    write_diagnosis(folder, case, diagnosed)
+    return folder
+
+
+@pytest.fixture
+def page(window, folder_of_run):
+    """The page of a diagnosis, opened anew on a desk."""
+    window.size(1280, 900)
+    window.dark(False)
+    window.open(folder_of_run / "report.html")
+    return window
+
+
+def see(page, name):
+    """Scroll to a drawing and wait until it is there."""
+    there = PLOT + "plot.closest('.live').scrollIntoView({ block: 'center' })"
+    page.run(there, name)
+    page.until(READY, name)
+    page.run(there, name)  # it may have grown, and others above it
+
+
+def select(page, name, label, index):
+    """Choose from a list as a user does; the text that was chosen."""
+    script = """
+      const all = [...document.querySelectorAll(`[data-name='${arguments[0]}'] label`)];
+      const list = all.find((l) => l.textContent.startsWith(arguments[1])).querySelector("select");
+      list.selectedIndex = arguments[2];
+      list.dispatchEvent(new Event("change"));
+      return list.selectedOptions[0].text;"""
+    return page.run(script, name, label, index)
+
+
+def centre(page, name):
+    script = PLOT + "const b = plot.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]"
+    x, y, width, height = page.run(script, name)
+    return x + width / 2, y + height / 2
+
+
+def test_all_is_drawn_without_a_word_on_the_console_or_a_look_outside(page):
+    assert (
+        set(page.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)"))
+        == NAMES
+    )
+    for name in sorted(NAMES):
+        see(page, name)
+    assert page.run(
+        "return document.querySelectorAll('.plot .js-plotly-plot, .plot .main-svg').length"
+    )
+    loaded = page.run("return performance.getEntriesByType('resource').map((e) => e.name)")
+    assert all(name.startswith(("data:", "blob:")) for name in loaded)
+    assert not [m for m in page.complaints() if "readback" not in m and "GPU stall" not in m]
+
+
+def test_the_mesh_turns_where_it_is_dragged(page):
+    see(page, "where")
+    eye = PLOT + "return Object.values(plot._fullLayout.scene._scene.getCamera().eye)"
+    before, (x, y) = page.run(eye, "where"), centre(page, "where")
+    page.pointer(
+        ("pointerMove", x, y), ("pointerDown",), ("pointerMove", x + 90, y + 20), ("pointerUp",)
+    )
+    assert page.until(
+        eye + ".some((v, k) => Math.abs(v - arguments[1][k]) > 0.05)", "where", before
+    )
+
+
+def test_another_channel_shows_its_own_curve(page):
+    see(page, "frf")
+    curve = PLOT + "return [plot.layout.title.text, plot.data[0].y.slice(0, 5)]"
+    title, values = page.run(curve, "frf")
+    chosen = select(page, "frf", "channel", 3)
+    page.until(PLOT + "return plot.layout.title.text != arguments[1]", "frf", title)
+    again, others = page.run(curve, "frf")
+    assert again == chosen
+    assert others != values
+
+
+def test_another_mode_is_shown_and_moves(page):
+    see(page, "shapes")
+    frames = PLOT + "return Number(plot.dataset.frames || 0)"
+    count = page.run(frames, "shapes")
+    page.until(PLOT + "return Number(plot.dataset.frames) > arguments[1] + 2", "shapes", count)
+    chosen = select(page, "shapes", "mode", 2).split(": ")[1]
+    said = PLOT + "return plot.layout.annotations[0].text.includes(arguments[1])"
+    assert page.until(said, "shapes", chosen)
+
+
+def test_a_matrix_says_its_numbers_where_one_points(page):
+    see(page, "mac")
+    x, y = centre(page, "mac")
+    page.pointer(("pointerMove", x - 300, y - 20), ("pointerMove", x - 290, y - 30))
+    tip = PLOT + "return plot.querySelector('.hoverlayer').textContent"
+    assert "MAC" in page.until(tip, "mac")
+
+
+def test_a_table_is_sorted_by_its_head(page):
+    script = """
+      const named = (s) => s.querySelector("h2").textContent == "Frequencies";
+      const table = [...document.querySelectorAll("section")].find(named).querySelector("table");
+      table.tHead.rows[0].cells[arguments[0]].click();
+      const value = (row) => parseFloat(row.cells[arguments[0]].textContent);
+      return [...table.tBodies[0].rows].map(value);"""
+    up, down = page.run(script, 0), page.run(script, 0)
+    assert up == sorted(up)
+    assert down == up[::-1]
+    assert len(up) > 2
+
+
+def test_a_narrow_screen_holds_all_of_it(page):
+    page.size(390, 800)
+    for name in sorted(NAMES):
+        see(page, name)
+    assert page.run("return document.documentElement.scrollWidth") <= 390
+
+
+def test_drawings_follow_the_dark_scheme(page):
+    see(page, "frf")
+    tint = PLOT + "return plot.layout.font.color"
+    light = page.run(tint, "frf")
+    page.dark()
+    assert page.until(PLOT + "return plot.layout.font.color != arguments[1]", "frf", light)
+
+
+def test_paper_and_readers_without_scripts_get_pictures(page, folder_of_run):
+    """Each drawing that has a picture is that picture there."""
+    hidden = """
+      const display = (f, side) => getComputedStyle(f.querySelector(side)).display;
+      const both = (f) => [display(f, ".screen"), display(f, ".still")];
+      const drawn = [...document.querySelectorAll(".live")];
+      return drawn.filter((f) => f.querySelector("img")).map(both);"""
+    see(page, "frf")
+    assert ["block", "none"] in page.run(hidden)
+    page.devtools("Emulation.setEmulatedMedia", media="print")
+    printed = page.run(hidden)
+    assert len(printed) > 5
+    assert all(pair == ["none", "block"] for pair in printed)
+    page.devtools("Emulation.setEmulatedMedia", media="")
+    assert page.pdf().startswith(b"%PDF")
+    page.devtools("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        page.open(folder_of_run / "report.html")
+        assert page.run(hidden) == printed
+    finally:
+        page.devtools("Emulation.setScriptExecutionDisabled", value=False)
+
+
+def test_names_are_shown_and_not_run(window, case, diagnosed, tmp_path):
+    """Whatever a deck or a recording calls its parts and channels."""
+    seen = shown(case, diagnosed)
+    curves = {
+        k: replace(c, outputs=tuple(o + EVIL for o in c.outputs)) for k, c in seen.curves.items()
+    }
+    marked = [replace(m, label=m.label + EVIL) for m in seen.outputs]
+    seen = replace(seen, parts=[EVIL for _ in seen.parts], curves=curves, outputs=marked)
+    effects = [
+        replace(
+            e, name=EVIL, where=replace(e.where, text=EVIL, point_m=None, grids=(), parts=(EVIL,))
+        )
+        for e in diagnosed.effects
+    ]
+    others = [replace(a, name=EVIL, why_not=EVIL) for a in diagnosed.alternatives]
+    result = replace(diagnosed, effects=tuple(effects), alternatives=tuple(others))
+    found = drawings(case, result, seen)
+    page = write_page(tmp_path, result, {}, [EVIL], drawings=found, title=EVIL, command=EVIL)
+    window.size(1280, 900)
+    window.open(page)
+    for name in found.by_name:
+        see(window, name)
+        x, y = centre(window, name)
+        window.pointer(("pointerMove", x, y), ("pointerMove", x + 3, y))
+    select(window, "frf", "channel", 1)
+    for name in ("frf", "odds"):  # a browser's own marks and those of Plotly
+        assert EVIL[:20] in window.run(PLOT + "return plot.textContent", name), name
+    assert window.run("return window.hit") is None
+    assert (
+        window.run("return document.querySelectorAll('img[src=x], a[href^=javascript]').length")
+        == 0
+    )
+    assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
