@@ -33,7 +33,7 @@ def test_a_page_gives_back_what_it_draws(tmp_path):
     again = drawings_of(page).by_name[name]
     assert (again.draw, again.data) == ("steps", {"x": [1, None], "y": name})
     text = page.read_text()
-    page.write_text(text.replace('id="numbers">', 'id="numbers">AAAA'))
+    page.write_text(text.replace('class="numbers">', 'class="numbers">AAAA'))
     assert not drawings_of(page).by_name
     assert not drawings_of(tmp_path / "none.html").by_name
 

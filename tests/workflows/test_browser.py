@@ -12,7 +12,9 @@ from urllib.error import URLError
 from urllib.request import Request, urlopen
 
 import pytest
+from typer.testing import CliRunner
 
+from chladni.cli.app import application
 from chladni.report.diagnosis_folder import shown, write_diagnosis
 from chladni.report.live_diagnosis import drawings
 from chladni.report.page import write_page
@@ -320,3 +322,49 @@ def test_names_are_shown_and_not_run(window, case, diagnosed, tmp_path):
         == 0
     )
     assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        (("modes",), ["shapes"]),
+        (("frf", "--input", "2:+Z", "--output", "30:+Z", "--output", "7:+Z"), ["frf"]),
+        (("identify",), ["automac", "fit", "stabilisation"]),
+        (("correlate",), ["frf", "mac", "shapes", "where"]),
+        (("plan", "--sensors", "6"), ["mac", "shapes", "where"]),
+    ],
+)
+def test_every_command_draws_its_page(window, folder, tmp_path, command, names):
+    """With the same layout; at both widths, without a word on the console."""
+    name, *options = command
+    out = tmp_path / "out"
+    done = CliRunner().invoke(application(), [name, str(folder), *options, "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    for width in (1280, 390):
+        window.size(width, 900)
+        window.open(out / "report.html")
+        seen = window.run("return [...document.querySelectorAll('.live')].map(f => f.dataset.name)")
+        assert sorted(seen) == names
+        for one in seen:
+            see(window, one)
+        assert window.run("return document.documentElement.scrollWidth") <= width
+    assert not [m for m in window.complaints() if "readback" not in m and "GPU stall" not in m]
+    if name == "identify":
+        click_a_pole(window)
+
+
+def click_a_pole(window):
+    """It is put into a line that picks it."""
+    see(window, "stabilisation")
+    place = (
+        PLOT
+        + """
+      const mark = [...plot.querySelectorAll(".points path")].pop().getBoundingClientRect();
+      return [mark.x + mark.width / 2, mark.y + mark.height / 2];"""
+    )
+    x, y = window.run(place, "stabilisation")
+    window.pointer(("pointerMove", x, y), ("pointerDown",), ("pointerUp",))
+    line = "return document.querySelector(`[data-name='${arguments[0]}'] code`).textContent"
+    assert "--pick" in window.until(
+        line + ".includes('--pick')" + " && " + line[7:], "stabilisation"
+    )

@@ -78,7 +78,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Live:
-    """What the page draws itself; its pictures stand for it on paper and where no script runs.
+    """A drawing by the page; its pictures replace it on paper and without scripts.
 
     ``name`` is the one of its numbers, ``draw`` the function of ``page.js`` that draws them.
     """

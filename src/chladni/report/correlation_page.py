@@ -10,8 +10,10 @@ from ..ema.correlation import Quality
 from ..view.surface import surface
 from ..workflows.case_model import cords, markers
 from ..workflows.correlate import Correlation
+from . import live_pages as live
 from .blocks import Block, Facts, PageParts, Picture, Section, Table, Text
 from .figures import Shown, curves, frequencies, mac_picture, setup
+from .live_pages import Page
 from .screening_blocks import screening_section
 from .words import criterion, hertz, number, percent
 
@@ -56,17 +58,31 @@ def correlation_page(folder: Path, case: Case, found: Correlation) -> PageParts:
     rows = [(found.f_test[j], found.f_model[i], None) for i, j in zip(p.model, p.test, strict=True)]
     drawn = frequencies(folder, rows) | mac_picture(folder, shown)
     drawn |= curves(folder, shown) | setup(folder, shown) | _shapes(folder, shown, found)
+    page = Page()
+    shapes = live.shape_pairs(
+        page, shown, found.shapes, found.sensors, _pictures(drawn, ("shapes",))
+    )
+    sensors = live.layout(page, "where", shown, _pictures(drawn, ("setup",)))
+    mac: Sequence[Block] = ()
+    if shown.mac is not None:
+        stills = _pictures(drawn, ("mac",))
+        mac = [live.likeness(page, "mac", *shown.mac, "model", shown.pairs, stills)]
+    responses: Sequence[Block] = ()
+    if shown.curves:
+        stills, bands = _pictures(drawn, ("frf", "frf_grid")), (shown.fitted, shown.excluded)
+        responses = [live.responses(page, "frf", shown.curves, stills, bands)]
     return PageParts(
         _lead(found),
         [
             screening_section(found.screening),
-            Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies", "mac"))]),
-            Section("Shapes", [*_worth(found), *_pictures(drawn, ("shapes",))]),
-            Section("Sensors", [*_sensors(found), *_pictures(drawn, ("setup",))]),
-            Section("Responses", [*_scores(found), *_pictures(drawn, ("frf", "frf_grid"))]),
+            Section("Modes", [_modes(found), *_pictures(drawn, ("frequencies",)), *mac]),
+            Section("Shapes", [*_worth(found), *shapes]),
+            Section("Sensors", [*_sensors(found), *sensors]),
+            Section("Responses", [*_scores(found), *responses]),
         ],
         found.notes,
         [(path.name, path.stem.replace("_", " ")) for path in drawn.values()],
+        page.drawings,
     )
 
 
@@ -100,6 +116,8 @@ def _shown(case: Case, found: Correlation) -> Shown:
         mac_of = (found.mac.T, found.f_test, found.f_model)
     return Shown(
         surface(case.assembly),
+        [p.name for p in case.assembly.parts],
+        case.assembly.ids,
         curves=curves_of,
         compared=False,
         fitted=[case.band] if case.band else [],
@@ -112,7 +130,7 @@ def _shown(case: Case, found: Correlation) -> Shown:
     )
 
 
-def _pictures(drawn: dict[str, Path], names: Sequence[str]) -> list[Block]:
+def _pictures(drawn: dict[str, Path], names: Sequence[str]) -> list[Picture]:
     return [Picture(drawn[name], _CAPTIONS.get(name, "")) for name in names if name in drawn]
 
 

@@ -104,10 +104,13 @@ def _changed(case: Case, result: DiagnosisResult) -> list[Section]:
 
 
 def shown(case: Case, result: DiagnosisResult) -> Shown:
-    """What the pictures need: the mesh, the sensors, test and model responses."""
+    """Mesh, sensors, test and model responses for the pictures."""
     models, compared = result.models, result.compared == "responses"
-    likeness = list(mac_of(case, result).values())  # the last one is after
-    mac, f_model, pairs = likeness[-1] if likeness else (None, None, [])
+    found, after = list(mac_of(case, result).values()), None
+    pairs: Sequence[tuple[int, int]] = ()
+    if found and models is not None:
+        mac, f_model, pairs = found[-1]
+        after = mac, models.test.frequency, f_model
     return Shown(
         surface(case.assembly),
         [p.name for p in case.assembly.parts],
@@ -120,6 +123,6 @@ def shown(case: Case, result: DiagnosisResult) -> Shown:
         markers(case.outputs),
         markers(case.inputs),
         cords(case),
-        None if models is None or mac is None else (mac, models.test.frequency, f_model),
+        after,
         pairs,
     )

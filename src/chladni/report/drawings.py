@@ -1,4 +1,4 @@
-"""What a page draws itself: numbers and names, packed into the page, and taken from it again."""
+"""Numbers and names of drawings, packed into a page and read from it again."""
 
 import gzip
 import json
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-_NUMBERS = re.compile(r'<script type="text/plain" id="numbers">([A-Za-z0-9+/=]*)</script>')
+_NUMBERS = re.compile(r'<script type="text/plain" class="numbers">([A-Za-z0-9+/=]*)</script>')
 
 
 @dataclass(frozen=True)
@@ -43,23 +43,18 @@ class Drawings:
     by_name: Mapping[str, Drawing] = field(default_factory=dict)
     shared: Mapping[str, Any] = field(default_factory=dict)
 
-    def packed(self) -> str:
-        """All of it as one word: JSON, compressed."""
-        drawings = {name: vars(d) for name, d in self.by_name.items()}
-        data = {"shared": self.shared, "drawings": drawings}
-        short = (",", ":")
-        return _packed(json.dumps(data, default=_listed, allow_nan=False, separators=short))
+    def packed(self) -> list[str]:
+        """The shared data, then each drawing: words that a browser reads when they are needed."""
+        each = ({"name": name, **vars(d)} for name, d in self.by_name.items())
+        return [_packed(_json(data)) for data in (self.shared, *each)]
 
 
 def drawings_of(page: Path) -> Drawings:
     """The drawings of a page that was written before; none where it holds none."""
     try:
-        found = _NUMBERS.search(page.read_text(encoding="utf-8"))
-        if found is None:
-            return Drawings()
-        data = json.loads(gzip.decompress(b64decode(found[1])))
-        drawings = {name: Drawing(**d) for name, d in data["drawings"].items()}
-        return Drawings(drawings, data["shared"])
+        words = _NUMBERS.findall(page.read_text(encoding="utf-8"))
+        shared, *each = (json.loads(gzip.decompress(b64decode(word))) for word in words)
+        return Drawings({d.pop("name"): Drawing(**d) for d in each}, shared)
     except (OSError, EOFError, ValueError, TypeError, KeyError, AttributeError):
         return Drawings()  # damaged: its pictures stand for them
 
@@ -82,6 +77,10 @@ def rounded(values: np.ndarray, step: float) -> list[Any]:
 def _listed(value: Any) -> Any:
     """Arrays as lists."""
     return value.tolist()
+
+
+def _json(data: Any) -> str:
+    return json.dumps(data, default=_listed, allow_nan=False, separators=(",", ":"))
 
 
 def _packed(text: str) -> str:

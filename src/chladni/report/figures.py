@@ -18,6 +18,7 @@ from .level_blocks import draw_levels
 from .words import hertz
 
 _GRID = 8  # channels in the overview
+_SHAPES = 6
 CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
 Bands = Sequence[tuple[float, float]]
 
@@ -59,7 +60,7 @@ def figures(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
     rows = [(r.test_hz, r.before_hz, r.after_hz) for r in result.frequencies]
     made = _places(folder, result, shown) | setup(folder, shown)
     made |= _scores(folder, result) | _left(folder, result, shown)
-    made |= frequencies(folder, rows) | mac_picture(folder, shown)
+    made |= frequencies(folder, rows) | mac_picture(folder, shown) | _modes(folder, result, shown)
     made |= {path.stem: path for path in draw_levels(folder, result.levels).values()}
     return made | curves(folder, shown)
 
@@ -117,6 +118,20 @@ def _scores(folder: Path, result: DiagnosisResult) -> dict[str, Path]:
         rows = {s.name: (s.value, s.median, s.low, s.high) for s in result.adequate.statistics}
         made["fit_test"] = plots.fit_test(folder / "fit_test.png", rows)
     return made
+
+
+def _modes(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
+    """Shapes of the updated deck that have a partner in the test."""
+    found = [r.after_hz for r in result.frequencies if r.after_hz][:_SHAPES]
+    if result.models is None or not found:
+        return {}
+    model = result.models.final.model
+    f = model.modes.frequency
+    at = [int(np.abs(f - one).argmin()) for one in found]
+    motion = np.asarray(model.structure.T @ model.modes.shapes[:, at])
+    motion = motion.reshape(len(shown.seen.points), 6, -1)[:, :3]
+    path, numbers = folder / "modes.png", [k + 1 for k in at]
+    return {"modes": scene.montage(path, shown.seen, motion, f[at], numbers)}
 
 
 def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:

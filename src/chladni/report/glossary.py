@@ -5,18 +5,17 @@ GLOSSARY = {
     "of 2 (rms).",
     "MAC": "Modal assurance criterion: squared cosine between two shapes at the sensors; 1: the "
     "same shape.",
-    "CoMAC": "The same over all paired modes at one sensor. One that is low may sit or point "
-    "elsewhere.",
-    "held out": "Sensors and bands that no fit saw. They judge: a wrong explanation does not "
-    "improve them.",
+    "CoMAC": "MAC at one sensor over all paired modes. One that is low may sit or point elsewhere.",
+    "held out": "Sensors and bands that were not fitted. They judge: a wrong explanation does "
+    "not improve them.",
     "log evidence": "Logarithm of the probability of the recording under an explanation, all its "
     "parameters averaged over. Free parameters that do not earn their keep lower it.",
     "Bayes factor": "The ratio of two such probabilities: how many times better one explanation "
-    "foretells the recording than another.",
+    "predicts the recording than another.",
     "95 % interval": "The value lies in it in 19 of 20 cases, if the explanation is right.",
     "damping": "Ratio ζ to critical damping; a peak is 1/2ζ times as high as the static response.",
     "drive point": "Where the force acts.",
-    "floor": "What the noise of the recording alone leaves.",
+    "floor": "Q that the noise of the recording alone leaves.",
     "off": "Deviation from the test.",
     "FRF": "Frequency response function: motion over force at every frequency.",
 }
@@ -29,7 +28,7 @@ _HEADS = {  # heads of tables and names of facts that hold a word of the glossar
 
 
 def meaning(head: str) -> str:
-    """What a head of a table or a fact means; "" where that is plain.
+    """Meaning of a head of a table or a fact; "" where that is plain.
 
     >>> meaning("MAC after") == GLOSSARY["MAC"], meaning("parameter")
     (True, '')

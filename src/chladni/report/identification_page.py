@@ -1,6 +1,7 @@
 """Identified modes as a page: the table, the stabilisation diagram, indicators, shapes, the fit."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,10 @@ from ..ema.shapes import driven_shapes, shape_spread, shapes
 from ..io.tables.write_modal import write_shape_table, write_state_space
 from ..io.tables.write_tables import write_levels, write_poles
 from ..workflows.identify import Identification, RecordingModes
-from .blocks import PageParts, Picture, Section, Table
+from . import live_pages as live
+from .blocks import Block, PageParts, Picture, Section, Table
 from .level_blocks import draw_levels, level_section
+from .live_pages import Page
 from .screening_blocks import SEVERAL, screening_section
 from .words import hertz, number
 
@@ -36,12 +39,13 @@ _AROUND = 4.0  # half bandwidths of a circle
 def identification_page(folder: Path, found: Identification) -> PageParts:
     """Sections of the page; its pictures and tables are written into the folder."""
     sections, files = [screening_section(*(r.screening for r in found.recordings))], []
+    page = Page()
     for k, r in enumerate(found.recordings):
         stem, name = "" if len(found.recordings) == 1 else f"_{k + 1}", r.recording.name
         write_poles(folder / f"poles{stem}.csv", r.poles)
         files.append((f"poles{stem}.csv", f"poles of {name}"))
         pictures = _pictures(folder, stem, r)
-        sections.append(Section(name, [_table(r), *pictures]))
+        sections.append(Section(name, [_table(r), *_live(page, stem, r, pictures)]))
         files += _modal_files(folder, stem, r)
         files += [(p.path.name, _FILES[p.path.stem.removesuffix(stem)]) for p in pictures]
     for k, study in enumerate(found.levels):
@@ -52,7 +56,7 @@ def identification_page(folder: Path, found: Identification) -> PageParts:
         drawn = draw_levels(folder, tables, stem)
         sections.insert(k, level_section(tables, drawn))
         files += [(path.name, "a mode over levels") for path in drawn.values()]
-    return PageParts(_lead(found.recordings), sections, found.notes, files)
+    return PageParts(_lead(found.recordings), sections, found.notes, files, page.drawings)
 
 
 def _modal_files(folder: Path, stem: str, r: RecordingModes) -> list[tuple[str, str]]:
@@ -146,6 +150,32 @@ def _pictures(folder: Path, stem: str, r: RecordingModes) -> list[Picture]:
         plots.mac_matrix(path["automac"], auto_mac(psi), labels, labels, "AutoMAC of the test [Hz]")
         blocks.append(Picture(path["automac"], "Off the diagonal: modes that look alike here."))
     return blocks
+
+
+def _live(page: Page, stem: str, r: RecordingModes, pictures: Sequence[Picture]) -> list[Block]:
+    """The pictures, some of them drawn by the page."""
+    frf = r.recording.frf
+    assert frf is not None
+    low, high = r.modes.band
+    test = frf.sel(band=(float(low), float(high)))
+    curves = {
+        "test": test,
+        "identified": replace(test, values=evaluate(r.whole, 2j * np.pi * test.frequency)),
+    }
+    shapes = driven_shapes(r.modes.sel(r.firm))
+    kept = r.modes.frequency[r.firm]
+
+    def block(picture: Picture) -> Block:
+        kind, still = picture.path.stem.removesuffix(stem), [picture]
+        if kind == "stabilisation":
+            return live.poles(page, kind + stem, r, still)
+        if kind == "fit":
+            return live.responses(page, kind + stem, curves, still)
+        if kind == "automac":
+            return live.likeness(page, kind + stem, auto_mac(shapes), kept, kept, "test", [], still)
+        return picture
+
+    return [block(picture) for picture in pictures]
 
 
 def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:

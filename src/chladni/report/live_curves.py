@@ -19,16 +19,17 @@ _LOG_STEP, _DEGREE = 1e-3, 1.0  # a thousandth of a decade; a degree
 
 def frf(shown: Shown) -> dict[str, Any]:
     """Magnitude and phase of every channel, of test and decks, and how far each is off."""
-    curves = dict(shown.curves)
-    test, held = curves["test"], set(shown.held_out)
+    curves, held = dict(shown.curves), set(shown.held_out)
+    test = curves.get("test", next(iter(curves.values())))
     channels = [(i, j) for j in range(len(test.inputs)) for i in range(len(test.outputs))]
     per_channel = _VALUES // len(curves)
     lines = thinned(test, max(_LINES, per_channel // len(channels)))
-    off = {name: _off(curve, test) for name, curve in curves.items() if name != "test"}
-    last = next((off[name] for name in ("after", "model", "before") if name in off), None)
+    off = {name: _off(curve, test) for name, curve in curves.items() if curve is not test}
+    last = list(off.values())[-1] if off else np.abs(test.values).max(axis=0)
     room = max(1, per_channel // len(lines))
-    if len(channels) > room and last is not None:  # the worst ones are looked for
-        channels = sorted(sorted(channels, key=lambda c: -last[c])[:room], key=lambda c: c[::-1])
+    if len(channels) > room:  # the worst ones are looked for, of one curve the largest
+        order = sorted(channels, key=lambda c: -last[c])
+        channels = sorted(order[:room], key=lambda c: c[::-1])
     return {
         "frequency": [float(f"{f:.7g}") for f in test.frequency[lines]],
         "channels": [
@@ -125,6 +126,6 @@ def ladder(rows: Sequence[FrequencyRow]) -> dict[str, Any]:
 
 
 def floors(fitted: Scores, held: Scores) -> dict[str, float]:
-    """What the noise of the recording alone leaves, where it is known."""
+    """Q of the noise of the recording alone, where it is known."""
     both = {"fitted": fitted.floor, "held out": held.floor}
     return {name: value for name, value in both.items() if value is not None}

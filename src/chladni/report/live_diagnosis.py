@@ -1,4 +1,4 @@
-"""What the page of a diagnosis draws itself."""
+"""Drawings of the page of a diagnosis."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,8 +22,8 @@ _FRF = (
 )
 _CAPTIONS = {
     "where": "Drag to turn, scroll to zoom, point at anything for its name.",
-    "left": "Where a small local change of stiffness or mass would still gain, and how much, with "
-    "what is named in place; grey: so blind is the test there that half of either could be gone.",
+    "left": "Gain of a small local change of stiffness or mass, with the named effects in place. "
+    "Grey: the test is blind there; half of either could be gone.",
     "shapes": "The test moves its sensors; the decks move all of the structure. Colour: share of "
     "the largest motion.",
     "mac": "Modal assurance criterion, test against model; framed: the pairs of the table.",

@@ -13,6 +13,7 @@ from ..updating.measured_modes import MeasuredModes
 from ..updating.result import FrequencyRow, LeftPlace
 from ..view.annotations import Marker
 from ..view.camera import best_view
+from ..view.paired_shapes import PairedShapes
 from ..view.surface import Surface
 from .drawings import rounded
 from .figures import CALM, Shown
@@ -133,6 +134,40 @@ def shapes(
             mode["test"]["motion"] = rounded(share, _THOUSANDTH)
         modes.append(mode)
     return {"modes": modes, "left_out": len(rows) - len(modes), "sensors": _markers(shown.outputs)}
+
+
+def model_shapes(
+    motion: np.ndarray, f: np.ndarray, numbers: Sequence[int], shown: Shown
+) -> dict[str, Any]:
+    """Modes (n, 3, r) of a model alone, with their numbers."""
+    used = shown.seen.without_joints().used
+    room = _SHAPE_VALUES // max(1, 3 * len(used))
+    modes = [
+        {"model": {"hz": float(f[k]), "number": int(number), "motion": _axes(motion[used, :, k])}}
+        for k, number in enumerate(numbers[:room])
+    ]
+    return {"modes": modes, "left_out": len(numbers) - len(modes), "sensors": []}
+
+
+def paired_shapes(found: PairedShapes, sensors: Sequence[str], shown: Shown) -> dict[str, Any]:
+    """Pairs of test and model."""
+    used = shown.seen.without_joints().used
+    room = _SHAPE_VALUES // max(1, 3 * len(used))
+    modes = []
+    for k in range(min(room, len(found.f_test))):
+        of_model = {"hz": float(found.f_model[k]), "mac": float(found.mac[k]),
+                    "motion": _axes(found.motion[used, :, k])}  # fmt: skip
+        of_test = {"hz": float(found.f_test[k]), "motion": rounded(found.test[:, k], _THOUSANDTH)}
+        modes.append({"test": of_test, "model": of_model})
+    at = zip(found.points.tolist(), found.directions.tolist(), sensors, strict=True)
+    places = [{"at": point, "along": along, "label": label} for point, along, label in at]
+    return {"modes": modes, "left_out": len(found.f_test) - len(modes), "sensors": places}
+
+
+def _axes(motion: np.ndarray) -> list[Any]:
+    """Motion (n, 3) of largest 1, by axis."""
+    largest = max(float(np.linalg.norm(motion, axis=1).max(initial=0.0)), 1e-300)
+    return [rounded(axis, _THOUSANDTH) for axis in motion.T / largest]
 
 
 def _motions(

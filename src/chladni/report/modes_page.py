@@ -7,6 +7,7 @@ import numpy as np
 from ..workflows.loaded_model import Model
 from ..workflows.modes import NormalModes
 from .blocks import Facts, PageParts, Picture, Section, Table
+from .live_pages import Page, mesh_of, mode_shapes
 from .words import hertz, number
 
 _SHOWN = 12  # modes in the picture
@@ -27,7 +28,11 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
     shown = elastic[:_SHOWN] if len(elastic) else np.arange(min(_SHOWN, len(modal)))
     numbers = [int(k) + 1 for k in shown]
     montage(folder / "modes.png", model.seen, motion[:, :, shown], f[shown], numbers=numbers)
-    shapes = Picture(folder / "modes.png", "Colour: displacement, 0 to its largest.")
+    still = Picture(folder / "modes.png", "Colour: displacement, 0 to its largest.")
+    page, whole = Page(), mesh_of(model.seen, model.assembly)
+    every = elastic if len(elastic) else shown
+    order = [int(k) + 1 for k in every]
+    shapes = mode_shapes(page, whole, motion[:, :, every], f[every], order, [still])
     kg = "kg" if found.in_si else "deck units"
     lead = (
         f"{len(f)} modes from {number(f[0])} to {number(f[-1])} Hz; "
@@ -35,8 +40,8 @@ def modes_page(folder: Path, model: Model, found: NormalModes) -> PageParts:
     )
     files = [("modes.vtu", "shapes for ParaView"), *other]
     files.append(("modes.png", "the first elastic modes"))
-    sections = [Section("Mode shapes", [shapes]), Section("Modes", _tables(found, kg))]
-    return PageParts(lead, sections, (*found.notes, *notes), files)
+    sections = [Section("Mode shapes", list(shapes)), Section("Modes", _tables(found, kg))]
+    return PageParts(lead, sections, (*found.notes, *notes), files, page.drawings)
 
 
 def _universal(

@@ -195,5 +195,5 @@ def _weigh(result: DiagnosisResult) -> list[str]:
         return []
     return [
         "Weigh the structure as it was tested, and write mass and mass_sd under [test]: without "
-        "it mass and stiffness are told apart by their pattern alone."
+        "it only their patterns distinguish mass from stiffness."
     ]

@@ -44,13 +44,26 @@ def write_page(
     command : str      the line that makes this run again
     drawings : Drawings    what the page draws itself; its pictures stand for it on paper
     """
+    text = diagnosis_page(result, figures, notes, tables, command, title, drawings)
+    return write_text(Path(folder) / "report.html", text)
+
+
+def diagnosis_page(
+    result: DiagnosisResult,
+    figures: Mapping[str, Path | str] | None = None,
+    notes: Sequence[str] = (),
+    tables: Sequence[Section] = (),
+    command: str = "",
+    title: str = "",
+    drawings: Drawings | None = None,
+) -> str:
+    """The page of a diagnosis as text, its parameters those of :func:`write_page`."""
     shown = {name: Path(path) for name, path in (figures or {}).items()}
     drawings = drawings or Drawings()
     hero: Block | None = Picture(shown["where"]) if "where" in shown else None
     if "where" in drawings.by_name:
         hero = live("where", drawings.by_name["where"], shown)
-    return write_sections(
-        Path(folder) / "report.html",
+    return _page(
         title or "Diagnosis",
         sections(result, shown, notes, tables, command, drawings),
         lead=sentence(result),
@@ -69,20 +82,28 @@ def write_sections(
     body: Sequence[Section],
     *,
     lead: str = "",
+    drawings: Drawings | None = None,
+) -> Path:
+    """Write one page of titled sections; the page of every command but the diagnosis.
+
+    ``drawings`` holds the numbers of the ``Live`` blocks.
+    """
+    return write_text(path, _page(title, body, lead=lead, drawings=drawings))
+
+
+def _page(
+    title: str,
+    body: Sequence[Section],
+    *,
+    lead: str,
     badge: str = "",
     tone: str = "neutral",
     hero: Block | None = None,
     facts: Sequence[tuple[str, str]] = (),
     steps: Sequence[str] = (),
     drawings: Drawings | None = None,
-) -> Path:
-    """Write one page of titled sections; the page of every command but the diagnosis.
-
-    Parameters
-    ----------
-    hero, facts, steps : picture, numbers and next steps of the first screen
-    drawings : the numbers of the ``Live`` blocks
-    """
+) -> str:
+    """HTML; hero, facts and steps are picture, numbers and next steps of the first screen."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -95,7 +116,7 @@ def write_sections(
     environment.filters["beside"] = lambda name: "./" + quote(str(name))
     environment.filters["meaning"] = meaning
     drawn = drawings is not None and drawings.by_name
-    html = environment.get_template("page.html").render(
+    return environment.get_template("page.html").render(
         title=title,
         lead=lead,
         badge=badge,
@@ -103,12 +124,12 @@ def write_sections(
         hero=hero,
         first=Facts(facts),
         steps=steps,
-        numbers=drawings.packed() if drawings is not None and drawn else "",
+        numbers=drawings.packed() if drawings is not None and drawn else [],
+        places={name: k for k, name in enumerate(drawings.by_name)} if drawings else {},
         library=library() if drawn else "",
         sections=[s for s in body if s.blocks],
         made=made_with(),
     )
-    return write_text(path, html)
 
 
 def made_with() -> str:

@@ -1,5 +1,6 @@
 """A plan as a page: pictures of the layout and of what it sees, tables, sentences."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,10 @@ from ..planning.whole_plan import Plan, motion
 from ..view import annotations, plots, scene
 from ..view.surface import Surface
 from ..workflows.loaded_model import Model
-from .blocks import Facts, Items, PageParts, Picture, Section, Table, Text
+from . import live_pages as live
+from .blocks import Block, Facts, Items, PageParts, Picture, Section, Table, Text
+from .figures import Shown
+from .live_pages import Page, mesh_of
 from .words import direction, hertz, number, rounded
 
 PICTURES = {
@@ -36,9 +40,10 @@ def plan_page(folder: Path, model: Model, found: Plan) -> PageParts:
     """Sections of the page; its pictures and the table of sensors are written into the folder."""
     write_text(folder / "sensors.csv", sensors_csv(found))
     result = summary(found)
-    body = sections(found, result, model.seen, model.structure, folder)
+    page, shown = Page(), mesh_of(model.seen, model.assembly)
+    body = sections(found, result, shown, model.structure, page, folder)
     files = [("sensors.csv", "sensors and shakers, for case.toml"), *PICTURES.items()]
-    return PageParts(lead(result), body, notes(found), files)
+    return PageParts(lead(result), body, notes(found), files, page.drawings)
 
 
 def lead(result: PlanSummary) -> str:
@@ -137,23 +142,26 @@ def _rattle_notes(found: Plan) -> list[str]:
 
 
 def sections(
-    found: Plan, result: PlanSummary, seen: Surface, built: Structure, folder: Path
+    found: Plan, result: PlanSummary, shown: Shown, built: Structure, page: Page, folder: Path
 ) -> list[Section]:
     """The page; its pictures (:data:`PICTURES`) are written into the folder."""
     return [
-        Section("Sensors", _sensors(found, result, seen, folder / "sensors.png")),
-        Section("Modes", _modes(found, result, seen, built, folder)),
-        Section("Shaker and cords", _shaker(found, result, seen, folder / "shaker.png")),
+        Section("Sensors", _sensors(found, result, shown, page, folder / "sensors.png")),
+        Section("Modes", _modes(found, result, shown, built, page, folder)),
+        Section("Shaker and cords", _shaker(found, result, shown.seen, folder / "shaker.png")),
         Section("Lines and duration", [Text([_test(result.test)])]),
     ]
 
 
-def _sensors(
-    found: Plan, result: PlanSummary, seen: Surface, path: Path
-) -> list[Picture | Table | Facts | Items]:
+def _sensors(found: Plan, result: PlanSummary, shown: Shown, page: Page, path: Path) -> list[Block]:
+    seen = shown.seen
     outputs = [_marker(s.at, str(s.rank)) for s in result.sensors]
     shakers = [_marker(at, "shaker") for at in result.actuators_together]
-    picture = scene.sensors(path, seen, outputs, shakers)
+    still = Picture(
+        scene.sensors(path, seen, outputs, shakers), "Sensors by rank (blue), shaker (orange)."
+    )
+    cords = [_hanger(found, int(g)) for g in result.hangers]
+    placed = replace(shown, outputs=outputs, inputs=shakers, cords=cords)
     rows = [
         (str(s.rank), s.at.label, *_where(s.at), direction(s.at.direction.tolist()), s.at.mounted)
         for s in result.sensors
@@ -171,7 +179,7 @@ def _sensors(
         for m in result.moves
     ]
     return [
-        Picture(picture, "Sensors by rank (blue), shaker (orange)."),
+        *live.layout(page, "where", placed, [still]),
         table,
         Facts([(f"log det, {name}", number(value)) for name, value in found.log_det.items()]),
         Items(moves or ["No sensor had to move for a mode to be seen."]),
@@ -193,8 +201,8 @@ def _arrow(point: np.ndarray, direction: np.ndarray, text: str) -> annotations.M
 
 
 def _modes(
-    found: Plan, result: PlanSummary, seen: Surface, built: Structure, folder: Path
-) -> list[Table | Picture]:
+    found: Plan, result: PlanSummary, shown: Shown, built: Structure, page: Page, folder: Path
+) -> list[Block]:
     shift = found.loaded / found.modal.frequency - 1
     rows = [
         (
@@ -222,15 +230,18 @@ def _modes(
     )
     names = [str(m.mode) for m in result.modes]
     mac = plots.mac_matrix(folder / "auto_mac.png", found.auto_mac, names, names, "AutoMAC")
-    least = _least_seen(found, seen, built, folder / "modes.png")
-    return [table, Picture(least, "Those the sensors see least."), Picture(mac), steps]
-
-
-def _least_seen(found: Plan, seen: Surface, built: Structure, path: Path) -> Path:
     faint = np.sort(np.argsort(found.visible, kind="stable")[:12])
-    shown = found.modal.sel(faint)
+    modal, moved = found.modal.sel(faint), motion(built, found.modal.sel(faint))
     numbers = [found.first + 1 + int(k) for k in faint]
-    return scene.montage(path, seen, motion(built, shown), shown.frequency, numbers=numbers)
+    drawn = scene.montage(folder / "modes.png", shown.seen, moved, modal.frequency, numbers)
+    least = [Picture(drawn, "Those the sensors see least.")]
+    f, stills = found.modal.frequency, [Picture(mac, "AutoMAC at the sensors.")]
+    return [
+        table,
+        *live.mode_shapes(page, shown, moved, modal.frequency, numbers, least),
+        live.likeness(page, "mac", found.auto_mac, f, f, "model", [], stills),
+        steps,
+    ]
 
 
 def _shaker(

@@ -17,6 +17,7 @@ _SHOWN = 12  # pictures
 def response_page(folder: Path, found: FRF) -> PageParts:
     """Sections of the page; its pictures are written into the folder."""
     from ..view import plots
+    from .live_pages import Page, responses
 
     unit = _unit(found)
     peak = np.abs(found.values).max(axis=0)
@@ -46,7 +47,9 @@ def response_page(folder: Path, found: FRF) -> PageParts:
     f, count = found.frequency, len(found.outputs) * len(found.inputs)
     lead = f"{count} {found.quantity} functions from {number(f[0])} to {number(f[-1])} Hz."
     table = Table(heads, rows, ("output", "input"))
-    return PageParts(lead, [Section("Responses", [*pictures, table])], notes, files)
+    page = Page()
+    live = responses(page, "frf", {"model": found}, pictures)
+    return PageParts(lead, [Section("Responses", [live, table])], notes, files, page.drawings)
 
 
 def _unit(found: FRF) -> str:

@@ -177,7 +177,7 @@ def sections(
 
 
 def _glance(result: DiagnosisResult) -> list[Block]:
-    """Numbers beside the three of the first screen."""
+    """Numbers in addition to the three of the first screen."""
     facts, fit = [], (result.agreement or Agreement()).fitted
     if fit.nominal is not None and fit.after is not None:
         change = percent(fit.after, fit.nominal)

@@ -19,7 +19,7 @@ _LEAST = 0.02  # of its lowest: modes below are rigid motions
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModes:
-    """What was identified of each mode, or given as a table.
+    """Frequency, damping and shape of each mode, identified or given as a table.
 
     Attributes
     ----------

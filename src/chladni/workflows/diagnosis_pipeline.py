@@ -250,7 +250,7 @@ def _unseen(prepared: Prepared) -> tuple[str, ...]:
 def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, FRF]:
     """The recording and the responses of the deck before and after, over all that was compared.
 
-    The decks' modes have the damping of their partners in the test: a default one would make their
+    Each mode of a deck has the damping of its partner in the test. The default damping would make
     peaks too low or too high, which is no error of the deck.
     """
     if not case.frfs:

@@ -11,6 +11,7 @@ from chladni.io.nastran import (
     SetColumns,
     SetField,
     assembly,
+    changed_lines,
     read_deck,
     write_deck,
 )
@@ -21,7 +22,7 @@ from .conftest import ANCHORS, PLATE, real_decks
 CASE = "SOL 103\nCEND\nMETHOD = 1\n"
 
 
-def changed_lines(before, after):
+def differing(before, after):
     """(lines gone, lines new) as multisets, kept in order."""
     old, new = before.read_text().splitlines(), after.read_text().splitlines()
     gone, fresh = list(old), []
@@ -36,7 +37,22 @@ def changed_lines(before, after):
 def rewritten(deck, *changes, name="new.bdf"):
     """The deck written with changes and read again, and the lines that differ."""
     path = write_deck(deck, deck.path.parent / "out" / name, changes)
-    return read_deck(path), changed_lines(deck.path, path)
+    return read_deck(path), differing(deck.path, path)
+
+
+def test_the_lines_that_change_are_those_that_are_written(bulk):
+    """In an edit, a card that goes, one that is added: what a page shows is what the deck has."""
+    deck = bulk(PLATE, before=CASE)
+    changes = [
+        SetField("PSHELL", 101, "T", 1.25),
+        Add((("CONM2", 900, 1, 0, 0.5),), "put in"),
+    ]
+    _, (gone, fresh) = rewritten(deck, *changes)
+    said = changed_lines(deck, changes)
+    assert sorted(line[2:] for line in said if line[0] == "-") == sorted(gone)
+    assert sorted(line[2:] for line in said if line[0] == "+") == sorted(fresh)
+    assert said[0].startswith(f"@ {deck.path.name}, line ")
+    assert changed_lines(deck, []) == []
 
 
 def test_nothing_changed_is_the_same_bytes(bulk):

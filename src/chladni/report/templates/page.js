@@ -7,10 +7,10 @@ const wrapped = (text) => said(text).replace(/(.{60}\S*)\s/g, "$1<br>");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 const hertz = (f) => (f == null ? "–" : f.toFixed(2) + " Hz");
 const scaled = (values, step) => values.map((v) => (v == null ? null : v * step));
-const CURVE = { test: "ink", before: "before", after: "after", model: "after" };
+const CURVE = { test: "ink", before: "before", after: "after", model: "after", identified: "after" };
 
-async function unpacked(id) {
-  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+async function unpacked(script) {
+  const bytes = Uint8Array.from(atob(script.textContent), (c) => c.charCodeAt(0));
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
 }
 
@@ -69,7 +69,7 @@ function sheet(mesh, [x, y, z], more, kept) {
   return {
     type: "mesh3d", x, y, z, i: some("i"), j: some("j"), k: some("k"), color: colour("steel"), flatshading: true,
     hoverinfo: "text", hovertext: mesh.ids.map((id) => "grid " + id), showlegend: false,
-    lighting: { ambient: more.intensity ? 1 : 0.65, diffuse: more.intensity ? 0 : 0.55, specular: 0.05, roughness: 0.9, facenormalsepsilon: 0 }, ...more,
+    lighting: { ambient: more.intensity ? 1 : 0.85, diffuse: more.intensity ? 0 : 0.3, specular: 0.05, roughness: 0.9, facenormalsepsilon: 0 }, ...more,
   };
 }
 
@@ -163,20 +163,22 @@ function remainder(at, data, shared) {
 
 function shapes(at, data, shared, box) {
   const mesh = shared.mesh, decks = Object.keys(data.modes[0]).concat("before", "after").filter((name, k, all) => name !== "test" && all.indexOf(name) === k && data.modes.some((m) => m[name]));
-  const sensed = data.modes.some((m) => m.test.motion);
+  const sensed = data.modes.some((m) => m.test?.motion), own = (m) => m.test ?? m[decks[0]];
   const state = { mode: 0, left: sensed ? "test" : decks[0], right: decks[decks.length - 1], size: 0.08, run: !matchMedia("(prefers-reduced-motion: reduce)").matches };
   const title = (m, name) => {
     const one = m[name];
     if (!one) return `${name}: no partner`;
     return `${name} ${hertz(one.hz)}` + (one.damping != null ? `, damping ${(100 * one.damping).toFixed(2)} %` : "") + (one.mac != null ? `, MAC ${one.mac.toFixed(3)}` : "");
   };
-  const names = (sensed ? ["test"] : []).concat(decks).map((n) => [n, n === "test" ? "test" : "deck " + n]);
-  const list = choice(box, "mode", data.modes.map((m, k) => [k, `${k + 1}: ${hertz(m.test.hz)}`]), (v) => show({ mode: Number(v) }));
+  const names = (sensed ? ["test"] : []).concat(decks).map((n) => [n, ["test", "model"].includes(n) ? n : "deck " + n]), both = names.length > 1;
+  const list = choice(box, "mode", data.modes.map((m, k) => [k, `${own(m).number ?? k + 1}: ${hertz(own(m).hz)}`]), (v) => show({ mode: Number(v) }));
   const step = (by) => show({ mode: (list.value = (state.mode + by + data.modes.length) % data.modes.length) });
   button(box, "previous", () => step(-1));
   button(box, "next", () => step(1));
-  choice(box, "left", names, (v) => show({ left: v })).value = state.left;
-  choice(box, "right", names, (v) => show({ right: v })).value = state.right;
+  if (both) {
+    choice(box, "left", names, (v) => show({ left: v })).value = state.left;
+    choice(box, "right", names, (v) => show({ right: v })).value = state.right;
+  }
   choice(box, "amplitude", [[0.03, "small"], [0.08, "medium"], [0.2, "large"]], (v) => show({ size: Number(v) })).value = state.size;
   const stop = button(box, "", () => { state.run = !state.run; label(); tick(); });
   const label = () => { stop.textContent = state.run ? "stop" : "play"; stop.setAttribute("aria-pressed", state.run); };
@@ -206,14 +208,15 @@ function shapes(at, data, shared, box) {
     return [{ ...surface, scene }, { ...lines(second, 3, "ink"), scene }];
   }
   const narrow = at.clientWidth < 600;
+  if (!both) at.style.height = "26rem";
   async function show(change) {
     Object.assign(state, change);
     const m = data.modes[state.mode];
     const note = (text, x, y) => ({ text: said(text), x, y, xref: "paper", yref: "paper", showarrow: false, xanchor: "left", yanchor: "top" });
-    const [one, two] = narrow ? [{ y: [0.52, 1] }, { y: [0, 0.48] }] : [{ x: [0, 0.5] }, { x: [0.5, 1] }];
-    await draw(at, [...traces(state.left, "scene"), ...traces(state.right, "scene2")], {
-      scene: space(at, mesh, "scene", one), scene2: space(at, mesh, "scene2", two), margin: { l: 0, r: 0, t: 0, b: 0 },
-      annotations: [note(title(m, state.left), 0.01, 1), note(title(m, state.right), narrow ? 0.01 : 0.51, narrow ? 0.48 : 1)],
+    const [one, two] = !both ? [{}] : narrow ? [{ y: [0.52, 1] }, { y: [0, 0.48] }] : [{ x: [0, 0.5] }, { x: [0.5, 1] }];
+    await draw(at, [...traces(state.left, "scene"), ...(both ? traces(state.right, "scene2") : [])], {
+      scene: space(at, mesh, "scene", one), ...(both && { scene2: space(at, mesh, "scene2", two) }), margin: { l: 0, r: 0, t: 0, b: 0 },
+      annotations: [note(title(m, state.left), 0.01, 1), ...(both ? [note(title(m, state.right), narrow ? 0.01 : 0.51, narrow ? 0.48 : 1)] : [])],
     });
     label();
   }
@@ -225,8 +228,8 @@ function shapes(at, data, shared, box) {
     busy = true;
     const phase = Math.sin((performance.now() - start) / 250);
     const left = side(state.left, phase), right = side(state.right, phase), first = state.left === "test" ? 4 : 2;
-    const moved = [...left, ...right], of = (axis) => moved.map((p) => p[axis]);
-    await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, [0, 1, first, first + 1]);
+    const moved = both ? [...left, ...right] : left, of = (axis) => moved.map((p) => p[axis]);
+    await Plotly.restyle(at, { x: of("x"), y: of("y"), z: of("z") }, [0, 1, first, first + 1].slice(0, moved.length));
     at.dataset.frames = Number(at.dataset.frames || 0) + 1;
     busy = false;
     timer = setTimeout(tick, 30);
@@ -234,7 +237,7 @@ function shapes(at, data, shared, box) {
   at.redraw = () => show({});
   document.addEventListener("visibilitychange", tick);
   new IntersectionObserver(([seen]) => { inView = seen.isIntersecting; tick(); }).observe(at);
-  return show({}).then(() => { at.on("plotly_relayout", (to) => turned(at, to)); tick(); });
+  return show({}).then(() => { if (both) at.on("plotly_relayout", (to) => turned(at, to)); tick(); });
 }
 
 function turned(at, to) {  // both sides are seen from the same place
@@ -258,7 +261,7 @@ function responses(at, data, shared, box) {
   button(box, "previous", () => step(-1));
   button(box, "next", () => step(1));
   const last = names[names.length - 1];
-  if (last !== "test") button(box, "worst", () => show((list.value = data.channels.reduce((w, c, k, all) => (c.off[last] > all[w].off[last] ? k : w), 0))));
+  if (names.length > 1) button(box, "worst", () => show((list.value = data.channels.reduce((w, c, k, all) => (c.off[last] > all[w].off[last] ? k : w), 0))));
   const [low, high] = [data.frequency[0], data.frequency[data.frequency.length - 1]];
   const inside = ([a, b]) => [Math.max(a, low), Math.min(b, high)];
   function grey() {
@@ -291,11 +294,36 @@ function assurance(at, data) {
     const tip = value.map((row, i) => row.map((v, j) => `test ${hertz(data.test[i])}<br>${name} ${hertz(map.model[j])}<br>MAC ${v.toFixed(3)}`));
     const ticks = (f) => ({ tickvals: f.map((_, i) => i), ticktext: f.map((v) => v.toFixed(1)), tickfont: { size: 10 }, showgrid: false, zeroline: false });
     traces.push({ type: "heatmap", z: value, zmin: 0, zmax: 1, colorscale: "Viridis", showscale: k === 0, colorbar: { thickness: 10 }, text: tip, hoverinfo: "text", xaxis: "x" + n, yaxis: "y" + n });
-    more["xaxis" + n] = { ...ticks(map.model), domain: narrow ? [0, 1] : share, anchor: "y" + n, tickangle: -60, title: { text: `deck ${name} [Hz]` } };
+    more["xaxis" + n] = { ...ticks(map.model), domain: narrow ? [0, 1] : share, anchor: "y" + n, tickangle: -60, title: { text: ["test", "model"].includes(name) ? `${name} [Hz]` : `deck ${name} [Hz]` } };
     more["yaxis" + n] = { ...ticks(data.test), domain: narrow ? down : [0, 1], anchor: "x" + n, autorange: "reversed", title: { text: "test [Hz]" } };
     for (const [i, j] of map.pairs) more.shapes.push({ type: "rect", xref: "x" + n, yref: "y" + n, x0: j - 0.5, x1: j + 0.5, y0: i - 0.5, y1: i + 0.5, line: { color: "#ff5a36", width: 2 } });
   });
   return draw(at, traces, more);
+}
+
+function poles(at, data, shared, box) {
+  const TINTS = { o: "line", f: "soft", d: "soft", v: "neutral", s: "calm" }, picked = new Set();
+  const list = document.createElement("code");
+  const say = () => { list.textContent = picked.size ? "chladni identify ... " + [...picked].map((f) => `--pick ${f}`).join(" ") : "click a pole to pick it"; };
+  const show = () => {
+    const traces = Object.entries(data.kinds).map(([kind, name]) => {
+      const of = data.kind.flatMap((k, n) => (k === kind ? [n] : [])), some = (values) => of.map((n) => values[n]);
+      return { type: "scatter", mode: "markers", name, x: some(data.frequency), y: some(data.states), marker: { color: colour(TINTS[kind]), size: kind === "s" ? 7 : 5 },
+        text: of.map((n) => `${hertz(data.frequency[n])}, damping ${data.damping[n]} %<br>${data.states[n]} states, ${name}`), hoverinfo: "text" };
+    });
+    traces.push({ type: "scatter", mode: "lines", name: "rms of |H|", x: data.curve[0], y: data.curve[1], yaxis: "y2", line: { color: colour("steel"), width: 1 }, hoverinfo: "skip" });
+    const line = (dash) => (f) => ({ type: "line", x0: f, x1: f, yref: "paper", y0: 0, y1: 1, line: { color: colour("before"), width: 1, dash } });
+    return draw(at, traces, { shapes: [...data.kept.map(line("solid")), ...data.struck.map(line("dot"))], xaxis: { title: { text: "frequency [Hz]" } },
+      yaxis: { title: { text: "states" } }, yaxis2: { type: "log", overlaying: "y", side: "right", showgrid: false, showticklabels: false } });
+  };
+  box.append(list);
+  say();
+  at.redraw = show;
+  return show().then(() => at.on("plotly_click", ({ points: [p] }) => {
+    const f = String(p.x);
+    if (!picked.delete(f)) picked.add(f);
+    say();
+  }));
 }
 
 function steps(at, data) {
@@ -346,20 +374,20 @@ function sortable(table) {
 
 // ---- all of it
 
-const DRAWN = { structure, remainder, shapes, responses, assurance, steps, odds, ladder };
+const DRAWN = { structure, remainder, shapes, responses, assurance, poles, steps, odds, ladder };
 const SPATIAL = ["structure", "remainder", "shapes"];
 
 async function begin() {
   document.querySelectorAll("table").forEach(sortable);
   const figures = [...document.querySelectorAll(".live")];
   if (!figures.length || !window.DecompressionStream) return;
-  const { shared, drawings } = JSON.parse(await unpacked("numbers"));
+  const [common, ...words] = document.querySelectorAll(".numbers"), shared = JSON.parse(await unpacked(common));
   const script = document.createElement("script");
-  script.textContent = await unpacked("library");
+  script.textContent = await unpacked(document.getElementById("library"));
   document.head.append(script);
   const turns = !!document.createElement("canvas").getContext("webgl");
   async function start(figure) {
-    const { draw: name, data } = drawings[figure.dataset.name], at = figure.querySelector(".plot");
+    const { draw: name, data } = JSON.parse(await unpacked(words[figure.dataset.word])), at = figure.querySelector(".plot");
     if (SPATIAL.includes(name) && !turns) return;
     figure.classList.add("drawn");
     try {
