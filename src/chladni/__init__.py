@@ -46,6 +46,9 @@ from .workflows.other_modes import other_modes as other_modes
 from .workflows.calibrate import calibrate as calibrate
 from .workflows.diagnose import diagnose as diagnose
 from .studies.parameter_study import study as study
+from .report.notebook import shown_in_notebooks as _shown_in_notebooks
+
+_shown_in_notebooks()
 
 __all__ = [
     "FRF",

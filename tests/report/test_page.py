@@ -4,6 +4,7 @@ import copy
 import json
 import re
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 
 import pytest
@@ -112,6 +113,17 @@ def test_text_of_decks_and_recordings_is_escaped(tmp_path):
     assert tags.seen.count("script") == 1  # that of the page
     assert text.count("&lt;script&gt;") >= 14
     assert all(link.startswith(("./", "#part-")) for link in tags.links)
+
+
+def test_a_notebook_shows_the_page_in_a_frame_that_runs_nothing():
+    """The names of a deck stay text: escaped for the page, and the page for its attribute."""
+    html, tags = RESULT._repr_html_(), Tags()
+    tags.feed(html)
+    assert tags.seen == ["iframe"]
+    assert 'sandbox=""' in html
+    page = unescape(html[html.index('srcdoc="') + 8 :].split('"', 1)[0])
+    assert sentence(RESULT).split(",")[0].split("<")[0] in page
+    assert EVIL not in page
 
 
 def test_page_is_self_contained(tmp_path):
