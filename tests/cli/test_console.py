@@ -87,6 +87,19 @@ def test_verbose_and_log_tell_the_stages_and_what_was_said(deck, tmp_path):
     assert refused.stderr.strip() in log.read_text()  # the log goes on, and holds the sentence
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_a_page_is_opened_only_where_that_is_asked_for(deck, tmp_path, monkeypatch, there):
+    """The page in its place, not in the scratch folder; without a browser a note says so."""
+    opened, out = [], tmp_path / "out"
+    monkeypatch.setattr("webbrowser.open", lambda uri: opened.append(uri) or there)
+    assert call("modes", deck, "--out", out).exit_code == 0
+    assert opened == []
+    done = call("modes", deck, "--out", out, "--open")
+    assert done.exit_code == 0
+    assert opened == [(out / "report.html").as_uri()]
+    assert ("no browser could open" in done.stderr) != there
+
+
 @pytest.mark.parametrize(
     ("words", "said", "more"),
     [

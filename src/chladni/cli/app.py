@@ -51,6 +51,7 @@ _EVERY = {  # options that every command takes
         typer.Option("--log", help="Append all that is said and done to a file.", metavar="FILE"),
         None,
     ),
+    "open_page": (bool, typer.Option("--open", help="Open the page in the browser."), False),
 }  # fmt: skip
 _UsageError: type[Any] = typer.BadParameter.__mro__[1]  # of the click that this typer brings
 
@@ -131,11 +132,12 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def inner(
-        *args: object, verbose: bool = False, log: Path | None = None, **options: object
-    ) -> None:
+        *args: object, verbose: bool = False, log: Path | None = None, open_page: bool = False,
+        **options: object,
+    ) -> None:  # fmt: skip
         code = DONE
         try:
-            with opened_console(verbose, log), _ending():
+            with opened_console(verbose, log, open_page), _ending():
                 code = _run(lambda: command(*args, **_finite(options)))
         except ChladniError as error:  # the log itself
             code = _said(error, AT_FAULT)

@@ -36,10 +36,12 @@ class Console:
     ----------
     verbose : every stage, note and warning on standard error
     log : the same and all that was said, with the time, in a file
+    shows : whether a page that was written is opened in the browser
     """
 
     verbose: bool = False
     log: IO[str] | None = None
+    shows: bool = False
     begun: float = field(default_factory=time.monotonic)
 
     def aside(self, text: str) -> None:
@@ -69,7 +71,9 @@ _used: list[Console] = [Console()]  # the last one speaks
 
 
 @contextmanager
-def opened_console(verbose: bool = False, log: Path | None = None) -> Iterator[Console]:
+def opened_console(
+    verbose: bool = False, log: Path | None = None, shows: bool = False
+) -> Iterator[Console]:
     """The console of a command; warnings of libraries go aside.
 
     Raises
@@ -78,7 +82,7 @@ def opened_console(verbose: bool = False, log: Path | None = None) -> Iterator[C
         If the log cannot be written.
     """
     file = None if log is None else _opened_log(log)
-    one = Console(verbose, file)
+    one = Console(verbose, file, shows)
     _used.append(one)
     try:
         with warnings.catch_warnings():
@@ -119,6 +123,15 @@ def say(text: str, error: bool = False) -> None:
     """A line on standard output or standard error, and in the log."""
     console().logged(text)
     _echo(text, error)
+
+
+def say_results(place: Path) -> None:
+    """Where the results are, or their page, which is opened if that was asked for."""
+    import webbrowser
+
+    say(f"results in {place}")
+    if console().shows and not (place.is_file() and webbrowser.open(place.resolve().as_uri())):
+        say(f"note: no browser could open {place}", error=True)
 
 
 def _echo(text: str, error: bool) -> None:

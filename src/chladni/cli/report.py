@@ -10,7 +10,7 @@ from ..report.blocks import Links, Section
 from ..report.diagnosis_json import read_diagnosis
 from ..report.drawings import drawings_of
 from ..report.page import write_page
-from .console import say
+from .console import say_results
 from .run import folder_named
 
 
@@ -33,4 +33,4 @@ def run(
         with run_folder(out, "report", [folder / "diagnosis.json"]) as part:
             write_page(part, result, figures, result.notes, tables, title=title, drawings=old)
         page = out / "report.html"
-    say(f"results in {page}")
+    say_results(page)

@@ -20,7 +20,7 @@ from ..report.drawings import Drawings
 from ..report.page import write_sections
 from ..workflows.diagnosis_result import DiagnosisResult
 from ..workflows.loaded_model import is_case
-from .console import console, say, say_table, watched
+from .console import console, say, say_results, say_table, watched
 
 
 def folder_named(text: str) -> Path:
@@ -148,7 +148,7 @@ def started(
         if run.sections:
             run.page()
     page = place / "report.html"
-    say(f"results in {page if page.exists() else place}")
+    say_results(page if page.exists() else place)
 
 
 def say_sections(lead: str, sections: Sequence[Section]) -> None:
