@@ -55,7 +55,7 @@ function layout(more) {
 }
 
 const draw = (at, traces, more) =>
-  Plotly.react(at, traces, layout(more), { responsive: true, displaylogo: false, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] });
+  Plotly.react(at, traces, layout(more), { responsive: true, displaylogo: false, displayModeBar: at.clientWidth > 600, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] });
 
 // ---- the mesh
 
@@ -213,7 +213,7 @@ function shapes(at, data, shared, box) {
     Object.assign(state, change);
     const m = data.modes[state.mode];
     const note = (text, x, y) => ({ text: said(text), x, y, xref: "paper", yref: "paper", showarrow: false, xanchor: "left", yanchor: "top" });
-    const [one, two] = !both ? [{}] : narrow ? [{ y: [0.52, 1] }, { y: [0, 0.48] }] : [{ x: [0, 0.5] }, { x: [0.5, 1] }];
+    const [one, two] = !both ? [{}] : narrow ? [{ x: [0, 1], y: [0.52, 1] }, { x: [0, 1], y: [0, 0.48] }] : [{ x: [0, 0.5], y: [0, 1] }, { x: [0.5, 1], y: [0, 1] }];
     await draw(at, [...traces(state.left, "scene"), ...(both ? traces(state.right, "scene2") : [])], {
       scene: space(at, mesh, "scene", one), ...(both && { scene2: space(at, mesh, "scene2", two) }), margin: { l: 0, r: 0, t: 0, b: 0 },
       annotations: [note(title(m, state.left), 0.01, 1), ...(both ? [note(title(m, state.right), narrow ? 0.01 : 0.51, narrow ? 0.48 : 1)] : [])],
@@ -278,9 +278,9 @@ function responses(at, data, shared, box) {
       traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, x: data.frequency, y: level.map((v) => (v == null ? null : 10 ** (v / 1000))), line, hovertemplate: `${name} %{y:.3g}<extra></extra>` });
       traces.push({ type: "scatter", mode: "lines", name, legendgroup: name, showlegend: false, x: data.frequency, y: cut, yaxis: "y2", line, hovertemplate: `${name} %{y}°<extra></extra>` });
     }
-    return draw(at, traces, { title: { text: said(text(c)), font: { size: 13 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", shapes: grey(), uirevision: "kept",
+    return draw(at, traces, { title: { text: said(text(c)), font: { size: at.clientWidth > 600 ? 13 : 10 } }, margin: { l: 60, r: 15, t: 40, b: 45 }, hovermode: "x unified", shapes: grey(), uirevision: "kept",
       xaxis: { title: { text: "frequency [Hz]" }, anchor: "y2", hoverformat: ".2f" }, yaxis: { type: "log", domain: [0.33, 1], exponentformat: "power", title: { text: said(`${data.quantity} [${data.unit}]`) } },
-      yaxis2: { domain: [0, 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } });
+      yaxis2: { domain: [0, 0.27], range: [-190, 190], tickvals: [-180, -90, 0, 90, 180], title: { text: "phase [°]" } }, legend: at.clientWidth > 600 ? { orientation: "h", y: 1, yanchor: "bottom", x: 1, xanchor: "right" } : { orientation: "h", y: -0.15 } });
   }
   at.redraw = () => show(Number(list.value));
   return show(0);
@@ -338,7 +338,7 @@ function odds(at, data) {
   return draw(at, [{ type: "bar", orientation: "h", y: bars.map((_, k) => k), x: bars.map((b) => b.against + 1), base: 0, marker: { color: bars.map((b) => colour(b.why === "named" ? "found" : "steel")) },
     text: bars.map((b) => b.against.toFixed(b.against < 10 ? 1 : 0)), textposition: "outside", cliponaxis: false, hoverinfo: "text",
     hovertext: bars.map((b) => `<b>${said(b.name)}</b>, 2 ln B ${b.against.toFixed(1)}<br>${wrapped(b.why || "")}`) }], {
-    xaxis: { type: "log", range: [0, Math.log10(Math.max(...bars.map((b) => b.against)) + 1) * 1.08 + 0.05], tickvals: marks.map((v) => v + 1), ticktext: marks.map(String), title: { text: "2 ln Bayes factor of the best against it" } },
+    xaxis: { type: "log", range: [0, Math.log10(Math.max(...bars.map((b) => b.against)) + 1) * 1.08 + 0.05], tickvals: marks.map((v) => v + 1), ticktext: marks.map(String), title: { text: "2 ln Bayes factor" } },
     yaxis: { tickvals: bars.map((_, k) => k), ticktext: bars.map((b) => said(b.name)), showgrid: false } });
 }
 

@@ -56,7 +56,7 @@ def write_deck(
 
 
 def changed_lines(deck: Deck, changes: Sequence[Change]) -> list[str]:
-    """What ``write_deck`` changes, line by line: "- " as it was, "+ " as it is, "@ " where."""
+    """The changes of ``write_deck`` by line: "- " as it was, "+ " as it is, "@ " where."""
     out, last = [], (-1, 0)
     for k, edits in sorted(_edits(deck, changes).items()):
         source = deck.sources[k]
