@@ -1,1 +1,1 @@
-"""The decision of a diagnosis: rows of numbers in, a verdict with its reasons out; no fits."""
+"""The decision of a diagnosis: from rows of numbers to a verdict with reasons, without any fit."""

@@ -1,4 +1,4 @@
-"""The answer beyond the name: what is tied with it, what is in doubt, numbers of a calibration."""
+"""Complete a decision: tied explanations, doubts about calibration and the calibrated numbers."""
 
 from dataclasses import replace
 
@@ -9,14 +9,14 @@ from .tied import tied
 
 
 def with_ties(case: JudgedTable, decision: Decision) -> Decision:
-    """The decision with what the data do not tell apart."""
+    """Add the explanations that the data cannot separate to a decision."""
     if decision.whole is not None and decision.named:
         return decision
     return _with_confusers(case, decision) if decision.named else _with_doubt(case, decision)
 
 
 def _with_confusers(case: JudgedTable, decision: Decision) -> Decision:
-    """The decision with what explains the data as well as the named effect, if anything does."""
+    """Add the effects that explain the data as well as the named one, if there are any."""
     best, *_ = every = case.rows(decision.order)
     over = dict(decision.passed_over)
     names = tied(best, [r for r in every if r.name not in over], case.rules.tied)
@@ -27,12 +27,12 @@ def _with_confusers(case: JudgedTable, decision: Decision) -> Decision:
 
 
 def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
-    """Calibration with what explains the data clearly better, if not by enough to be named.
+    """Add the effects that are clearly better than calibration, but too weak to be named.
 
-    That no physics is missing is a claim as well: where an effect leads by more than what is told
-    apart, and no data that were not fitted have refused it, the answer is one of both. So it is
-    where calibration strains a family of joints that stays as it is with the effect. Where
-    calibration alone does not fit at all, it is that effect or what the catalogue does not hold.
+    The statement that no physics is missing needs evidence too. If an effect leads by more than
+    ``rules.tied`` and no held-out data reject it, the answer is calibration or that effect. It is
+    so at any gain if calibration strains a family of joints beyond its scatter and the effect does
+    not. If calibration alone does not fit, the answer is that effect or one outside the catalogue.
     """
     table, rules = case.table, case.rules
     plainly = decision.verdict in ("nothing missing", "calibration only")
@@ -55,14 +55,14 @@ def _with_doubt(case: JudgedTable, decision: Decision) -> Decision:
 
 
 def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
-    """The decision with the numbers of the calibration, where nothing is named.
+    """Choose the numbers of the calibration, where no effect is named.
 
-    Plain calibration would bend E, rho and t to make up for mesh and joints. Numbers as the null
-    found them come first, then fitted anew. Where errors of the model are so large that both fit
-    worse than the deck as it was given, with its mesh error or as it is written, plain calibration
-    is the answer; where that needs numbers no structure of this deck has, or fits no better either,
-    the deck's own stay. Joints that took more than joints scatter are calibrated, whatever E, rho
-    and t gain beside them.
+    Plain calibration would distort E, rho and t to compensate for errors of mesh and joints. The
+    candidates, in this order, are the numbers found by the null, the same fitted again, and plain
+    calibration. Each of the first two must fit no worse than the given deck, with and without its
+    mesh error. Plain calibration must have plausible numbers and not fit worse in every respect.
+    Otherwise the given deck stays. Joints beyond their usual scatter count as calibrated, whatever
+    E, rho and t gain.
     """
     table, rules = case.table, case.rules
     if decision.named:

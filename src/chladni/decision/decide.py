@@ -1,17 +1,17 @@
 """One decision: from rows of numbers to a verdict, or to the one fit that is still missing.
 
-It computes nothing of a structure and makes no sentence. What it needs and does not find in the
-table it asks for by name; whoever measures that puts it in and calls again.
+The module computes nothing about a structure and writes no text. If the table lacks a number, the
+decision returns a request for it by name. The caller computes it, adds it and calls again.
 
-1. the leader is named where it gains what is due and fits;
-2. too few data name nothing;
-3. all data together may bear what was fitted alone does not;
-4. several effects that pay in full come before one;
-5. the leader is renewed and data that no fit saw are asked; where it leaves too much, sets that pay
-   in part, and what is usual, are next;
-6. where the leader is refused, its rivals are asked;
-7. what is tied is one of several, and what leads without a name leaves calibration in doubt;
-8. where nothing is named, the numbers of the calibration are chosen.
+1. The leader is named if it reaches the required gain and fits.
+2. Too few data name nothing.
+3. All data together may support a name that the fitted data alone do not.
+4. A set of effects that all reach the required gain precedes one effect.
+5. The leader is fitted again and tested on held-out data. If too much is left, sets that reach
+   only a part of the required gain follow, then the test for usual errors of the model's form.
+6. If the leader is refused, its rivals are tested.
+7. Tied effects are listed together; a leader that is not named puts calibration in doubt.
+8. If nothing is named, the numbers of the calibration are chosen.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ WITH_KNOWN_NOISE = RULES.without("most_left")  # the test of fit knows what may 
 
 
 def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
-    """The decision, or what is still to be measured for it."""
+    """Return the decision, or the number that is still missing for it."""
     case = JudgedTable(table, rules)
     try:
         return with_numbers(case, with_ties(case, _named(case)))
@@ -38,7 +38,7 @@ def decide(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | W
 
 
 def called(table: HypothesisTable, rules: DecisionRules = RULES) -> Decision | Wanted:
-    """What is said of the effects alone, before data that no fit saw are asked."""
+    """Return the decision on single effects, before held-out data are used."""
     try:
         return _first(JudgedTable(table, rules))
     except Missing as missing:
@@ -64,7 +64,7 @@ def _named(case: JudgedTable) -> Decision:
 
 
 def _first(case: JudgedTable) -> Decision:
-    """The leader is named where it gains what is due; it, or calibration, must fit."""
+    """Name the leader if it reaches the required gain; it, or calibration, must fit."""
     table, order = case.table, case.table.singles
     lead = table.rows[order[0]] if order else None
     due = case.due(lead)
@@ -75,7 +75,7 @@ def _first(case: JudgedTable) -> Decision:
 
 
 def _too_few(case: JudgedTable, decision: Decision) -> Decision:
-    """No name: a list of what explains the data and cannot be told apart by them."""
+    """Name nothing; list the effects that explain the data and cannot be separated by them."""
     some = [r.name for r in case.rows(decision.order) if case.table.gain(r) > 0]
     one_of = (ALONE, *some)
     step = Step(Reason.TOO_FEW, names=one_of)
@@ -86,12 +86,12 @@ def _too_few(case: JudgedTable, decision: Decision) -> Decision:
 
 
 def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
-    """The decision with a name that all data together bear, those that no fit saw included.
+    """Name the leader if all data together support it, held-out data included.
 
-    A fifth of a dozen natural frequencies is much of what is known, and held-out sensors and lines
-    may feel an effect that the fitted band hardly does. The Bayes factor of all data is the product
-    of that of the fitted ones and of how well the others are foretold, and the bound on false
-    alarms holds for it as for the first alone. Responses bear a good part of it themselves.
+    A fifth of a dozen natural frequencies is a large part of the information. Held-out sensors and
+    spectral lines may be sensitive to an effect that the fitted band hardly shows. The Bayes factor
+    of all data is that of the fitted data times the predictive ratio of the held-out data. The
+    bound on false alarms holds for it too. Fitted responses must bring ``good_part`` of the gain.
     """
     table, poles = case.table, case.table.poles
     if not decision.order or decision.named or decision.refused:
@@ -102,7 +102,7 @@ def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
         return decision
     if not case.carried(gain, lead.heard(), decision.due, poles):
         return decision
-    done = tuple(s for s in decision.steps if s.key != NULL)  # what was said of calibration
+    done = tuple(s for s in decision.steps if s.key != NULL)  # without the steps on calibration
     borne = replace(decision, steps=(*done, Step(Reason.BORNE_BY_ALL, lead.key)))
     return tested(case, borne, lead)
 
@@ -110,15 +110,15 @@ def _borne_by_all_data(case: JudgedTable, decision: Decision) -> Decision:
 def _with_lead_renewed(
     case: JudgedTable, alone: Decision, decision: Decision, in_part: Sequence[SetRow]
 ) -> Decision:
-    """The decision on the leader, on a model that bears it, by all data.
+    """Decide on the leader, fitted again on a refined basis, with all data.
 
-    Where several things are missing at once, each leaves what the others would explain. What was
-    fitted may then bear an effect more by a good part of its price, if all that no fit saw speaks
-    for it and all data together pay the whole: so much is asked of a name alone as well.
+    If several effects are missing, each leaves a residual that the others would explain. Fitted
+    data may then support one more effect by a good part of the required gain. All held-out data
+    must be in favour, and all data together must reach the full gain, as for a single effect.
 
-    Beside a small effect the scatter of an article leaves much, as errors of the model's form do.
-    That much may stay where the test of fit all but surely passes, where all that was asked speaks
-    for the name, and where a fifth of Q goes of what was fitted or of what was not.
+    With a small effect, scatter of the test article and errors of the model's form leave much of Q.
+    This is accepted if p of the test of fit exceeds ``usual`` and all votes are in favour. A fifth
+    of Q must disappear from the fitted or from the held-out data.
     """
     key, *behind = decision.order
     lead, rules = case.table.renewal(key), case.rules
@@ -143,13 +143,12 @@ def _with_lead_renewed(
 
 
 def _rivals_heard(case: JudgedTable, refused: Decision) -> Decision:
-    """The decision with the first rival named that nothing refuses, the leader being refused.
+    """Name the first rival that passes every test, after the leader was refused.
 
-    Evidence of the fitted data puts explanations in an order; data that no fit saw, what an
-    explanation leaves and how modes are damped refuse some. What comes behind one that was refused
-    is asked the same, for it may be what is missing, and the leader another name for it that fits a
-    little better for the wrong reason. Yet a leader that is far ahead refutes its rivals as it
-    refutes calibration alone: it found what they do not explain.
+    The evidence of the fitted data orders the explanations. Held-out data, the residual and the
+    modal damping can refuse one. The next explanations undergo the same tests: one of them may be
+    the true cause, while the leader imitates it and fits slightly better for a wrong reason. A
+    leader that is far ahead refutes its rivals, as it refutes calibration alone.
     """
     table, (lead, *rivals) = case.table, case.rows(refused.order)
     ahead = table.gain(lead)
@@ -169,7 +168,7 @@ def _rivals_heard(case: JudgedTable, refused: Decision) -> Decision:
 def _asked_next(
     case: JudgedTable, refused: Decision, rival: Row, over: tuple[tuple[str, Reason], ...]
 ) -> Decision:
-    """The decision with a rival in front of those that were passed over."""
+    """Test a rival, placed in front of the explanations that were passed over."""
     row = case.table.renewal(rival.key)
     others = (k for k in refused.order if k != rival.key)
     led = replace(
@@ -187,10 +186,10 @@ def _asked_next(
 
 
 def _against(case: JudgedTable, refused: Decision, asked: Decision) -> Reason | None:
-    """What refutes a rival that nothing of its own refuses; None where nothing does.
+    """Return the reason that refutes a rival which passed its own tests, or None.
 
-    The leader refutes it by the gain due, of what was fitted and held out, as calibration alone is
-    refuted. Damping that follows what the leader changes refutes what does not dissipate itself.
+    The leader refutes it by the required gain on fitted and held-out data, as it refutes
+    calibration alone. Modal damping that follows the leader's change refutes a lossless rival.
     """
     table, rules = case.table, case.rules
     (lead, *_), (rival, *_) = case.rows(refused.order), case.rows(asked.order)

@@ -7,20 +7,20 @@ import math
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
-TIED = 10.0  # in -2 ln evidence, e^5: odds up to which two explanations are one answer
+TIED = 10.0  # in -2 ln evidence (odds of e^5): explanations within this gap are tied
 GOOD_PART = (
-    0.5  # of the gain due, that fitted responses have to bring where other data pay the rest
+    0.5  # of the required gain, which fitted responses must bring if held-out data add the rest
 )
 
 
 def _rule(value: Any, off: Any, why: str) -> Any:
-    """A number with the value that switches its rule off, and what the rule is for."""
+    """A number, the value that switches its rule off, and the purpose of the rule."""
     return field(default=value, metadata={"off": off, "why": why})
 
 
 @dataclass(frozen=True)
 class DecisionRules:
-    """All numbers of the decision; gains are in -2 ln evidence, ``due`` is the gain due."""
+    """All numbers of the decision; gains are in -2 ln evidence, ``due`` is the required gain."""
 
     chance_of_responses: float = _rule(
         1e-5,
@@ -87,19 +87,19 @@ class DecisionRules:
     )
 
     def without(self, name: str) -> "DecisionRules":
-        """The same with one rule switched off."""
+        """A copy with one rule switched off."""
         return replace(self, **{name: rule(name).metadata["off"]})
 
 
 def rule(name: str) -> Field[Any]:
-    """The field of a rule, with what it is for."""
+    """The field of a rule, with its purpose."""
     return next(f for f in fields(DecisionRules) if f.name == name)
 
 
 def gain_due(tried: int, chance: float) -> float:
-    """The gain in -2 ln evidence that is needed to name any of so many families.
+    """Gain in -2 ln evidence required to name one of so many families: 2 ln(tried / chance).
 
-    Under the null a Bayes factor has mean one, so that it exceeds B with probability 1/B at most
-    (Markov); the families that were tried share the chance of a false alarm.
+    Under the null hypothesis a Bayes factor has mean one. It exceeds B with probability 1/B at most
+    (Markov). The families that were tried share the chance of a false alarm.
     """
     return 2 * math.log(tried / chance)

@@ -1,6 +1,6 @@
-"""What a decision knows: hypotheses as rows of numbers and flags, and what was measured of each.
+"""The input of a decision: one row of numbers and flags for each hypothesis.
 
-A number that was not measured is None. :func:`~chladni.decision.decide.decide` asks for it by name.
+A number that is not yet computed is None. :func:`~chladni.decision.decide.decide` requests it.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ NULL = "calibration"  # key of the row without any effect
 
 
 class Ask(Enum):
-    """What a decision may ask for of one row."""
+    """Quantities of one row that a decision may request."""
 
     TEST = "the test of fit"
     VOTES = "what data that no fit saw say of it against calibration"
@@ -25,7 +25,7 @@ class Ask(Enum):
 
 @dataclass(frozen=True)
 class Wanted:
-    """One more number, or fit: what, of which row, beside which."""
+    """A request for one number or fit: the quantity, the row and the row to compare with."""
 
     ask: Ask
     key: str
@@ -33,7 +33,7 @@ class Wanted:
 
 
 class Missing(Exception):
-    """A number that is not in the table; it never leaves this room."""
+    """A number is not in the table; the exception never leaves this package."""
 
     def __init__(self, wanted: Wanted) -> None:
         super().__init__(wanted)
@@ -42,7 +42,7 @@ class Missing(Exception):
 
 @dataclass(frozen=True)
 class Votes:
-    """Gains in 2 ln predictive density over calibration; None: nothing was asked there."""
+    """Gains in 2 ln predictive density over calibration; None where there are no such data."""
 
     held_out: float | None = None
     sensors: float | None = None
@@ -50,23 +50,23 @@ class Votes:
 
     @property
     def given(self) -> tuple[float, ...]:
-        """Those that there are."""
+        """The votes that exist."""
         return tuple(v for v in (self.held_out, self.sensors, self.lines) if v is not None)
 
     @property
     def news(self) -> float:
-        """Of the data held out."""
+        """The gain on the held-out data, 0 without any."""
         return self.held_out or 0.0
 
     @property
     def all_for(self) -> bool:
-        """Whether every one speaks for the effect."""
+        """True if every vote is for the effect."""
         return all(v > 0 for v in self.given)
 
 
 @dataclass(frozen=True)
 class Left:
-    """Q of plain calibration and with an effect as a deck has it, fitted and held out."""
+    """Q of plain calibration and of the deck with an effect, on fitted and held-out data."""
 
     fitted: tuple[float, float]
     held_out: tuple[float, float]
@@ -81,14 +81,14 @@ class Row:
     key : name in the table
     names : of its effects, the one with most gain first
     neg2_log_evidence : float
-    physics, channels : whether it changes the model; whether it concerns some channels alone
-    expected : whether what the deck is made of has it as a rule
-    becomes, nearly : the simpler effect that it is as it was fitted, and within its intervals
-    sound : whether its values are such as the thing can have
-    strained : whether a family of joints took more than joints scatter
+    physics, channels : whether it changes the model; whether it concerns some channels only
+    expected : whether the materials of the deck usually have it
+    becomes, nearly : simpler effect to which it reduces at the fitted values, within its intervals
+    sound : whether its fitted values are physically possible
+    strained : whether the factor of a joint family exceeds the usual scatter of joints
     fitted : False where the fit failed
     p, p_damping : of the test of fit, and of damping that follows an elastic change; NaN: no test
-    votes, left : what data that no fit saw say; Q with it
+    votes, left : evidence of the held-out data; Q with the effect
     """
 
     key: str
@@ -114,11 +114,11 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """The public verdict where it is named."""
+        """The public verdict if the row is named."""
         return "missing physics" if self.physics else "measurement fault"
 
     def fit(self, rules: DecisionRules) -> float:
-        """P of the test of fit, and of damping where it is refused by that and less likely."""
+        """P of the test of fit, or of the damping test where that refuses with a smaller p."""
         if self.p is None:
             raise Missing(Wanted(Ask.TEST, self.key))
         follows = self.p_damping
@@ -127,18 +127,18 @@ class Row:
         return follows
 
     def fits(self, rules: DecisionRules) -> bool:
-        """Whether it fits; where there is no test it does."""
+        """True if the row fits, or if there is no test."""
         p = self.fit(rules)
         return not p < (rules.fits if p == self.p else rules.fits_damping)
 
     def heard(self) -> Votes:
-        """The votes, which are asked for where they are not known."""
+        """The votes; raise ``Missing`` if they are not known."""
         if self.votes is None:
             raise Missing(Wanted(Ask.VOTES, self.key))
         return self.votes
 
     def leaves(self) -> Left:
-        """Q, which is asked for where it is not known."""
+        """Q with the effect; raise ``Missing`` if it is not known."""
         if self.left is None:
             raise Missing(Wanted(Ask.LEFT, self.key))
         return self.left
@@ -146,13 +146,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Rival:
-    """Another family that would do in the place of a member of a set.
+    """A family that could replace one member of a set.
 
     Attributes
     ----------
     name : of the family
-    behind : how far it stays behind, in -2 ln evidence
-    implausible : why its value is none such a thing can have; "" where it may
+    behind : gap to the member, in -2 ln evidence
+    implausible : why its value is physically impossible; "" if it is possible
     """
 
     name: str
@@ -168,9 +168,9 @@ class SetRow:
     ----------
     key : of its row in the table
     members : names, most gain first
-    gains : in -2 ln evidence, of each beside the others
-    due : gain that each has to bring
-    ahead : of the best effect alone, in -2 ln evidence
+    gains : in -2 ln evidence, of each with the others in place
+    due : gain required of each
+    ahead : lead over the best single effect, in -2 ln evidence
     rivals : of each member
     """
 
@@ -183,16 +183,16 @@ class SetRow:
 
     @property
     def pays(self) -> bool:
-        """Whether what was fitted pays the whole price, of each beside the others and of all."""
+        """True if every member, and the set as a whole, exceed the required gain when fitted."""
         return min(*self.gains, self.ahead) > self.due
 
     def member(self, k: int) -> str:
-        """Key of the row that holds what data that no fit saw say of one beside the others."""
+        """Key of the row with the held-out evidence for member k, with the others in place."""
         return f"{self.key}/{k}"
 
 
 class CalibratedDeck(Enum):
-    """The numbers of a calibration that is the answer."""
+    """The source of the numbers, where calibration is the answer."""
 
     FOUND = "as the null found them"
     WRITTEN = "as the null found them, fitted anew without scatter"
@@ -206,16 +206,16 @@ class HypothesisTable:
 
     Attributes
     ----------
-    rows : by key; ``NULL`` is calibration alone, ``renewed(key)`` a row after its fit was renewed
+    rows : by key; ``NULL`` is calibration alone, ``renewed(key)`` a row that was fitted again
     singles : keys of the best of every family, best first
     sets : of several effects, in the order in which they grew
-    nominal : -2 ln evidence of the deck as it was given, scatter allowed
+    nominal : -2 ln evidence of the given deck, scatter allowed
     poles : whether natural frequencies are compared
-    enough : whether the data are enough to bear a name
-    leaning : whether plain calibration has numbers that no structure of this deck has
-    decks : of a calibration, Q with and without what the mesh hides; () where there is no such fit;
-        of ``GIVEN`` the deck as it was given
-    families : how many are known, where none was tried
+    enough : whether there are enough data to support a name
+    leaning : whether plain calibration has implausible values
+    decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
+        of ``GIVEN`` that of the given deck
+    families : number of known families, used where none was tried
     """
 
     rows: Mapping[str, Row]
@@ -234,48 +234,48 @@ class HypothesisTable:
         return self.rows[NULL]
 
     def gain(self, row: Row) -> float:
-        """In -2 ln evidence over calibration alone."""
+        """Gain over calibration alone, in -2 ln evidence."""
         return self.null.neg2_log_evidence - row.neg2_log_evidence
 
     def renewal(self, key: str) -> Row:
-        """A row after its fit was renewed, which is asked for where it was not."""
+        """The row fitted again on a refined basis; raise ``Missing`` if it was not."""
         if renewed(key) not in self.rows:
             raise Missing(Wanted(Ask.RENEWAL, key))
         return self.rows[renewed(key)]
 
     def after(self, row: Row, leader: Row) -> float:
-        """P that the damping a row leaves follows what the leader changes."""
+        """P of the test that the damping left by a row follows the change by the leader."""
         known = self.rows.get(after(row.key, leader.key))
         if known is None or known.p_damping is None:
             raise Missing(Wanted(Ask.AFTER, row.key, leader.key))
         return known.p_damping
 
     def deck(self, which: CalibratedDeck) -> tuple[float, ...]:
-        """Q of a calibration as a deck can hold it."""
+        """Q of a calibration whose numbers can be written into a deck."""
         if which not in self.decks:
             raise Missing(Wanted(Ask.DECK, which.name))
         return self.decks[which]
 
     def having(self, *rows: Row) -> "HypothesisTable":
-        """The table with some rows put in or replaced."""
+        """The table with some rows added or replaced."""
         return replace(self, rows={**self.rows, **{r.key: r for r in rows}})
 
 
 def renewed(key: str) -> str:
-    """Key of a row after its fit was renewed."""
+    """Key of a row that was fitted again."""
     return f"{key}, renewed"
 
 
 def after(key: str, leader: str) -> str:
-    """Key of what is asked of a row beside a leader."""
+    """Key of the comparison of a row with a leader."""
     return f"{key} after {leader}"
 
 
 def needed(table: HypothesisTable, row: Row | None, tried: int, rules: DecisionRules) -> float:
-    """The gain in -2 ln evidence that is needed to name a row where so many families were tried.
+    """Gain in -2 ln evidence required to name a row, if so many families were tried.
 
-    What a material has as a rule (wood is stiffer along its grain) is no false alarm where it is
-    named: it has to be told apart from calibration, as two explanations are.
+    A property that a material usually has is no false alarm (wood is stiffer along its grain). It
+    only has to be separated from calibration, as two explanations are: ``rules.expected_due``.
     """
     chance = rules.chance_of_poles if table.poles else rules.chance_of_responses
     due = gain_due(tried or table.families, chance)

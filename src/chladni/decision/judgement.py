@@ -1,4 +1,4 @@
-"""A row against the rules: whether it fits, and whether data that no fit saw support it."""
+"""Apply the rules to a row: the test of fit and the support by held-out data."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,13 +12,13 @@ from .tied import tied
 
 @dataclass(frozen=True)
 class JudgedTable:
-    """A table and the rules it is judged by."""
+    """A table and the rules that apply to it."""
 
     table: HypothesisTable
     rules: DecisionRules
 
     def due(self, row: Row | None, more: int = 0) -> float:
-        """Gain that is needed to name a row; ``more`` sets stand beside the families tried."""
+        """Gain required to name a row; ``more`` sets count in addition to the families tried."""
         return needed(self.table, row, len(self.table.singles) + more, self.rules)
 
     def rows(self, keys: Sequence[str]) -> tuple[Row, ...]:
@@ -31,10 +31,10 @@ class JudgedTable:
         return "calibration only" if changed else "nothing missing"
 
     def carried(self, gain: float, votes: Votes, due: float, poles: bool = False) -> bool:
-        """Whether fitted data and those that no fit saw bear a name that has to gain what is due.
+        """True if fitted and held-out data support a name whose required gain is ``due``.
 
-        ``poles`` are few: all of them together bear it, or do not. So do responses, where all that
-        was asked speaks for the name and what was fitted bears a good part of it.
+        ``poles`` are few: all of them together must reach it. The sum also counts for responses,
+        if all votes are for the name and the fitted data bring ``good_part`` of the gain.
         """
         together = gain + votes.news
         for_it = gain > self.rules.good_part * due and votes.all_for
@@ -44,7 +44,7 @@ class JudgedTable:
 
 
 def tested(case: JudgedTable, decision: Decision, row: Row) -> Decision:
-    """The row is named where it fits, and refused where it does not."""
+    """Name the row if it fits, and refuse it otherwise."""
     decision = replace(
         decision, tested=row.key, steps=steps(decision, Step(Reason.TESTED, row.key))
     )
@@ -54,7 +54,7 @@ def tested(case: JudgedTable, decision: Decision, row: Row) -> Decision:
 
 
 def untested(case: JudgedTable, decision: Decision) -> Decision:
-    """Nothing is named; calibration alone fits, or nothing in the catalogue explains the data."""
+    """Name nothing; calibration alone fits, or nothing in the catalogue explains the data."""
     fits = case.table.null.fits(case.rules)
     return replace(
         decision, verdict=case.calibrated() if fits else "not in catalogue", tested=NULL,
@@ -63,16 +63,19 @@ def untested(case: JudgedTable, decision: Decision) -> Decision:
 
 
 def judged(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
-    """The decision once data that no fit saw have been asked of the first row.
+    """Decide on the first row with the held-out data.
 
-    The fitted data must carry a name after the fit was renewed. The others refuse it as surely:
-    where they speak against it by the gain that would be needed to name it, where less than that is
-    left of all data together, or where the deck with the effect does harm: by far, or at all where
-    the fitted data bear the name by less than twice the gain due. Nor is named what leaves more
-    than ``most_left`` of the Q of plain calibration, of what was fitted and of what was not. Data
-    that cannot feel the effect are predicted alike without it and have no vote. Where all data
-    together, or what was fitted by far, still want more than calibration, what is missing is not in
-    the catalogue; or it is the leader with more beside it, where no data speak against that.
+    The fitted data must still support the name after the second fit. Held-out data refuse it
+
+    - if they are against it by the required gain;
+    - if all data together bring less than the required gain;
+    - if the deck with the effect predicts them much worse than calibration does, or worse at all
+      where the fitted data bring less than twice the required gain;
+    - if more than ``most_left`` of the Q of plain calibration is left, fitted and held out.
+
+    Data that are insensitive to the effect are predicted equally well without it and have no vote.
+    All data together, or the fitted data by far, may refute calibration even so. The cause is then
+    outside the catalogue or, if no data are against the leader, the leader with something else.
     """
     table, rules = case.table, case.rules
     row = table.rows[decision.order[0]]
@@ -109,9 +112,9 @@ def judged(case: JudgedTable, decision: Decision, most_left: float) -> Decision:
 
 
 def _leaves_more(row: Row, most: float) -> bool:
-    """Whether a name leaves more of Q than may be left, fitted and held out.
+    """True if more of Q is left than the rules allow, fitted and held out.
 
-    A fault of a few channels is asked of what they recorded and no fit saw: of all it is little.
+    A fault of a few channels is tested on the held-out data of these channels only.
     """
     if not (row.physics or row.channels):
         return False

@@ -1,8 +1,8 @@
-"""Whether several effects may be named together.
+"""Decide if several effects may be named together.
 
-A second effect next to a first one that is a little off mops up what that leaves. Therefore each is
-asked with all others in place, as the first is with calibration alone; and all together must fit,
-and must be supported by the data held out against calibration alone.
+A second effect may only compensate for a small error of the first. Therefore each is tested with
+all others in place, as the first is tested against calibration alone. The set as a whole must fit,
+and held-out data must support it against calibration alone.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from .reasons import Decision, Reason, Step, steps
 def largest_named(
     case: JudgedTable, alone: Decision, sets: Sequence[SetRow]
 ) -> tuple[Decision | None, tuple[Step, ...]]:
-    """The decision with the last of some sets named that may be; None, and what refused each."""
+    """Name the last set that passes; otherwise return None and the refusal of each set."""
     refusals: list[Step] = []
     for whole in reversed(sets):
         found = _together(case, alone, whole)
@@ -27,11 +27,10 @@ def largest_named(
 
 
 def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | Step:
-    """The decision with several effects named together; or why they are not.
+    """Name several effects together, or return the step that refuses them.
 
-    A second effect beside a first one that is a little off mops up what that leaves. Therefore each
-    is asked beside all others, as the first is beside calibration alone; and all together must fit,
-    and must be borne by the data held out against calibration alone.
+    Every member must be supported with all others in place. The set must pass the test of fit and
+    the rules for held-out data, as a single effect must.
     """
     table, rules = case.table, case.rules
     row = table.renewal(whole.key)
@@ -65,7 +64,7 @@ def _together(case: JudgedTable, alone: Decision, whole: SetRow) -> Decision | S
 
 
 def _perhaps_beside(case: JudgedTable, named: SetRow) -> tuple[Step, ...]:
-    """A step for every effect that pays a part of its price beside those that are named."""
+    """One step for every effect that reaches a part of its required gain after the named ones."""
     part: dict[str, Step] = {}
     for other in case.table.sets:
         for k, (name, gain) in enumerate(zip(other.members, other.gains, strict=True)):

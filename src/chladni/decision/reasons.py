@@ -1,4 +1,4 @@
-"""Why a diagnosis says what it says: every step of a decision, as an enum and numbers."""
+"""The reasons of a diagnosis: every step of a decision, as an enum and numbers."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -10,39 +10,39 @@ BEYOND = "something that the catalogue does not hold"
 
 
 class Reason(Enum):
-    """One step, or what ends in a name or refuses one; ``decision_in_words`` has the sentences."""
+    """Kinds of steps, ends and refusals of a decision; ``decision_in_words`` has the sentences."""
 
-    # what ends a decision
+    # ends of a decision
     NAMED = auto()  # one effect
     TOGETHER = auto()  # several effects
-    NOTHING_DUE = auto()  # no effect gains what is due
-    # what refuses a name
+    NOTHING_DUE = auto()  # no effect reaches the required gain
+    # refusals of a name
     TOO_FEW = auto()  # modes or numbers
     UNFIT = auto()  # the test of fit
-    AGAINST = auto()  # data that no fit saw speak against it
-    TOO_LITTLE = auto()  # gained, of all data together
-    WORSE = auto()  # on data that no fit saw, as a deck has it
+    AGAINST = auto()  # held-out data are against it
+    TOO_LITTLE = auto()  # gain of all data together
+    WORSE = auto()  # fit of the deck to held-out data
     LEAVES_MORE = auto()  # than it explains
-    NOT_FITTED = auto()  # again, on a model that bears it
+    NOT_FITTED = auto()  # the second fit, on a refined basis, failed
     REFUTED = auto()  # by a leader that is refused itself
-    DAMPING = auto()  # follows what the leader changes
-    NOT_BORNE = auto()  # a member of a set, by data that no fit saw
+    DAMPING = auto()  # follows the change by the leader
+    NOT_BORNE = auto()  # a member of a set is not supported by held-out data
     BARELY_FITS = auto()  # a set, where one effect alone does not fit
-    # what was done on the way
-    TESTED = auto()  # against what it predicts itself
-    RENEWED = auto()  # the fit, on a model that bears it
-    BORNE_BY_ALL = auto()  # data together
-    HEARD = auto()  # data that no fit saw, which let the name stand
+    # intermediate steps
+    TESTED = auto()  # against its own predictions
+    RENEWED = auto()  # the fit was repeated on a refined basis
+    BORNE_BY_ALL = auto()  # all data together support the name
+    HEARD = auto()  # held-out data do not refuse the name
     FOUND_TOGETHER = auto()
-    HEARD_BESIDE = auto()  # the same of a member of a set
+    HEARD_BESIDE = auto()  # held-out data do not refuse a member of a set
     SET_REFUSED = auto()
-    PERHAPS_BESIDE = auto()  # an effect that pays a part of its price
+    PERHAPS_BESIDE = auto()  # an effect that reaches a part of its required gain
     RIVAL_OF_MEMBER = auto()
     ALL_DATA = auto()  # refute calibration alone
     WHAT_WAS_FITTED = auto()  # refutes calibration alone
     USUAL_LEFT = auto()  # no more is left than errors of the model's form leave
-    NEXT = auto()  # what comes behind a refused leader
-    TIED = auto()  # explains the data as well
+    NEXT = auto()  # explanation after a refused leader
+    TIED = auto()  # explains the data equally well
     DOUBT = auto()  # calibration or the leader
     DECK_STAYS = auto()
 
@@ -53,11 +53,11 @@ class Step:
 
     Attributes
     ----------
-    reason : what was found or done
+    reason : kind of step
     key : of the row
-    why : what refused it
-    member : of a set, which effect
-    names : of what it is compared with
+    why : reason of a refusal
+    member : index of the effect in a set
+    names : of the explanations it is compared with
     """
 
     reason: Reason
@@ -69,23 +69,23 @@ class Step:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a diagnosis says.
+    """The outcome of a diagnosis, with its reasons.
 
     Attributes
     ----------
     verdict : one of the public verdicts
-    order : keys of the rows, the one that is named or would be first
-    reason : what ended the decision
-    due : gain that is needed to name the first
-    named : whether the first is
-    one_of : what the data cannot tell apart
+    order : keys of the rows; the named one, or the best candidate, is first
+    reason : why the decision ended
+    due : gain required to name the first
+    named : whether the first is named
+    one_of : explanations that the data cannot separate
     tested : key of the row whose test of fit is the absolute one
-    refuting : what refutes calibration alone where no row is tested, and the p of that
-    votes : what data that no fit saw say of the first
+    refuting : which data refute calibration alone where no row is tested, and their p
+    votes : evidence of the held-out data on the first
     whole : the set that is named
-    passed_over : names that were asked before the first, and what refused each
-    deck : numbers of a calibration
-    steps : how it came to that
+    passed_over : names that were tested before the first, and the refusal of each
+    deck : source of the calibrated numbers
+    steps : the steps that led to the decision
     """
 
     verdict: str
@@ -104,15 +104,15 @@ class Decision:
 
     @property
     def refused(self) -> bool:
-        """Whether a leader that gained what is due is not named."""
+        """True if a leader reached the required gain but is not named."""
         return not self.named and self.reason is not Reason.NOTHING_DUE
 
 
 def steps(decision: Decision, *more: Step) -> tuple[Step, ...]:
-    """The steps so far and some more."""
+    """The steps of a decision, followed by some more."""
     return (*decision.steps, *more)
 
 
 def names_of(rows: tuple[Row, ...]) -> tuple[str, ...]:
-    """The name of each."""
+    """The names of the rows."""
     return tuple(r.name for r in rows)

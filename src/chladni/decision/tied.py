@@ -1,23 +1,24 @@
-"""When two explanations are one answer, and which of the two is told."""
+"""Equivalent explanations: which of them leads, and which are tied."""
 
 from collections.abc import Sequence
 
 from .decision_rules import TIED
 from .hypothesis_table import Row
 
-FOOT = 0.01  # of the gain, a tenth of an effect in amplitude: what a simpler one may leave of it
+FOOT = 0.01  # of the gain (a tenth of the amplitude), by which a simpler effect may fall behind
 
 
 def leading(rows: Sequence[Row], null: float) -> int:
-    """Which of the rows, best first, leads: the first but for one behind that is to be preferred.
+    """Index of the leading row: the first, unless a later one is to be preferred.
 
-    A lump on a spring that is tuned above all lines is a point mass: the simpler effect leads,
-    unless the foot of a resonance that no line shows is more than a hundredth of what was gained.
-    Where it may be tuned there, as well as it is known, the simpler leads that is as probable. A
-    sealant as stiff as steel is no sealant: what has a value it can have leads.
+    A resonator tuned above all spectral lines acts as a point mass. The simpler effect leads,
+    unless the flank of that resonance brings more than a hundredth of the gain. If the interval of
+    the tuning merely includes such values, the simpler effect leads only if it is tied. Likewise a
+    tied row with physically possible values leads one without (a sealant as stiff as steel).
 
     Parameters
     ----------
+    rows : best first
     null : -2 ln evidence without any of them
     """
     lead = rows[0]
@@ -32,16 +33,16 @@ def leading(rows: Sequence[Row], null: float) -> int:
 
 
 def same(row: Row, name: str) -> bool:
-    """Whether an explanation, as it was fitted or within its intervals, is a simpler one's."""
+    """True if an explanation reduces to a named simpler one, as fitted or within its intervals."""
     return name in (row.becomes, row.nearly)
 
 
 def tied(best: Row, rows: Sequence[Row], gap: float = TIED) -> tuple[str, ...]:
-    """Names of what explains the data as well, its own first.
+    """Names of the rows that explain the data as well as the best one, whose own name is first.
 
-    What as it was fitted is another name for the best, or may be, is none of them. What the best is
-    somewhere in its intervals is one, whatever the odds: a point mass on a tailgate (tuning 561)
-    was called a resonator of 253 Hz, 74 to 862.
+    A row that reduces to the best one, as fitted or within its intervals, is left out. A simpler
+    effect to which the best one reduces within its intervals is included at any odds. Example: a
+    point mass on a tailgate (tuning 561) was named a resonator of 253 Hz (interval 74 to 862).
     """
     behind = {
         r.name: r.neg2_log_evidence - best.neg2_log_evidence
