@@ -1,8 +1,8 @@
-"""A bead of adhesive that is softer or stiffer than the deck has it, by more than coupons scatter.
+"""An adhesive bead far softer or stiffer than in the deck, beyond the scatter of coupons.
 
-That a bead's stiffness is off by half is ordinary and free in every fit; here it may be off by
-orders of magnitude: not cured, torn, another product.  Between thin sheets a bead saturates: some
-thirty times stiffer than a sealant it only holds.
+An error of about half the stiffness is a calibration parameter of every fit. Here the error may be
+orders of magnitude: an uncured or torn bead, or another product. Between thin sheets the effect
+saturates: a bead some thirty times stiffer than a sealant acts as a rigid joint.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,14 +23,14 @@ from .search_context import Candidate, SearchContext, best_places
 
 SD = 3.0  # of ln of the factor
 STARTS = (-2.5, 2.0, 4.0)
-MOST = 12  # beads that are tried, longest first
+MOST = 12  # beads tried, longest first
 FOLLOWED = 2
-SEALANT = 80e6  # [Pa] what flows into a hem and stays soft has less (Echaniz Granado 2015: 6 MPa)
+SEALANT = 80e6  # [Pa] upper limit of a soft hem sealant (Echaniz Granado 2015: 6 MPa)
 
 
 @dataclass(frozen=True, eq=False)
 class AdhesiveStiffness(Effect):
-    """K + (e^x - 1) K_bead + (e^g - 1) K_others: the bead's own modulus, that of all others."""
+    """K + (e^x - 1) K_bead + (e^g - 1) K_others: one modulus for the bead, one for all others."""
 
     name = "adhesive-stiffness"
     claim = "a bead of adhesive is far softer or stiffer than the deck has it"
@@ -41,7 +41,7 @@ class AdhesiveStiffness(Effect):
     others: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The bead's own and that of the others."""
+        """The terms of the bead and of the other beads."""
         each = zip((self.operator, self.others), self.parameters, x, np.eye(len(x)), strict=False)
         return tuple(
             MatrixTerm("K", A, p.value(v) / p.scale - 1, p.slope(v) / p.scale * e)
@@ -49,15 +49,15 @@ class AdhesiveStiffness(Effect):
         )
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """A φ of the bead; the basis carries all adhesive together already."""
+        """A φ of the bead; the basis already represents all adhesive together."""
         return sp.csr_array((self.operator @ shapes).T)
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """What the bead answers: (P⁻¹ A)ᵏ φ spans how a bead of any stiffness changes a mode."""
+        """Loads A u of the bead: (P⁻¹ A)ᵏ φ spans the mode change for any stiffness of the bead."""
         return self.operator @ static
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """E of the bead, that of the others as it was fitted beside it."""
+        """Write E of the bead, and E of the other beads as fitted with it."""
         assert self.joint is not None
         beside = self.parameters[1].value(x[1]) if len(x) > 1 else 1.0
         made = with_solids(assembly, beside, soft=True)
@@ -68,7 +68,7 @@ class AdhesiveStiffness(Effect):
         return super().reported(x, sd)[:1]
 
     def implausible(self, x: np.ndarray) -> str:
-        """Of what is a sealant in the deck: a modulus no sealant has."""
+        """Report a modulus that no sealant has, where the deck has a sealant."""
         E = self.parameters[0].value(x[0])
         if self.parameters[0].scale >= SEALANT or E <= SEALANT:
             return ""
@@ -78,12 +78,12 @@ class AdhesiveStiffness(Effect):
 
 
 def longest_beads(built: Structure) -> list[Connection]:
-    """Those that are tried, ``MOST`` of them."""
+    """The ``MOST`` longest beads, which are tried."""
     return sorted(beads(built), key=lambda bead: -len(bead.elements))[:MOST]
 
 
 def beads_of(built: Structure) -> list[AdhesiveStiffness]:
-    """The effect of every bead, and of all of a part together."""
+    """One effect for each of the longest beads."""
     found = longest_beads(built)
     families = {text: (K, sd) for text, K, sd in joint_families(built)} if found else {}
     return [_of_one(built, bead, families["adhesive"], len(found)) for bead in found]
@@ -117,7 +117,7 @@ def _parts(assembly: Assembly, bead: Connection) -> list[Part]:
 
 
 def modulus_of(assembly: Assembly, bead: Connection) -> float | None:
-    """E [Pa] where all of the bead has the same."""
+    """E [Pa] of a bead of one isotropic modulus, else None."""
     values = {
         p.section.material.E
         for p in _parts(assembly, bead)
@@ -127,7 +127,7 @@ def modulus_of(assembly: Assembly, bead: Connection) -> float | None:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The beads whose change explains most."""
+    """The beads whose change of stiffness explains most."""
     effects = beads_of(context.where.groups.structure)
     if not effects:
         return []
@@ -138,7 +138,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def softened_bead(
     assembly: Assembly, rng: np.random.Generator, ln_factor: tuple[float, float]
 ) -> tuple[Connection, float, float]:
-    """A bead drawn to be concealed, the factor on its E from a range of its logarithm, and E [Pa].
+    """Draw a bead to conceal, the factor on its E from a range of its logarithm, and E [Pa].
 
     Raises
     ------
@@ -154,7 +154,7 @@ def softened_bead(
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """E of a bead times e^-2 to e^-3."""
+    """Multiply E of a bead by e^-2 to e^-3."""
     bead, factor, E = softened_bead(article.assembly, rng, (-3.0, -2.0))
     truth = {"point_m": bead.point.tolist(), "value": E, "parameters": {"E": E}}
     made = with_factor_on(article.assembly, bead, factor)

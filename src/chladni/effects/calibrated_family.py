@@ -1,4 +1,4 @@
-"""A family of joints that took more than joints of its kind scatter, as a number of the deck."""
+"""A family of joints whose factor exceeds the usual scatter, written as a number of the deck."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ from .model_families import ModelFamily
 
 @dataclass(frozen=True, eq=False)
 class CalibratedFamily(ModelFamily):
-    """The same factor, written into the deck: on E of such solids, on K of the bushes."""
+    """The factor of a joint family, written into the deck: on E of solids or on K of bushes."""
 
     claim = "joints of a kind are far stiffer or softer than the deck has them"
     kind = "ordinary"
@@ -19,16 +19,16 @@ class CalibratedFamily(ModelFamily):
     called = "stiffness, times the deck's"
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The deck with the factor in it."""
+        """Write the factor into the deck."""
         factor = self.parameters[0].value(x[0])
         if self.text != "bushes":
             return with_solids(assembly, factor, soft=self.text == "adhesive")
         bushes = assembly.bushes
-        own = np.where(bushes.ids > 0, factor, 1.0)  # none of the firm ones in rigid ties
+        own = np.where(bushes.ids > 0, factor, 1.0)  # not the firm springs in rigid ties
         scaled = replace(bushes, stiffness=bushes.stiffness * own[:, None])
         return replace(assembly, bushes=scaled)
 
 
 def calibrated_family(family: ModelFamily) -> CalibratedFamily:
-    """A family of joints as a number of the deck."""
+    """Make a family of joints writable as a number of the deck."""
     return CalibratedFamily(family.parameters, family.text, family.parts, slope=family.slope)

@@ -1,10 +1,9 @@
-"""A clamp that gives: what the deck holds by supports, a fixture holds as a spring does.
+"""A compliant clamp: the fixture holds as springs where the deck has rigid supports.
 
-The supports that hang together are one rigid clamp. It moves along the one direction, and turns
-about the one axis, in which the modes pull hardest at it: the root of a beam shears and turns. A
-fixture is as stiff as its foundation; for a bolted root the rotation counts most (Gorman 1975, Free
-Vibration Analysis of Beams and Shafts, ch. 1). Where the base is what moves, the springs stand
-between it and the clamp.
+Connected supports form one rigid clamp. It moves along one direction and turns about one axis,
+those of the largest modal reactions: the root of a beam shears and turns. A fixture is as stiff as
+its foundation; for a bolted root the rotation matters most (Gorman 1975, Free Vibration Analysis of
+Beams and Shafts, ch. 1). With base excitation the springs are between the base and the clamp.
 """
 
 from dataclasses import dataclass, replace
@@ -25,30 +24,30 @@ from .effect import Effect, Parameter, PointTerm
 from .family import Article, Family
 from .search_context import Candidate, SearchContext, best_starts
 
-RIGID = 2e4  # of the spring on which all of the mass swings at the highest line: it gives no more
-SD = 2.0  # of its prior: fixtures differ by as much as foundations do
+RIGID = 2e4  # times the spring on which all mass resonates at the highest line: as good as rigid
+SD = 2.0  # of its prior: fixtures differ as much as foundations do
 STARTS = (-4.0, -2.0, 0.0)
-SEEN = 1e-11  # of a rigid spring: what the modes pull less at is rounding
-TYPICAL = 0.01  # of the stiffness of the mode that pulls most: median of what a spring takes
-NEAR_AXIS = 0.999  # cosine from which a direction is taken for an axis of the basic frame
-TOGETHER = 0.01  # correlation of a moment with a force below which they are of other modes
-MOST = 12  # ways that are tried, those that take most
+SEEN = 1e-11  # of a rigid spring: smaller modal reactions are rounding
+TYPICAL = 0.01  # prior median: share of stiffness lost by the mode with the largest reaction
+NEAR_AXIS = 0.999  # cosine from which a direction counts as an axis of the basic frame
+TOGETHER = 0.01  # correlation of moment and force below which they come from different modes
+MOST = 12  # ways tried: those with the largest loss of stiffness
 FOLLOWED = 2  # ways that are fitted
-DRAWN = 8  # modes of an article that tell how its clamp is pulled at
-TAKEN = 0.05, 0.25  # of the mode that pulls most, by each spring of a concealed clamp
+DRAWN = 8  # modes of an article that set the reactions at its clamp
+TAKEN = 0.05, 0.25  # share of stiffness lost by that mode, for each spring of a concealed clamp
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """One way in which a clamp gives: along the first axis of a frame, and about the second.
+    """One compliance of a clamp: along the first axis of a frame, and about the second.
 
     Attributes
     ----------
     clamp : position among the clamps of the structure
     frame : (3, 3)     rows are unit vectors in the basic frame
     components : 1, or 1 and 5: along and about these axes
-    rigid : (k,)       springs that do not give [N/m, N m/rad]
-    pull : (k, r)      f²/λ of each mode: a spring k takes a share pull/k of its stiffness
+    rigid : (k,)       springs that are as good as rigid [N/m, N m/rad]
+    pull : (k, r)      f²/λ of each mode: a spring k reduces its stiffness by the share pull/k
     """
 
     clamp: int
@@ -59,7 +58,7 @@ class Way:
 
     @property
     def scale(self) -> np.ndarray:
-        """Springs that take ``TYPICAL`` of the mode that pulls most (k,)."""
+        """Springs (k,) that cost the mode of the largest reaction ``TYPICAL`` of its stiffness."""
         return np.asarray(self.pull.max(axis=1) / TYPICAL)
 
     def motions(self) -> np.ndarray:
@@ -71,15 +70,15 @@ class Way:
 
 @dataclass(frozen=True, eq=False)
 class CompliantSupport(Effect):
-    """x = ln of its springs over their scale: along the axis it is sheared, about that it turns."""
+    """A clamp on springs, x = ln of stiffness over scale: one along an axis, one about an axis."""
 
     name = "compliant-support"
     claim = "a clamp that the deck holds rigidly gives"
     lets_go: ClassVar[bool] = True
     rounds: ClassVar[int] = 1
 
-    every: tuple[Clamp, ...] = ()  # clamps of the structure, this one among them
-    rigid: np.ndarray | None = None  # springs of all of them where they do not give (6 clamps,)
+    every: tuple[Clamp, ...] = ()  # clamps of the structure, including this one
+    rigid: np.ndarray | None = None  # springs as good as rigid of all of them (6 clamps,)
     way: Way | None = None
     rows: sp.csr_array | None = None  # motions of the clamp over the dofs of the released structure
 
@@ -89,22 +88,22 @@ class CompliantSupport(Effect):
         return released(built, self.every, self.rigid)
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """(k - k_rigid) gᵀg at each motion that it gives in."""
+        """(k - k_rigid) gᵀg for each compliant motion g of the clamp."""
         assert self.rows is not None
         assert self.way is not None
         k = self.springs(x)
         return (PointTerm("K", self.rows, k - self.way.rigid, np.diag(k)),)
 
     def springs(self, x: np.ndarray) -> np.ndarray:
-        """[N/m] and [N m/rad] of each parameter."""
+        """Spring stiffness [N/m] and [N m/rad] of each parameter."""
         return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Inertia of the structure that follows the clamp."""
+        """Inertia loads M u of the structure that follows the clamp."""
         return M @ static[: M.shape[0]]
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """GRID, RBE2 and CELAS2 to ground in place of the supports."""
+        """Replace the supports by GRID, RBE2 and CELAS2 to ground."""
         assert self.way is not None
         return on_springs(assembly, self.every[self.way.clamp], self.way, self.springs(x))
 
@@ -121,11 +120,11 @@ def ways_of(
     built: Structure, every: tuple[Clamp, ...], frequency: np.ndarray, shapes: np.ndarray,
     stiff: np.ndarray,
 ) -> list[Way]:  # fmt: skip
-    """How each clamp may give, up to three ways each, those first that take most.
+    """Up to three compliances of each clamp, those with the largest loss of stiffness first.
 
-    To first order a spring k takes f²/(k λ) of the stiffness of a mode that pulls at it by f. A
-    clamp gives along the principal axes of the forces of all modes, and with each about the axis
-    of the moment that comes with that force.
+    To first order a spring k reduces the stiffness of a mode with reaction f by f²/(k λ). A clamp
+    moves along the principal axes of the forces of all modes. With each, it turns about the axis of
+    the moment that comes with that force.
 
     Parameters
     ----------
@@ -151,7 +150,7 @@ def ways_of(
 
 
 def _turning(x: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """The axis across x of the moment that comes with a force along x, else of the largest."""
+    """Axis across x of the moment that comes with a force along x, else of the largest moment."""
     across = np.stack(tangents(x))
     turn = across @ moment
     with_x = turn @ (x @ force)
@@ -164,7 +163,7 @@ def _turning(x: np.ndarray, force: np.ndarray, moment: np.ndarray) -> np.ndarray
 def rigid_springs(
     assembly: Assembly, every: tuple[Clamp, ...], weight: float, f_max: float
 ) -> np.ndarray:
-    """Springs of each clamp on which all of the mass would swing far above the highest line.
+    """Springs of each clamp on which all mass resonates far above the highest spectral line.
 
     Along [N/m], and about its centre [N m/rad]: (clamps, 2).
     """
@@ -181,9 +180,9 @@ def _axis(v: np.ndarray) -> np.ndarray:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The two ways of clamps that explain most, each about the nominal and the calibrated model.
+    """The two compliances that explain most, each from the nominal and the calibrated model.
 
-    What the clamp gives may have been calibrated into E and t, and a fit finds no way back.
+    Calibration may have put the compliance into E and t, and a fit from there would not return.
     """
     where = context.where
     built = where.groups.structure
@@ -220,7 +219,7 @@ def _effect(
 
 
 def _said(clamp: Clamp, way: Way) -> str:
-    """Where the clamp is and how it gives."""
+    """The place of the clamp and the direction of its compliance, in words."""
     at = ", ".join(f"{1e3 * v:.0f}" for v in clamp.centre)
     n = len(clamp.grids)
     grids = f"grid {clamp.grids[0]}" if n == 1 else f"{n} grids from {clamp.grids[0]} on"
@@ -237,7 +236,7 @@ def _named(axis: np.ndarray) -> str:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """One of its clamps gives: each of its springs takes 5 to 25 % of a mode's stiffness."""
+    """Make one clamp compliant: each of its springs costs a mode 5 to 25 % of its stiffness."""
     assembly = article.assembly
     every = clamps(assembly)
     if not every:

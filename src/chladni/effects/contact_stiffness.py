@@ -23,7 +23,7 @@ MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
 STARTS = (-2.0, 0.0, 2.0)
 TRIED = MEDIAN * np.exp(np.linspace(-4.0, 6.0, 6))
 CLOSE = 1e-3  # [m] of clearance, or less
-MOST, BY_POLES = 200, 16  # places, spread over all that are close
+MOST, BY_POLES = 200, 16  # places, sampled from all that are close
 FOLLOWED = 2
 
 
@@ -33,15 +33,15 @@ class ClosePlaces(SheetPairs):
 
     Attributes
     ----------
-    grids : (k,) int               ids of the grids of the first sheet they are at
-    sheets : names of both sheets of each
+    grids : (k,) int               ids of their grids on the first sheet
+    sheets : names of both sheets at each place
     """
 
     grids: np.ndarray
     sheets: tuple[tuple[str, str], ...]
 
     def only(self, which: Sequence[int]) -> "ClosePlaces":
-        """Some of them."""
+        """A selection of the places."""
         which = list(which)
         return ClosePlaces(
             self.middle[which], self.along[which], tuple(self.sides[k] for k in which),
@@ -51,7 +51,7 @@ class ClosePlaces(SheetPairs):
 
 @dataclass(frozen=True, eq=False)
 class ContactStiffness(Effect):
-    """K + k bᵀ b, b the motion of two sheets against each other across the gap."""
+    """K + k bᵀ b, b the relative motion of two sheets across the gap."""
 
     name = "contact-stiffness"
     claim = "two sheets touch where the model has a gap between them"
@@ -66,7 +66,7 @@ class ContactStiffness(Effect):
         return (PointTerm("K", self.rows, c, c[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CBUSH between two RBE3 at the place."""
+        """Write a CBUSH between two RBE3 at the place."""
         assert self.place is not None
         return self.place.gripped(assembly, np.array([self.parameters[0].value(x[0])]))
 
@@ -74,8 +74,9 @@ class ContactStiffness(Effect):
 def close_places(assembly: Assembly) -> ClosePlaces:
     """Places of all pairs of sheets that are close, away from joints, shared grids and folds.
 
-    How stiff a fold is two codes do not agree on (one ties the thickness of its shells there), and
-    a spring beside it would take that up: on a bolted bracket it won odds of e^50 by that.
+    Two codes disagree on the stiffness of a fold (one ties the thickness of its shells there). A
+    spring next to a fold would compensate for that difference: on a bolted bracket it gained odds
+    of e^50 in this way.
     """
     nodes, found = assembly.shells.nodes, []
     smooth = smooth_normals(assembly)[1]
@@ -96,7 +97,7 @@ def close_places(assembly: Assembly) -> ClosePlaces:
 
 
 def contacts(built: Structure) -> list[ContactStiffness]:
-    """A spring at every one of a sample of the places where sheets are close."""
+    """One spring at each of a sample of the places where sheets are close."""
     every = close_places(built.assembly)
     if not len(every):
         return []
@@ -121,7 +122,7 @@ def contacts(built: Structure) -> list[ContactStiffness]:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The places at which a contact explains most, by exact re-analysis at every one."""
+    """The places at which a contact explains most, by exact re-analysis at each place."""
     effects = contacts(context.where.groups.structure)
     if not effects:
         return []
@@ -147,7 +148,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A spring of 20 to 200 kN/m between two sheets that almost touch."""
+    """Add a spring of 20 to 200 kN/m between two sheets that almost touch."""
     effects = contacts(structure(article.assembly))
     if not effects:
         raise ModelError("the structure has no two sheets that almost touch")

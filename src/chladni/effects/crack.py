@@ -1,8 +1,8 @@
-"""A crack: bending stiffness lost along a line of shells, mass and membrane as they were.
+"""A crack: bending stiffness lost along a line of shells, with mass and membrane unchanged.
 
-It may be a crack, a bead ground off, a bend annealed, a score: all are a hinge with a spring
-(Adams, Cawley, Pye and Stone 1978, J. Mech. Eng. Sci. 20, 93-100). How much is lost depends on the
-width of the shells it is put into, so that it is told in units of these: 12I/T3.
+It may be a crack, a bead ground off, an annealed bend or a score: all act as a hinge with a spring
+(Adams, Cawley, Pye and Stone 1978, J. Mech. Eng. Sci. 20, 93-100). The loss depends on the width of
+the shells that hold it. Therefore it is reported as their bending ratio 12I/T3.
 """
 
 from collections.abc import Sequence
@@ -23,28 +23,28 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, ResponseScan, SearchContext, best_places, distinct
 
-LEAST = 0.1  # of the bending stiffness is always left: K stays positive
-SHELLS = 3  # fewer of them are no line
-REACH = 0.55  # of a shell's size times so many: half the least length
+LEAST = 0.1  # of the bending stiffness always remains, so that K stays positive
+SHELLS = 3  # in a line at least
+REACH = 0.55  # of a shell's size times ``SHELLS``: half the least length
 WIDE = 0.75  # of a shell's size: half the width of a line, so that no corner bridges an oblique one
 LENGTH = 0.25  # of the square root of the part's area
 LENGTHS = (1.0, 2.5)  # times that: tried all over the sheets
-SHORTEST, LONGEST = 0.4, 4.0  # times that: what a line may come to
+SHORTEST, LONGEST = 0.4, 4.0  # times that: limits of a moved line
 ANGLES = 4
 PLACES = 48  # middles of lines, all over the sheets
 BEGUN = 12  # lines, far from each other, that are moved while they explain more
 TURNS = (-np.pi / 8, -np.pi / 16, np.pi / 16, np.pi / 8)
 STRETCHED = (0.7, 1.4)  # times its length
-BESIDE = 1.7  # of a shell's size: how far its neighbours are
-WORTH = 0.05  # in -2 ln posterior: a move that gains less is none
-FOLLOWED = 2  # lines that are worth a fit
-STEPS, BETTER = 4, 0.5  # of a line that was fitted, and what each has to gain in -2 ln posterior
+BESIDE = 1.7  # of a shell's size: distance of its neighbours
+WORTH = 0.05  # least gain of a move in -2 ln posterior
+FOLLOWED = 2  # lines that are fitted
+STEPS, BETTER = 4, 0.5  # moves of a fitted line, and the least gain of each in -2 ln posterior
 AROUND = (-0.7, 0.0, 0.7)  # strengths about that of the fit
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Shells side by side along a line on a part, as :meth:`LineFinder.through` drew it.
+    """Adjacent shells along a line on a part, as drawn by :meth:`LineFinder.through`.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class LineFinder:
-    """Where the shells of an assembly are, so that lines of them can be drawn.
+    """Geometry of the shells of an assembly, from which lines of shells are drawn.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class LineFinder:
 
     @classmethod
     def of(cls, assembly: Assembly) -> "LineFinder":
-        """Those of an assembly."""
+        """Collect the shells of an assembly."""
         shells, area = assembly.shells, cell_areas(assembly.points, assembly.shells.nodes)
         size = {int(p): float(np.sqrt(area[shells.part == p].sum())) for p in set(shells.part)}
         middle = assembly.points[shells.nodes].mean(axis=1)
@@ -93,8 +93,8 @@ class LineFinder:
     def through(self, shell: int, way: np.ndarray, times: float) -> Line | None:
         """The line through a shell's middle along ``way`` (3,), ``times`` the usual length.
 
-        It follows the sheet. On a coarse mesh it is as long as ``SHELLS`` shells at least; None
-        where there are fewer, or ``way`` leaves the sheet.
+        The line follows the sheet. On a coarse mesh it spans at least ``SHELLS`` shells. The result
+        is None if there are fewer, or if ``way`` leaves the sheet.
         """
         n = self.normal[shell]
         flat = way - (way @ n) * n
@@ -126,7 +126,7 @@ class LineFinder:
         return _different(found)
 
     def moved(self, line: Line) -> list[Line]:
-        """Lines beside one; and it turned, and stretched, about its middle and about either end."""
+        """Neighbours of a line: shifted, and turned or stretched about its middle or an end."""
         k, x, n = line.through, self.middle[line.through], self.normal[line.through]
         mine = np.flatnonzero(self.part == line.part)
         d = np.linalg.norm(self.middle[mine] - x, axis=1)
@@ -147,15 +147,15 @@ class LineFinder:
 
 
 def _different(lines: Sequence[Line | None]) -> list[Line]:
-    """Each set of shells once."""
+    """Keep each set of shells once."""
     return list({line.shells.tobytes(): line for line in lines if line is not None}.values())
 
 
 @dataclass(frozen=True, eq=False)
 class Crack(Effect):
-    """K - (1 - f) Σ_line B_e, B_e the bending stiffness; f = 0.1 + 0.9 / (1 + e^x) is what is left.
+    """K - (1 - f) Σ_line B_e, B_e the bending stiffness, f = 0.1 + 0.9 / (1 + e^x) the rest of it.
 
-    With f > 0 the sum is positive: no more than B is taken from A + B.
+    With f > 0 the sum stays positive: at most B is subtracted from A + B.
     """
 
     name = "crack"
@@ -173,22 +173,22 @@ class Crack(Effect):
         return (MatrixTerm("K", self.operator, f - 1, np.array([slope])),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The shells of the line with a property of their own, 12I/t³ times f."""
+        """Give the shells of the line their own property, with 12I/t³ times f."""
         return cracked(assembly, self.shells, left(x[0]))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """What is left of 12I/t³."""
+        """Remaining 12I/t³ with its 95 % interval."""
         value, high, low = (left(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
         return (Estimate("12I/T3", value, "-", low, high),)
 
 
 def left(x: float) -> float:
-    """What is left of the bending stiffness, from 1 to LEAST."""
+    """Remaining share of the bending stiffness, from 1 down to LEAST."""
     return float(LEAST + (1 - LEAST) / (1 + np.exp(x)))
 
 
 def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
-    """A crack along one line of as many as were tried."""
+    """A crack along one line, out of ``tried`` lines."""
     assembly, on = groups.structure.assembly, line.shells
     K = blocks(groups.cubic[on], groups.nodes[on], len(assembly.points))
     name, (x, y, z) = assembly.parts[line.part].name, line.centre.tolist()
@@ -204,7 +204,7 @@ def crack(groups: ElementGroups, line: Line, tried: int) -> Crack:
 
 
 def cracked(assembly: Assembly, shells: np.ndarray, f: float) -> Assembly:
-    """The assembly with f times the bending stiffness in some shells, which become parts."""
+    """Multiply the bending stiffness of some shells by f; these shells become new parts."""
     parts, part = list(assembly.parts), assembly.shells.part.copy()
     for k in np.unique(part[shells]):
         mine = shells[assembly.shells.part[shells] == k]
@@ -215,7 +215,7 @@ def cracked(assembly: Assembly, shells: np.ndarray, f: float) -> Assembly:
 
 
 def weakened(part: Part, f: float) -> Part:
-    """The part with f times the bending stiffness."""
+    """Multiply the bending stiffness of a part by f."""
     assert isinstance(part.section, ShellSection)
     return part.with_section(bending_ratio=part.section.bending_ratio * f)
 
@@ -223,7 +223,7 @@ def weakened(part: Part, f: float) -> Part:
 def candidates(context: SearchContext) -> list[Candidate]:
     """The lines along which a crack explains most: drawn all over the sheets, then moved.
 
-    Each costs a slope; where the best of them came to rest they are evaluated as they are.
+    The score of a line in this search is linearised; the final lines are evaluated exactly.
     """
     groups = context.where.groups
     lines = LineFinder.of(groups.structure.assembly)
@@ -241,14 +241,14 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def _at_rest(
     scan: ResponseScan, about: int, lines: LineFinder, first: Sequence[Line]
 ) -> tuple[list[Line], int]:
-    """The best of the lines drawn first, moved until none next to them explains more.
+    """Move the best initial lines until no neighbour explains more.
 
-    With how many were tried for it.
+    Return the final lines and the number of lines tried.
     """
     known: dict[bytes, float] = {}
 
     def scores(drawn: Sequence[Line]) -> np.ndarray:
-        """Of each of them; one that is to gain stiffness explains nothing."""
+        """Score of each line; a line that would gain stiffness explains nothing."""
         fresh = [line.shells for line in drawn if line.shells.tobytes() not in known]
         amount, score = scan.bending_scores(about, fresh)
         score = np.where(amount < 0, score, np.inf)
@@ -256,7 +256,7 @@ def _at_rest(
         return np.array([known[line.shells.tobytes()] for line in drawn])
 
     def at_rest(line: Line) -> Line:
-        """Where no move explains more."""
+        """Move a line until no neighbour explains more."""
         while near := lines.moved(line):
             score = scores([line, *near])
             best = int(np.argmin(score))
@@ -272,7 +272,7 @@ def _at_rest(
 
 
 def closer(context: SearchContext, effect: Effect, x: np.ndarray) -> Candidate | None:
-    """Along a line beside that of a fitted crack, a few steps at most, each evaluated as it is."""
+    """Move a fitted crack to neighbouring lines, in a few steps, each evaluated exactly."""
     if not isinstance(effect, Crack) or effect.line is None or context.scan is None:
         return None
     groups, line, tried = context.where.groups, effect.line, effect.trials_factor
@@ -303,7 +303,7 @@ def _scored(context: SearchContext, effect: Effect, x: np.ndarray) -> tuple[floa
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A line of the deck loses 50 to 80 % of its bending stiffness, the finer shells in it."""
+    """Remove 50 to 80 % of the bending stiffness of the finer shells along a line of the deck."""
     lines = LineFinder.of(article.deck)
     options = lines.drawn(farthest_point_sample(lines.middle, PLACES), (1.0, 1.7))
     line = options[int(rng.integers(len(options)))]

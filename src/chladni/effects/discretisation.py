@@ -1,4 +1,4 @@
-"""What the mesh of the deck, and the formulation of its elements, hide."""
+"""Discretisation errors: the mesh of the deck and the formulation of its elements."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,22 +16,22 @@ from ..geometry.refine import refined
 from ..model.assembly import Assembly
 from .effect import Effect, Parameter, PointTerm, ShapeChange
 
-MOST = 60_000  # dofs of a structure that is still refined: four times as many take half a minute
-LARGE = 20_000  # dofs from which the refined modes are solved for no farther than they are compared
+MOST = 60_000  # dofs up to which a structure is refined: four times as many take half a minute
+LARGE = 20_000  # dofs from which refined modes are solved only up to the comparison limit
 ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on the refined one
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
-SOFTEST = 0.45  # share of a mode's stiffness that a finer mesh may take: twice it leaves some
-FOOTPRINT = 0.5, 0.7  # the same of footprints: as the deck has them, half as wide, or a quarter
-REGIONS = 4  # of joints whose footprints differ by themselves; each is a refined structure solved
+SOFTEST = 0.45  # largest loss of modal stiffness by a finer mesh: twice as much leaves a rest
+FOOTPRINT = 0.5, 0.7  # prior of footprints, same terms: as in the deck, half as wide, or a quarter
+REGIONS = 4  # regions of joints with their own footprints; each needs one refined solution
 
 
 @dataclass(frozen=True, eq=False)
 class MeshError(Effect):
-    """Modal stiffness moves by x times the change that a mesh twice as fine brings.
+    """Change of modal stiffness: x times that of a mesh twice as fine.
 
-    ``change`` (k,) [rad²/s²] is its diagonal over coordinates ``rows`` (k, n); ``shapes`` (p, k)
-    how much the motion of the places that were measured changes with each of these coordinates.
+    ``change`` (k,) [rad²/s²] is its diagonal over coordinates ``rows`` (k, n). ``shapes`` (p, k) is
+    the change of motion at the measured places for each of these coordinates.
     """
 
     name = "mesh-error"
@@ -43,7 +43,7 @@ class MeshError(Effect):
     shapes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def seen(self, x: np.ndarray) -> ShapeChange | None:
-        """x times what the finer mesh changes of the shapes at sensors and shaker."""
+        """x times the change of the mode shapes at sensors and shaker on the finer mesh."""
         if not len(self.shapes):
             return None
         return ShapeChange(self.rows, self.shapes, float(x[0]), np.ones(1))
@@ -55,7 +55,7 @@ class MeshError(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ModalDiscrepancy(Effect):
-    """Every mode's stiffness may be off a little on its own."""
+    """Independent small errors of the stiffness of each mode."""
 
     name = "jitter"
     claim = "elements of another formulation give slightly other frequencies"
@@ -72,23 +72,23 @@ class ModalDiscrepancy(Effect):
 
 @dataclass(frozen=True, eq=False)
 class JointFootprint(MeshError):
-    """Modal stiffness moves by x times what joints on shells half as wide take away."""
+    """Change of modal stiffness: x times that of joints on shells half as wide."""
 
     name = "joint-footprint"
     claim = "a joint holds as much of a sheet as a shell of the mesh is wide, not as it does"
 
 
-Places = Callable[[Structure], sp.csr_array]  # rows of what was measured, on any mesh
+Places = Callable[[Structure], sp.csr_array]  # rows of the measured dofs, on any mesh
 
 
 def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> list[MeshError]:
-    """What the mesh of a structure hides up to somewhat above ``f_max``; nothing of a large one.
+    """Mesh errors of a structure up to somewhat above ``f_max``; none for a large structure.
 
-    The error of its elements, and, where it has joints on whole shells, that of their footprints:
-    of all alike, and of each region by itself, for two meshers hang one joint on unlike shells.
-    With Ψ the refined modes at the old points, each the partner of one of Φ, B = ΦᵀMΨ made
-    orthogonal, the softest modes first, and ΔK = B Λ_ref Bᵀ - Λ.  B is square, so that x = 1 gives
-    the refined frequencies exactly.
+    The list holds the error of the elements. Joints on whole shells add the error of their
+    footprints: one common to all, and one for each region, because two meshers attach one joint to
+    different shells. Ψ are the refined modes at the old points, paired with the modes Φ. B = ΦᵀMΨ
+    is made orthogonal, softest modes first, and ΔK = B Λ_ref Bᵀ - Λ. B is square, so that x = 1
+    gives the refined frequencies exactly.
     """
     built = model.structure
     made = built.assembly
@@ -128,10 +128,10 @@ def _nowhere(built: Structure) -> sp.csr_array:
 
 @dataclass(frozen=True, eq=False)
 class _ModalChange:
-    """What another mesh changes over the modes of the deck MΦ (n, r).
+    """Changes by another mesh, over the modes of the deck MΦ (n, r).
 
-    ``stiffness`` (r, r) of the modal stiffness λ (r,), ``seen`` (p, r) of the modes where it was
-    measured.
+    ``stiffness`` (r, r) is the change of the modal stiffness λ (r,), ``seen`` (p, r) that of the
+    mode shapes at the measured places.
     """
 
     M_phi: np.ndarray
@@ -140,21 +140,21 @@ class _ModalChange:
     seen: np.ndarray
 
     def __sub__(self, other: Self) -> Self:
-        """What is left without the change of another."""
+        """The difference of two changes."""
         left = self.stiffness - other.stiffness
         return replace(self, stiffness=left, seen=self.seen - other.seen)
 
     def error(self, kind: type[MeshError], prior: tuple[float, float]) -> MeshError:
-        """The nuisance of this change."""
+        """The nuisance effect with this change."""
         change, V = np.linalg.eigh(self._within_reach())
         unknown = Parameter("mesh", "-", *prior, kind="linear", step=0.5)
         rows = sp.csr_array((self.M_phi @ V).T)
         return kind((unknown,), "every mode", rows=rows, change=change, shapes=self.seen @ V)
 
     def _within_reach(self) -> np.ndarray:
-        """The change of stiffness, of far too coarse a mesh no more than it can lose twice over.
+        """The change of stiffness, limited on a coarse mesh so that twice the loss leaves a rest.
 
-        It is laid out as linear, and a mode of five shells a wave loses more than there is.
+        The change is linear in x, and a mode with five shells a wave would lose more than it has.
         """
         root = np.sqrt(self.lam)
         share, V = np.linalg.eigh(self.stiffness / np.outer(root, root))
@@ -166,7 +166,7 @@ class _ModalChange:
 
 @dataclass(frozen=True, eq=False)
 class _CoarseModes:
-    """The modes of the deck: λ (r,), MΦ (n, r), Φ where it was measured (p, r)."""
+    """The modes of the deck: λ (r,), MΦ (n, r), Φ at the measured places (p, r)."""
 
     dofs: np.ndarray
     lam: np.ndarray
@@ -176,12 +176,12 @@ class _CoarseModes:
 
     @classmethod
     def of(cls, built: Structure, modes: ModalModel, places: Places) -> Self:
-        """Of the deck's structure."""
+        """Collect the modes of the deck's structure."""
         lam, phi = (2 * np.pi * modes.frequency) ** 2, modes.shapes
         return cls(built.system.dofs, lam, built.system.M @ phi, places(built) @ phi, places)
 
     def changed_to(self, finer: Structure, modes: ModalModel) -> _ModalChange:
-        """What a finer structure with these modes Ψ changes."""
+        """The change by a finer structure with modes Ψ."""
         overlap = self.M_phi.T @ (finer.rows(self.dofs) @ modes.shapes)
         own, partner = linear_sum_assignment(-(overlap**2))
         soft = np.argsort(self.lam[own], kind="stable")
@@ -195,11 +195,11 @@ class _CoarseModes:
 
 
 def _orthogonal(overlap: np.ndarray) -> np.ndarray:
-    """Columns (n, n) of an overlap of modes made orthogonal in their order, the softest first.
+    """Make the columns (n, n) of a mode overlap orthogonal in their order, the softest first.
 
     Another mass matrix puts δM_ij of a soft mode i into a stiff one j, and only λ_i/λ_j as much of
-    j into i.  The polar factor would share both evenly and turn the soft mode towards the stiff
-    one, which x beyond 1 takes for a loss of x(x - 1) λ_j δM_ij²/4: it can be more than λ_i.
+    j into i. The polar factor would share both evenly and turn the soft mode towards the stiff one.
+    For x beyond 1 this acts as a loss of x(x - 1) λ_j δM_ij²/4, which can exceed λ_i.
     """
     Q, R = np.linalg.qr(overlap)
     return np.asarray(Q * np.where(np.diag(R) < 0, -1.0, 1.0))
@@ -210,7 +210,8 @@ def modal_discrepancy(
 ) -> ModalDiscrepancy:
     """Independent scatter of each modal frequency up to ``f_max``.
 
-    Standard deviation of ln f: ``sd``, and half of what the finer mesh changes in that mode.
+    The standard deviation of ln f combines ``sd`` with half the change of that mode on the finer
+    mesh.
     """
     modes = _flexible(model.up_to(1.1 * f_max), f_max)
     lam = (2 * np.pi * modes.frequency) ** 2

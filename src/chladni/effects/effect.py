@@ -1,19 +1,19 @@
-"""What may differ between model and article, and how it enters the reduced model.
+"""Effects: possible differences between model and test article, and their terms in the model.
 
-An effect acts in five ways, and in no other:
+An effect acts on the reduced model in five ways only:
 
-- it multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
-  stiffness) on groups of shells.  Multiplying calibrated operators, never subtracting nominal
-  ones, keeps every stiffness positive whatever the other parameters do;
-- it adds *point terms* c(p) bᵀb to K or M, rows b of the structure (a spring, a mass), and of
-  degrees of freedom it brings along (a lump on a spring);
-  It may let clamps go (fem/released.py): its rows then reach beyond the dofs of the deck;
-- it adds *operators* c(p) A, A what a part other than a sheet has in K or M already, c > -1;
-- it changes *channels* of the test: gain, sign;
-- it changes *shapes* where they are measured, and only there (a mesh about a sensor).
+- It multiplies *sheet fields* (thickness, stiffness, density, each component of the plane
+  stiffness) on groups of shells. It multiplies calibrated operators and never subtracts nominal
+  ones. Every stiffness therefore stays positive, whatever the other parameters do.
+- It adds *point terms* c(p) bᵀb to K or M, with rows b of the structure (a spring, a mass) and of
+  dofs that it brings along (a mass on a spring). An effect that releases clamps
+  (fem/released.py) has rows beyond the dofs of the deck.
+- It adds *operators* c(p) A, c > -1, where A is the contribution of a part to K or M.
+- It changes *channels* of the test: gain, sign.
+- It changes *shapes* at the measured places only (the mesh around a sensor).
 
 Parameters are unbounded numbers x with a Gaussian prior; :meth:`Parameter.value` gives the
-physical one.
+physical value.
 """
 
 from collections.abc import Sequence
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 FIELDS = ("t", "E", "rho", "bending", "Q11", "Q22", "Q12", "Q66")
 
 
-WIDER = 2.0  # over the learned error: so that 95 % of 160 intervals held the truth on tuning seeds
+WIDER = 2.0  # times the learned error: 95 % of 160 intervals then held the truth on tuning seeds
 
 
 @dataclass(frozen=True)
 class Parameter:
     """One unknown x with prior N(mean, sd²).
 
-    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``; where
-    nothing can go beyond ``reach`` L it is ``scale · exp(L tanh(x/L))``, x as long as x is small.
-    ``step`` is the longest step a fit may take at once, ``starts`` where a search begins. With all
+    The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``. With
+    a finite ``reach`` L it is ``scale · exp(L tanh(x/L))``, which is close to exp(x) for small x.
+    ``step`` is the longest step of a fit, ``starts`` are the first values of a search. With all
     parameters at ``nominal`` an effect does nothing.
     """
 
@@ -62,7 +62,7 @@ class Parameter:
         return float(self.scale * (np.exp(self._drawn_in(x)[0]) if self.kind == "log" else x))
 
     def slope(self, x: float) -> float:
-        """Its derivative by x."""
+        """Derivative of the physical value with respect to x."""
         return self.value(x) * self._drawn_in(x)[1] if self.kind == "log" else self.scale
 
     def _drawn_in(self, x: float) -> tuple[float, float]:
@@ -94,10 +94,10 @@ class FieldChange:
 class PointTerm:
     """Σ_k c_k b_kᵀ b_k added to K or M: rows b (k, n), c (k,), dc/dx (k, n_parameters).
 
-    Where the place itself is unknown, ``moving`` holds ∂b/∂x of the parameters that move it. Of an
-    effect with degrees of freedom of its own, ``own`` (k, own_dofs) is b on these; a base that
-    moves carries them as it does the rows ``carrier`` of the structure. Where a clamp was let go,
-    ``strained`` rows see what deforms alone, not what follows the clamp.
+    If the place is unknown, ``moving`` holds ∂b/∂x for the parameters that move it. If the effect
+    has its own dofs, ``own`` (k, own_dofs) is b on these. A moving base carries them as it carries
+    the rows ``carrier`` of the structure. If a clamp is released, ``strained`` rows take only the
+    deformation, without the motion that follows the clamp.
     """
 
     matrix: Literal["K", "M"]
@@ -112,17 +112,17 @@ class PointTerm:
 
 @dataclass(frozen=True, eq=False)
 class Rise:
-    """How stiffness c A rises with frequency and dissipates: c G A G in its place, η of it lost.
+    """Frequency-dependent stiffness: c G A G replaces c A, with loss factor η.
 
-    G = Φ diag(g) ΦᵀM on the modes Φ of the model as it is without the rise, g = (f/f_0)^p: a mode
-    meets the stiffness of its own frequency, what it mixes with the geometric mean of both. What is
-    so multiplied stays positive.
+    G = Φ diag(g) ΦᵀM on the modes Φ of the model without the rise, g = (f/f_0)^p. A mode has the
+    stiffness at its own frequency, a coupling of two modes that at their geometric mean. The
+    product stays positive.
 
     Attributes
     ----------
     power, gradient : p, (n_parameters,)
     reference : f_0 [Hz]
-    band : (low, high) Hz beyond which it rises no more: nothing was measured there
+    band : (low, high) Hz, the measured band, beyond which the stiffness is constant
     loss, loss_gradient : η, (n_parameters,)
     """
 
@@ -134,7 +134,7 @@ class Rise:
     loss_gradient: np.ndarray
 
     def log_frequency(self, lam: np.ndarray) -> np.ndarray:
-        """ln f/f_0 within the band, of modes with these λ (m,)."""
+        """ln f/f_0, limited to the band, of modes with these λ (m,)."""
         f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
         return np.asarray(np.log(np.clip(f, *self.band) / self.reference))
 
@@ -152,10 +152,10 @@ class MatrixTerm:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """What an effect knows of the test beside what is compared: whitened residuals r (k,).
+    """Whitened residuals r (k,) of an effect in addition to the data that are compared.
 
-    Their slopes by its own parameters (k, n_parameters), and by λ and by the damping ratio that
-    effects bring of every mode of the state (k, modes).
+    Slopes are given with respect to its own parameters (k, n_parameters), and with respect to λ and
+    the damping ratio added by effects for every mode of the state (k, modes).
     """
 
     r: np.ndarray
@@ -174,11 +174,11 @@ class ChannelChange:
 
 @dataclass(frozen=True, eq=False)
 class ShapeChange:
-    """c S b added to the motion of the places that were measured: outputs first, then inputs.
+    """c S b added to the motion of the measured places: outputs first, then inputs.
 
     b are coordinates ``rows`` (k, n) of the structure, S ``shapes`` (places, k), c and dc/dx
-    (n_parameters,). What is local at a sensor no change of K and M over a basis can bring. What
-    follows a clamp that was let go is none of it.
+    (n_parameters,). It represents local changes at a sensor, which no change of K and M over a
+    basis can. Motion that follows a released clamp is not included.
     """
 
     rows: sp.csr_array
@@ -189,7 +189,7 @@ class ShapeChange:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One kind of physics; subclasses say what it does, this one does nothing.
+    """One kind of physics; the base class does nothing, subclasses define the terms.
 
     Attributes
     ----------
@@ -197,21 +197,21 @@ class Effect:
     text : where it acts, in words
     parts, grids : names of parts and ids of grids it concerns
     point : (3,) or None  its place in the basic frame [m]
-    trials_factor : how many places were tried, this one among them (look-elsewhere)
-    replaces : names of ordinary parameters it makes superfluous
-    expected : whether what the deck is made of has it as a rule
+    trials_factor : number of places tried, this one included (look-elsewhere effect)
+    replaces : names of calibration parameters that it makes superfluous
+    expected : whether the materials of the deck usually have it
     """
 
     name: ClassVar[str] = "nothing"
     claim: ClassVar[str] = "the model is right as it is"
     kind: ClassVar[str] = "physics"  # physics, test, ordinary, nuisance
-    writable: ClassVar[bool] = True  # whether a deck could hold it
-    remakes_structure: ClassVar[bool] = False  # so strong that mesh error and basis are made anew
-    elastic: ClassVar[bool] = False  # gives or holds, no more: what rubs there as well is not it
-    lone: ClassVar[bool] = False  # a second one beside it would be no finding
+    writable: ClassVar[bool] = True  # whether a deck can represent it
+    remakes_structure: ClassVar[bool] = False  # strong: mesh error and basis are computed again
+    elastic: ClassVar[bool] = False  # adds or removes stiffness only, without friction
+    lone: ClassVar[bool] = False  # a second one of its kind is not a finding
     rounds: ClassVar[int] = 0  # of loads that its responses cause, see ``reloads``
-    lets_go: ClassVar[bool] = False  # of clamps: its rows reach beyond the dofs of the deck
-    own_dofs: ClassVar[int] = 0  # degrees of freedom it brings: its terms must give them mass
+    lets_go: ClassVar[bool] = False  # releases clamps: its rows reach beyond the dofs of the deck
+    own_dofs: ClassVar[int] = 0  # degrees of freedom it adds: its terms must give them mass
 
     parameters: tuple[Parameter, ...] = ()
     text: str = ""
@@ -225,60 +225,60 @@ class Effect:
     expected: bool = False
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Fields of shells and beams it multiplies."""
+        """Factors on fields of shells and beams."""
         return ()
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """Point springs and masses it adds."""
+        """Added point springs and masses."""
         return ()
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """Operators of the structure it adds."""
+        """Added operators of the structure."""
         return ()
 
     def outputs(self, x: np.ndarray) -> ChannelChange | None:
-        """What it does to the channels of the test."""
+        """Change of the channels of the test."""
         return None
 
     def seen(self, x: np.ndarray) -> ShapeChange | None:
-        """What it does to the motion of the very places that were measured."""
+        """Change of the motion at the measured places only."""
         return None
 
     def beside(self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray) -> Beside | None:
-        """What it is held against beside the data, at λ (m,) and damping that effects bring (m,).
+        """Additional residuals, at λ (m,) and the damping that effects add (m,).
 
-        ``neg2_log_without`` is -2 ln p of the same where it does not act.
+        ``neg2_log_without`` is their -2 ln p without the effect.
         """
         return None
 
     @property
     def neg2_log_without(self) -> float:
-        """-2 ln p, without the effect, of what :meth:`beside` holds it against."""
+        """-2 ln p, without the effect, of the data that :meth:`beside` compares."""
         return 0.0
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Change of the weighed mass [kg] beside the sheet's own, and its gradient (n_p,)."""
+        """Change of the weighed mass [kg], that of the sheets excluded, and its gradient (n_p,)."""
         return 0.0, np.zeros(len(self.parameters))
 
     def lump(self, x: np.ndarray) -> tuple[np.ndarray, float] | None:
-        """Place (3,) [m] and mass [kg], where it is a mass at a place; None: it is none."""
+        """Place (3,) [m] and mass [kg] of an effect that is a mass at a place, else None."""
         return None
 
     @classmethod
     def of_lump(
         cls, where: "Surroundings", point: np.ndarray, mass: float
     ) -> tuple["Effect", np.ndarray] | None:
-        """The effect as a mass [kg] at a place (3,) [m] begins it, and its start; None: not so."""
+        """The effect and its start from a mass [kg] at a place (3,) [m], or None if impossible."""
         return None
 
     def off_the_scales(self, x: np.ndarray) -> float:
-        """Mass [kg] it puts on the structure that is taken off before this is weighed."""
+        """Mass [kg] on the structure during the test that is removed before weighing."""
         return 0.0
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array | None:
-        """Rows b (k, n) whose static response the reduced basis must hold, or None.
+        """Rows b (k, n) whose static response the reduced basis must contain, or None.
 
-        Its points, and A φ of its operators: to first order that is how they change the modes.
+        These are its points, and A φ of its operators: the first-order loads of a change.
 
         Parameters
         ----------
@@ -289,37 +289,37 @@ class Effect:
         return sp.csr_array(sp.vstack([*points, *operators])) if points or operators else None
 
     def released(self, built: Structure) -> Structure:
-        """The structure with the dofs its rows speak of beyond those the deck's supports leave."""
+        """The structure with the additional dofs of its rows, which the deck's supports remove."""
         return built
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """Loads (n, k) that static responses (n, k) of the last round cause in their turn.
+        """Loads (n, k) caused by the static responses (n, k) of the previous round.
 
-        What acts strongly changes modes beyond first order: the basis holds the responses to these
-        as well, ``rounds`` times.
+        A strong effect changes modes beyond first order. The basis then contains the responses to
+        these loads as well, ``rounds`` times.
         """
         return M @ static
 
     def recentred(self, x: np.ndarray, where: "Surroundings") -> tuple["Effect", np.ndarray] | None:
-        """The effect about the place it moved to, and its start there; None: it is near enough."""
+        """The effect centred on its fitted place, and its start; None if it is near enough."""
         return None
 
     def with_reference_state(self, x: np.ndarray) -> Self:
-        """The same effect on a structure that has it already as x says (``remakes_structure``)."""
+        """The effect on a structure that already contains it at x (``remakes_structure``)."""
         return self
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The structure with the effect written into it."""
+        """Write the effect into the structure."""
         return assembly
 
     def deck_comment(self, x: np.ndarray) -> str:
-        """What of it no card that is written holds, for whoever runs the deck; "" where none is."""
+        """Note on what the cards of the deck do not represent; "" if nothing is missing."""
         return ""
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
         """Physical values of the parameters with their 95 % intervals.
 
-        Laplace's intervals are :meth:`widened`: model error makes them too narrow.
+        Laplace intervals are :meth:`widened`, because model error makes them too narrow.
         """
         wide = self.widened(sd)
         return tuple(
@@ -328,10 +328,10 @@ class Effect:
         )
 
     def widened(self, sd: np.ndarray) -> np.ndarray:
-        """Standard deviations (n,) of a fit, what the data say of each ``WIDER`` times as wide.
+        """Standard deviations (n,) of a fit, with the part of the data ``WIDER`` times as wide.
 
-        Data of the precision 1/sd² - 1/sd_0² beside a prior sd_0: model error makes these less
-        certain and leaves the prior what it is, so that nothing is less certain than before.
+        With prior sd_0 the data have the precision 1/sd² - 1/sd_0². Model error reduces this
+        precision and leaves the prior unchanged. Hence no result is wider than its prior.
         """
         prior = np.array([p.sd for p in self.parameters])
         with np.errstate(divide="ignore"):
@@ -339,33 +339,33 @@ class Effect:
         return np.asarray(1 / np.sqrt(1 / prior**2 + told / WIDER**2))
 
     def location(self, x: np.ndarray) -> Location:
-        """Where it is once it has been fitted."""
+        """The place of the effect after a fit."""
         return self.where()
 
     def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
-        """The same, with how well the place is known where the fit says so."""
+        """The fitted place with its uncertainty, where the fit gives one."""
         return self.location(x)
 
     def becomes(self, x: np.ndarray) -> str:
-        """The simpler effect that it is at x for all the data can tell; "" where it is its own."""
+        """Name of the simpler effect that the data cannot distinguish from it at x, or ""."""
         return ""
 
     def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
-        """The simpler effect that it is somewhere in its intervals about x, or ""."""
+        """Name of the simpler effect to which it reduces within its intervals about x, or ""."""
         return ""
 
     def implausible(self, x: np.ndarray) -> str:
-        """Why its value at x is none such a thing can have; "" where it may."""
+        """Why its value at x is physically impossible; "" if it is possible."""
         return ""
 
     def starts(self) -> list[np.ndarray]:
-        """Points from which a fit begins: every combination of its parameters' starts."""
+        """Start points of a fit: every combination of the starts of its parameters."""
         options = [p.starts or (p.mean,) for p in self.parameters]
         grid = np.meshgrid(*options, indexing="ij") if options else []
         return [np.array(x) for x in zip(*(g.ravel() for g in grid), strict=True)]
 
     def where(self) -> Location:
-        """The place it was made for."""
+        """The nominal place of the effect."""
         return Location(
             self.text,
             tuple(self.parts),
@@ -377,5 +377,5 @@ class Effect:
 
 
 def count(effects: Sequence[Effect]) -> int:
-    """How many parameters these effects have together."""
+    """Total number of parameters of some effects."""
     return sum(len(effect.parameters) for effect in effects)

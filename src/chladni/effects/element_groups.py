@@ -1,11 +1,11 @@
-"""The shells and beams of a structure, split by what scales them and gathered in groups.
+"""The shells and beams of a structure, collected in groups and split by powers of thickness.
 
-A shell's stiffness is E (t A + t³ B); its mass is ρ t m.  With the element matrices of A, B and m
-projected group by group, any smooth field of thickness, modulus or density is a weight per group,
-and the reduced model never goes back to elements.
+The stiffness of a shell is E (t A + t³ B); its mass is ρ t m. The element matrices of A, B and m
+are projected group by group. Any smooth field of thickness, modulus or density is then one weight
+for each group, and the reduced model does not return to elements.
 
-Of a beam t is the wall of a thin tube: A (shear areas with it), I1, I2, I12 and J go with it, so
-that its stiffness is E t A and its mass ρ t m exactly.
+For a beam, t is the wall of a thin tube. Its area and shear areas, I1, I2, I12 and J are
+proportional to t. Hence its stiffness is E t A and its mass ρ t m exactly.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,10 +30,10 @@ from .shell_components import component_matrices, thickness_split
 
 @dataclass(frozen=True, eq=False)
 class ElementGroups:
-    """Element matrices of all shells, then of all member beams, and the groups they are in.
+    """Element matrices of all shells, then of all member beams, and their groups.
 
-    No fastener is among the beams: what is wrong with these is asked of joints. A beam has the rows
-    of its two ends; the other twelve are zero.
+    Fasteners are not included; errors of fasteners belong to the effects of joints. A beam uses the
+    rows of its two ends; the other twelve are zero.
 
     Attributes
     ----------
@@ -62,16 +62,16 @@ class ElementGroups:
 
     @cached_property
     def sheet(self) -> np.ndarray:
-        """Which groups are of shells (g,) bool; these come first."""
+        """Mask (g,) of the groups of shells, which come first."""
         n = self.group[: len(self.structure.assembly.shells)].max(initial=-1) + 1
         return np.arange(len(self)) < n
 
     @cached_property
     def connected(self) -> np.ndarray:
-        """Which connected sheet, or beams, each group belongs to (g,): what shares grids is one."""
+        """Index (g,) of the connected sheet, or set of beams, of each group; they share grids."""
         assembly, parts = self.structure.assembly, self.part[self.group]
         nodes = self.nodes.copy()
-        nodes[len(assembly.shells) :] += len(assembly.points)  # beams hold no sheets together
+        nodes[len(assembly.shells) :] += len(assembly.points)  # beams do not connect sheets
         touch = sp.coo_array(
             (np.ones(4 * len(parts)), (np.repeat(parts, 4), nodes.ravel())),
             shape=(len(assembly.parts), 2 * len(assembly.points)),
@@ -79,9 +79,10 @@ class ElementGroups:
         return np.asarray(connected_components(touch @ touch.T, directed=False)[1][self.part])
 
     def components(self) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
-        """``linear`` and ``cubic`` by the component of the plane stiffness; beams go with Q66.
+        """``linear`` and ``cubic`` for each component of the plane stiffness; beams go with Q66.
 
-        One after another: of a large sheet all of them weigh as much as all else that is known.
+        They come one at a time, because all of them together would double the memory of a large
+        model.
         """
         m = len(self.structure.assembly.shells)
         for name, pair in component_matrices(self.structure.assembly):
@@ -92,9 +93,9 @@ class ElementGroups:
     def project(
         self, kinds: Sequence[np.ndarray], basis: Basis, last: int | None = None
     ) -> list[np.ndarray]:
-        """Φᵀ A_g W of every group g (n_groups, r, last) and of each kind of element matrices.
+        """Φᵀ A_g W of every group g (n_groups, r, last), for each kind of element matrices.
 
-        W are the last columns of Φ; all of them where it is not said how many.
+        W are the ``last`` columns of Φ; by default all of them.
         """
         r = basis.shape[1]
         k = r if last is None else last
@@ -107,7 +108,7 @@ class ElementGroups:
         return out
 
     def carried(self, basis: Basis, motion: np.ndarray) -> np.ndarray:
-        """Φᵀ m_g R of a motion of all points (6 n_points, k) and every group: (n_groups, r, k)."""
+        """Φᵀ m_g R (n_groups, r, k) of each group g, for a motion R (6 n_points, k) of points."""
         of_each = [
             place.motion(basis).T @ place.forces(self.mass, motion[place.dofs])
             for place in self._places
@@ -116,14 +117,14 @@ class ElementGroups:
 
     @cached_property
     def _places(self) -> list["_Place"]:
-        """Of every group where its elements are."""
+        """The elements and dofs of every group."""
         dofs = (6 * self.nodes[:, :, None] + np.arange(6)).reshape(len(self.nodes), 24)
         return [_Place.of(on, dofs[on], self.structure.T) for on in alike(self.group)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Elements of a group and the motion of their points, without the rest of the structure.
+    """Elements of one group and the motion of their points, without the rest of the structure.
 
     Attributes
     ----------
@@ -143,7 +144,7 @@ class _Place:
 
     @classmethod
     def of(cls, elements: np.ndarray, dofs: np.ndarray, T: sp.csr_array) -> Self:
-        """Of elements with these dofs (m, 24)."""
+        """Collect elements with these dofs (m, 24)."""
         mine, at = np.unique(dofs, return_inverse=True)
         at = at.reshape(dofs.shape)
         entries = (np.ones(at.size), (at.ravel(), np.arange(at.size)))
@@ -166,9 +167,9 @@ class _Place:
 def group_of_shells(
     centre: np.ndarray, part: np.ndarray, area: np.ndarray, most: int = 64
 ) -> np.ndarray:
-    """Group of each shell (m,): every part halved along its longest side until pieces are alike.
+    """Group of each shell (m,): the largest piece of a part is halved along its longest side.
 
-    The number of groups of a part follows its area; none mixes parts.
+    The number of groups of a part is proportional to its area; no group contains two parts.
     """
     out = np.full(len(part), -1)
     share = np.bincount(part, area) / area.sum()
@@ -192,10 +193,10 @@ def _halves(piece: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
 
 
 def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
-    """The shells of a structure, and likewise its beams, gathered in about ``most`` groups.
+    """Collect the shells and the beams of a structure, each in about ``most`` groups.
 
     Transverse shear with residual bending flexibility grows with a power of t between one and
-    three; its matrix is split so that value and first derivative are exact.
+    three. Its matrix is split so that value and first derivative are exact.
     """
     shells, beams = _shells(structure.assembly), _beams(structure.assembly)
     linear, cubic, mass, nodes, centre, area, of = (
@@ -219,7 +220,7 @@ def element_groups(structure: Structure, most: int = 64) -> ElementGroups:
 
 
 def _stacked(of_shells: np.ndarray, of_beams: np.ndarray) -> np.ndarray:
-    """Both kinds, the matrices of a large sheet not copied where there is no beam."""
+    """Stack both kinds; without beams the large matrices of the shells are not copied."""
     return np.concatenate([of_shells, of_beams]) if len(of_beams) else of_shells
 
 
@@ -246,7 +247,7 @@ def _shells(assembly: Assembly) -> _Elements:
 
 
 def _beams(assembly: Assembly) -> _Elements:
-    """The members; what they carry of non-structural mass stays with the rest."""
+    """Member beams without their non-structural mass, which stays in the rest of the model."""
     beams = picked(assembly.beams, member_beams(assembly))
     plain = tuple(
         part.with_section(nonstructural=0.0, nonstructural_inertia=0.0)

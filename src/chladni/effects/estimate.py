@@ -1,4 +1,4 @@
-"""What a fitted effect says of itself: how large it is and where (SI)."""
+"""Results of a fitted effect: its size and its place (SI)."""
 
 from dataclasses import dataclass
 
@@ -16,10 +16,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Location:
-    """Where an effect acts: in words, and as far as it is known in numbers.
+    """Place of an effect in words and, if known, in numbers.
 
-    ``radius_m`` is how far what is spread reaches; of what sits at one place, how well that is
-    known.
+    ``radius_m`` is the extent of a distributed effect, or the uncertainty of the place of a local
+    one.
     """
 
     text: str = ""

@@ -1,4 +1,4 @@
-"""A contact with the ground the model does not know of."""
+"""A contact with the ground that is missing from the model."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -18,17 +18,17 @@ from .search_context import Candidate, SearchContext
 from .surroundings import Surroundings
 
 TILT = 0.5  # prior sd of the tangent of its tilt: folds of a sheet have normals up to 45 deg apart
-FLATTEST = 0.2  # cosine to a new normal below which the tilt is no longer followed
-ACROSS = 0.97  # cosine to the normal up to which a direction is not worth a word
+FLATTEST = 0.2  # least cosine to a new normal for which the tilt is converted exactly
+ACROSS = 0.97  # cosine to the normal from which the direction is not reported
 TRIED = np.exp(np.linspace(-4.5, 4.5, 9))  # multiples of the prior median
 
 
 @dataclass(frozen=True, eq=False)
 class ExtraSupport(MovableAttachment):
-    """A spring to ground at an unknown place, in about the direction of the normal.
+    """A spring to ground at an unknown place, roughly along the normal.
 
-    x = (ln strength, place along both axes of the patch, tilt towards each of them): what touches
-    an edge or a fold seldom pushes along a normal.
+    x = (ln strength, place along both axes of the patch, tilt towards each of them). The tilt is
+    needed because a contact at an edge or a fold seldom acts along the normal.
     """
 
     name = "extra-support"
@@ -58,18 +58,18 @@ class ExtraSupport(MovableAttachment):
         return (PointTerm("K", rows, np.array([c]), c * np.eye(5)[:1], moving),)
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """Across the sheet at the grids next to the start; within it, where it moves little."""
+        """Rows across the sheet at 7 grids near the start, and in its plane at the 3 nearest."""
         assert self.patch is not None
         near = np.argsort((self.patch.flat**2).sum(axis=1))
         across, *within = self.patch.rows
         return sp.csr_array(sp.vstack([across[near[:7]], *(rows[near[:3]] for rows in within)]))
 
     def pushes(self, x: np.ndarray) -> np.ndarray:
-        """Its direction in the basic frame (3,)."""
+        """Direction of the spring in the basic frame (3,)."""
         return _tilted(x[3:])[0] @ np.stack([self.direction, *tangents(self.direction)])
 
     def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
-        """About the grid it moved to, pushing as it did."""
+        """The effect centred on the grid it moved to, with the same direction of force."""
         again = super().recentred(x, where)
         if again is None:
             return None
@@ -81,13 +81,13 @@ class ExtraSupport(MovableAttachment):
         return effect, np.append(start[:3], tilt)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CBUSH to ground at the place, led to from the nearest grid."""
+        """Write a CBUSH to ground at the place, attached to the nearest grid."""
         row = assembly.rows([self.nearest(x)])
         k, d = self.parameters[0].value(x[0]), self.pushes(x)
         return with_ground_bushes(assembly, row, d[None], k, self.at(x)[None])
 
     def location(self, x: np.ndarray) -> Location:
-        """The place a fit moved it to, and how it pushes where that is not across the sheet."""
+        """The fitted place, and the direction where it is not across the sheet."""
         found, d = super().location(x), self.pushes(x)
         if abs(d @ self.direction) > ACROSS:
             return found
@@ -109,7 +109,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A spring of 2 to 50 kN/m along z at a grid."""
+    """Add a spring to ground of 2 to 50 kN/m along z at a grid."""
     grid = article.shell_grid(rng)
     K = float(np.exp(rng.uniform(np.log(2e3), np.log(5e4))))
     at = article.grids_at(np.array([grid]))

@@ -1,4 +1,4 @@
-"""A family of effects: all that the rest of the program knows of it."""
+"""A family of effects: its interface to search, bench, deck and page."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -18,18 +18,18 @@ from .surroundings import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class Article:
-    """What stands on the virtual bench and how it is tested, with the sealed truth.
+    """A test article on the virtual bench, its test and the concealed truth.
 
     Attributes
     ----------
     assembly : the article, meshed finer than the deck
-    deck : what the user will have
+    deck : the deck given to the user
     outputs, hangers : (k,) int    grid ids of the deck
     gains : (n_out,)               factor on every channel
-    off_scale : mass that is taken off before the article is weighed [kg]
-    drive : grid id of the deck and direction of the force, or None where none is known
-    truth : what was concealed; ``parameters`` by the names the effect reports, ``value`` the first
-        of them, ``point_m`` and ``channel`` where it has a place
+    off_scale : mass that is removed before the article is weighed [kg]
+    drive : grid id of the deck and direction of the force, or None if unknown
+    truth : the concealed effect; ``parameters`` by the names that the effect reports, ``value`` the
+        first of them, ``point_m`` and ``channel`` where it has a place
     """
 
     assembly: Assembly
@@ -47,33 +47,34 @@ class Article:
         return mass_properties(self.assembly)[0]
 
     def grids_at(self, grids: np.ndarray) -> tuple[int, ...]:
-        """Ids of the article's grids that lie where these of the deck lie."""
+        """Ids of the article's grids nearest to some grids of the deck."""
         where = self.deck.points[self.deck.rows(grids)]
         return tuple(self.assembly.ids[nearest_points(self.assembly.points, where)].tolist())
 
     def shell_grid(self, rng: np.random.Generator) -> int:
-        """Id of a grid of the deck's shells, or of its beams where it has none, any of them."""
+        """Id of a random grid of the deck's shells, or of its beams if it has no shells."""
         nodes = self.deck.shells.nodes if len(self.deck.shells) else self.deck.beams.nodes
         return int(self.deck.ids[rng.choice(np.unique(nodes))])
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """One kind of physics as search, bench, deck and page know it.
+    """One kind of physics, as used by search, bench, deck and page.
 
     Attributes
     ----------
-    effect : its class, which holds name, claim and physics
-    conceal : puts it into an article, of a size and at a place drawn at random, with the truth
-    placed : its effects where deck and test tell their place
-    candidates : what is worth a fit, where the place is unknown; of ``placed`` the best starts
-    closer : one that was fitted at x, next to its place, if it explains more there; the last of
-        the context's ``bases`` is that of the fit
-    cards : of the deck that hold it
-    no_cards : why none can
-    settled_by : the measurement that tells it from what looks like it, in words
-    needs : what a structure must have beside its sheets for it to act, in words; "": nothing
-    on_sheets : whether it acts on shells alone, so that a structure of beams is not asked for it
+    effect : its class, with name, claim and physics
+    conceal : function that puts it into an article at random, in size and place, with the truth
+    placed : function that gives its effects where deck and test define the place
+    candidates : function that proposes fits where the place is unknown; without it, the best
+        starts of ``placed``
+    closer : function that moves an effect fitted at x if it explains more next to its place; the
+        last of the context's ``bases`` is that of the fit
+    cards : of the deck that represent it
+    no_cards : why no card can
+    settled_by : the measurement that separates it from similar causes, in words
+    needs : what the structure must have in addition to sheets, in words; "": nothing
+    on_sheets : whether it acts on shells only, so that a structure of beams does not try it
     """
 
     effect: type[Effect]
@@ -100,11 +101,11 @@ class Family:
 
     @property
     def name(self) -> str:
-        """The name of the public contract."""
+        """The public name."""
         return self.effect.name
 
     def proposed(self, context: SearchContext) -> list[Candidate]:
-        """What of this family is worth a fit; nothing where it has nothing to act on."""
+        """Candidates of this family that are worth a fit; none if there is nothing to act on."""
         if self.on_sheets and not context.where.groups.sheet.any():
             return []
         if self.candidates is not None:

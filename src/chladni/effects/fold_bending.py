@@ -1,8 +1,8 @@
-"""Bending stiffness of shells at folds: what no two meshes, codes or tools make alike.
+"""Bending stiffness of shells at folds, which differs between meshes, codes and tools.
 
-A radius of 5 mm is a sharp edge between shells of 20 mm; a solver that makes solids of shells ties
-their ends at an edge rigidly, another lets them turn; a bead smaller than a shell is not in the
-deck at all. Membrane and mass are the same in all of them.
+A radius of 5 mm is a sharp edge between shells of 20 mm. One solver makes solids of shells and ties
+their ends at an edge rigidly; another lets them rotate. A bead smaller than a shell is missing from
+the deck. Membrane and mass are the same in all of them.
 """
 
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from .effect import Effect, FieldChange, Parameter
 from .element_groups import ElementGroups
 
 SPREAD = 0.4  # prior sd of ln of the bending stiffness of a shell with folds at all corners
-LEAST = 0.02  # share at folds of those groups that have any, below which a part has no factor
+LEAST = 0.02  # share at folds, in groups that have folds, below which a part has no factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class FoldBending(Effect):
 
 
 def fold_bending(groups: ElementGroups) -> list[FoldBending]:
-    """One factor for every part of shells that is folded anywhere."""
+    """One factor for every part of shells that has a fold."""
     assembly = groups.structure.assembly
     cells, points = assembly.shells.nodes, assembly.points
     if not len(cells):
