@@ -86,9 +86,11 @@ def mesh_errors(model: Modelled, f_max: float, places: Places | None = None) -> 
 
     The list holds the error of the elements. Joints on whole shells add the error of their
     footprints: one common to all, and one for each region, because two meshers attach one joint to
-    different shells. Ψ are the refined modes at the old points, paired with the modes Φ. B = ΦᵀMΨ
-    is made orthogonal, softest modes first, and ΔK = B Λ_ref Bᵀ - Λ. B is square, so that x = 1
-    gives the refined frequencies exactly.
+    different shells.
+
+    The refined modes Ψ at the old points are paired with the modes Φ. B = ΦᵀMΨ is made orthogonal,
+    softest modes first, and ΔK = B Λ_ref Bᵀ - Λ. B is square, so that x = 1 gives the refined
+    frequencies exactly.
     """
     built = model.structure
     made = built.assembly

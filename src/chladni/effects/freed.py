@@ -1,9 +1,9 @@
-"""The numbers a user frees: a field of parts, joints or masses, one factor e^y for all of them.
+"""User parameters: a field of parts, joints or masses, one factor e^y for all of them.
 
-y(x) is x within bounds and bends towards them, y = b tanh(x / b), so a bound is never passed and
-the slope at the deck's own value is one. Parts of several kinds share the factor: shells and
-beams by their fields, solids, fasteners, springs, bushes and masses by their operators. Operators
-of two numbers of one part add up; their product, of second order, is left out.
+Without bounds y = x. A bound b gives y = b tanh(x / b): it is never passed, and the slope at the
+deck's value is one. Parts of several kinds share the factor: shells and beams by their fields,
+solids, fasteners, springs, bushes and masses by their operators. The operators of two parameters of
+one part are added; their second-order product is neglected.
 """
 
 from collections.abc import Sequence
@@ -30,16 +30,16 @@ UNITS = {
     **{"nu": "-", "nu12": "-", "K": "N/m", "M": "kg"},
 }
 SD = {**SPREAD, "nu": 0.1, "nu12": 0.2}  # prior sd of ln(value / deck's value); others SD_OTHERS
-SD_OTHERS = 0.3  # joints and directional moduli are known worse
-NEAR_BOUND = 0.9  # of the way to a bound: the answer leans on it
+SD_OTHERS = 0.3  # joints and directional moduli are less certain
+NEAR_BOUND = 0.9  # of the way to a bound: the value counts as on the bound
 SAME = 1e-9
-AWAY = 1e-3  # relative step to the points between which the second slope is taken
-SERVES = 0.3  # of the way of nu to 1/2: as far as two terms of 1/(1 - 2 nu) serve, to 3 %
+AWAY = 1e-3  # relative step of the finite difference for the second slope
+SERVES = 0.3  # of the way of nu to 1/2: there two terms of 1/(1 - 2 nu) are accurate to 3 %
 
 
 @dataclass(frozen=True, eq=False)
 class Freed(Effect):
-    """Members that share their parameters; of a single one, bounds of ln factor."""
+    """Members that share their parameters; a single parameter may have bounds of ln factor."""
 
     name = "part-scale"
     claim = "an ordinary value of the deck is off"
@@ -48,7 +48,7 @@ class Freed(Effect):
     members: tuple[Effect, ...] = ()
     low: float = -np.inf
     high: float = np.inf
-    called: str = ""  # by the user
+    called: str = ""  # name given by the user
 
     def y(self, x: np.ndarray) -> tuple[np.ndarray, float]:
         """The members' parameters and dy/dx; several parameters have no bounds."""
@@ -61,50 +61,50 @@ class Freed(Effect):
         return np.array([y]), float(1 - (y / bound) ** 2)
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Those of all members."""
+        """Field changes of all members."""
         y, slope = self.y(x)
         return tuple(
             replace(c, gradient=slope * c.gradient) for m in self.members for c in m.fields(y)
         )
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """Those of all members."""
+        """Point terms of all members."""
         y, slope = self.y(x)
         return tuple(
             replace(t, gradient=slope * t.gradient) for m in self.members for t in m.terms(y)
         )
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """Those of all members."""
+        """Operators of all members."""
         y, slope = self.y(x)
         return tuple(
             replace(t, gradient=slope * t.gradient) for m in self.members for t in m.matrices(y)
         )
 
     def outputs(self, x: np.ndarray) -> ChannelChange | None:
-        """Of the first member that has any; only effects of the test have."""
+        """Channel changes of the first member that has any; only effects of the test have them."""
         found = (m.outputs(self.y(x)[0]) for m in self.members)
         return next((c for c in found if c is not None), None)
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """What all members add to the scales."""
+        """Change of the weighed mass by all members."""
         y, slope = self.y(x)
         each = [m.weight(y) for m in self.members]
         return sum(w for w, _ in each), slope * np.sum([g for _, g in each], axis=0)
 
     def off_the_scales(self, x: np.ndarray) -> float:
-        """What all members put there."""
+        """Mass [kg] of all members that is removed before weighing."""
         return sum(m.off_the_scales(self.y(x)[0]) for m in self.members)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """All members written."""
+        """Write all members."""
         y, _ = self.y(x)
         for member in self.members:
             assembly = member.apply(assembly, y)
         return assembly
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Value and interval within the bounds; :meth:`on_bound` says whether it leans on one."""
+        """Value and interval within the bounds; :meth:`on_bound` detects a value at a bound."""
         if len(x) > 1 or not len(self.parameters):
             return self.members[0].reported(x, sd)
         p, reach = self.parameters[0], 1.96 * self.widened(sd)
@@ -112,17 +112,17 @@ class Freed(Effect):
         return (Estimate(p.name, here, p.unit, low, high),)
 
     def on_bound(self, x: np.ndarray) -> bool:
-        """True where the value is all but at a bound, so that it may stand for something else."""
+        """True if the value is close to a bound, so that it may compensate for something else."""
         y = float(self.y(x)[0][0])
         return len(x) == 1 and not NEAR_BOUND * self.low < y < NEAR_BOUND * self.high
 
     def location(self, x: np.ndarray) -> Location:
-        """Where it is."""
+        """The place after a fit."""
         return self.members[0].location(self.y(x)[0]) if len(x) > 1 else self.where()
 
 
 def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
-    """The effect of one number a user frees."""
+    """The effect of one user parameter."""
     built = groups.structure
     parts = built.assembly.parts
     members: list[Effect] = []
@@ -146,7 +146,7 @@ def freed(groups: ElementGroups, free: FreeParameter) -> Freed:
 
 
 def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:
-    """Bounds of ln(value / deck's value): the user's, and of nu how far its expansion serves."""
+    """Bounds of ln(value / deck's value): the user's, and for nu the range of its expansion."""
     low = -np.inf if free.low is None else float(np.log(free.low))
     high = np.inf if free.high is None else float(np.log(free.high))
     if free.field == "nu":
@@ -157,7 +157,7 @@ def _bounds(parts: Sequence[Part], free: FreeParameter) -> tuple[float, float]:
 
 
 def freed_effect(effect: Effect, called: str) -> Freed:
-    """An effect whose place is known, free in every fit."""
+    """An effect of known place as a free parameter of every fit."""
     return Freed(
         effect.parameters, effect.text, effect.parts, effect.grids, replaces=effect.replaces,
         members=(effect,), called=called,
@@ -182,7 +182,7 @@ def _lumps(free: FreeParameter) -> tuple[tuple[str, tuple[int, ...]], ...]:
 
 
 def _of_part(built: Structure, k: int, name: str) -> LinearScale:
-    """E or rho of solids, also the wall of fasteners, nu, moduli of an orthotropic sheet."""
+    """E or rho of solids, the wall of fasteners, nu, or moduli of an orthotropic sheet."""
     part, write = built.assembly.parts[k], PartWriter(k, name)
     text = f"{name} of {part.name}"
     if name in TUBE:
@@ -205,7 +205,7 @@ def _three(slope: Slope) -> tuple[Any, Any, Any]:
 
 
 def _scaled(slope: Slope, v: float) -> Slope:
-    """By the factor on the value: v times the slope by the value."""
+    """Slope with respect to the factor: v times the slope with respect to the value."""
     return Slope(*(v * A for A in _three(slope)))
 
 
@@ -225,7 +225,7 @@ def _mass(assembly: Assembly, row: int) -> float:
 
 @dataclass(frozen=True)
 class PartWriter:
-    """Puts a factor on a field of one part."""
+    """Multiply a field of one part by a factor."""
 
     position: int
     field: str
@@ -239,7 +239,7 @@ class PartWriter:
 
 @dataclass(frozen=True)
 class LumpWriter:
-    """Puts a factor on the values of some springs, bushes or masses."""
+    """Multiply the values of some springs, bushes or masses by a factor."""
 
     family: str
     rows: tuple[int, ...]
@@ -254,7 +254,7 @@ class LumpWriter:
 
 
 def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assembly:
-    """The assembly with the number times a factor, everywhere it stands, nothing linearised."""
+    """Multiply a user parameter by a factor in all its parts and joints, without linearisation."""
     whole = free.field in (*SHEET, *TUBE)
     of_solids = [k for k in free.positions if isinstance(assembly.parts[k].section, SolidSection)]
     fields = [k for k in free.positions if whole and k not in of_solids]
@@ -269,7 +269,7 @@ def with_factor(assembly: Assembly, free: FreeParameter, factor: float) -> Assem
 
 
 def values_of(assembly: Assembly, free: FreeParameter) -> np.ndarray:
-    """The deck's values of what shares the factor (n,), springs' and bushes' in any order."""
+    """The deck's values (n,) of all members that share the factor."""
     out = [number(assembly.parts[k], free.field) for k in free.positions]
     out += [float(assembly.springs.value[r]) for r in free.springs]
     stiff = assembly.bushes.stiffness[list(free.bushes)]
@@ -289,7 +289,7 @@ def number(part: Part, name: str) -> float:
 
 
 def changed(part: Part, name: str, factor: float) -> Part:
-    """The part with a field times a factor; E takes all moduli along."""
+    """Multiply a field of a part by a factor; E scales all moduli of the part."""
     section = part.section
     if isinstance(section, SolidSection):
         material = section.material

@@ -1,9 +1,9 @@
-"""A hem whose sheets do not slide along it, where the model has soft sealant alone.
+"""A hem whose sheets do not slide along it, where the model has only soft sealant.
 
-In a hem the outer sheet is folded round the inner one: what a box section gains in torsion is that
-the inner edge cannot slide along the fold (Echaniz Granado 2015, section 5.3.2, speaks of the edge
-that cannot go into the fold; of the two it is the sliding that stiffens).  All round, a far stiffer
-sealant does the same to all frequencies; along a stretch it does not.
+In a hem the outer sheet is folded round the inner one. A box section gains torsional stiffness
+because the inner edge cannot slide along the fold. Echaniz Granado (2015, section 5.3.2) describes
+an edge that cannot move into the fold, but the sliding is the motion that matters. Along the whole
+hem, a far stiffer sealant changes all frequencies in the same way; along a stretch it does not.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from .search_context import Candidate, SearchContext
 
 MEDIAN, SD = 1e9, 3.0  # [N/m²] stiffness against sliding per length, sd of its ln
 STARTS = (-1.5, 0.5, 2.5)
-HAT = 0.06  # [m] distance of loads whose responses the basis holds
+HAT = 0.06  # [m] spacing of the loads whose responses the basis contains
 STRETCH, STRETCH_SD = 0.15, 0.7  # of the line: half of a stretch, sd of its ln
 PLACES = 10  # along a line, tried as the middle of a stretch
 SQUARE = 4  # power of the distance in the edge of a stretch: even
@@ -33,8 +33,8 @@ END = 1e-3  # of the stiffness in the middle: less is not written
 class HemContact(Effect):
     """K + Σ_i k L_i w_i b_iᵀ b_i, b_i the sliding and L_i the length of solid i along the line.
 
-    w = 1 all along, or exp(-(d/ℓ)⁴) at the distance d from the middle of a stretch of length 2ℓ:
-    x = (ln k, middle over half the line's length, ln ℓ).
+    Along the whole line w = 1 and x = (ln k,). On a stretch of length 2ℓ w = exp(-(d/ℓ)⁴) at the
+    distance d from its middle, and x = (ln k, middle over half the line's length, ln ℓ).
     """
 
     name = "hem-contact"
@@ -45,7 +45,7 @@ class HemContact(Effect):
 
     @property
     def local(self) -> bool:
-        """Whether a stretch is meant."""
+        """True for a contact along a stretch."""
         return len(self.parameters) > 1
 
     def weights(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ class HemContact(Effect):
         return (PointTerm("K", self.rows, c, gradient),)
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """Hats along the line, each of the loads of the springs near it."""
+        """Hat functions along the line, as weights on the loads of the springs."""
         assert self.line is not None
         assert self.rows is not None
         count = min(len(self.line), max(2, round(self.line.length / HAT)))
@@ -78,13 +78,13 @@ class HemContact(Effect):
         return sp.csr_array(sp.csr_array(np.array(hats)) @ self.rows)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CBUSH between two RBE3 at one place, wherever the hem holds."""
+        """Write a CBUSH between two RBE3 at each place where the hem holds."""
         assert self.line is not None
         k = self.terms(x)[0].coefficient
         return self.line.gripped(assembly, np.where(k > END * k.max(), k, 0.0))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Stiffness against sliding per length, and the length of a stretch."""
+        """Sliding stiffness per length, and the length of a stretch."""
         k, *rest = super().reported(x, sd)
         if not self.local:
             return (k,)
@@ -94,7 +94,7 @@ class HemContact(Effect):
         return k, Estimate("L", 2 * L.value, "m", 2 * L.low, 2 * L.high)
 
     def location(self, x: np.ndarray) -> Location:
-        """The stretch, from its one end to the other."""
+        """The stretch, from one end to the other."""
         if not self.local or self.line is None:
             return self.where()
         _, middle, reach = self.parameters
@@ -112,7 +112,7 @@ class HemContact(Effect):
 
 
 def everywhere(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
-    """No sliding all along a line."""
+    """The contact along a whole line."""
     k = Parameter("K", "N/m2", 0.0, SD, MEDIAN, step=1.0, starts=STARTS, nominal=NOTHING)
     return HemContact(
         (k,), f"along all of {line.name}", line.sheets, trials_factor=tried, line=line, rows=rows
@@ -120,7 +120,7 @@ def everywhere(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
 
 
 def along_stretch(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
-    """No sliding along a stretch of a line, anywhere on it."""
+    """The contact along a stretch of a line, at an unknown place."""
     whole, half = everywhere(line, rows, tried), line.length / 2
     middle = Parameter("s", "m", 1.0, 3**-0.5, half, "linear", step=0.1)
     reach = Parameter("L", "m", 0.0, STRETCH_SD, STRETCH * line.length, step=0.3)
@@ -130,7 +130,7 @@ def along_stretch(line: HemLine, rows: sp.csr_array, tried: int) -> HemContact:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """Every string of adhesive, all along and where a stretch of it explains most."""
+    """Every string of adhesive, as a whole and with the stretch that explains most."""
     built = context.where.groups.structure
     lines = hem_lines(built.assembly)
     out = []
@@ -146,7 +146,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """No sliding all along a string, 1e9 to 1e10 N/m²."""
+    """Block the sliding along a whole string, with 1e9 to 1e10 N/m²."""
     lines = hem_lines(article.assembly)
     if not lines:
         raise ModelError("the structure has no string of adhesive along which a hem could hold")

@@ -1,4 +1,4 @@
-"""Strings of adhesive along an edge: the line they follow between two sheets."""
+"""Strings of adhesive along an edge, and their line between two sheets."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from .joints import solid_parts
 from .sheet_pairs import SheetPairs
 
 SHORTEST = 8  # solids of a string
-CLOSED = 6.0  # pitches between its ends at which a line still goes on
+CLOSED = 6.0  # pitches between its ends, below which a line is closed
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +23,9 @@ class HemLine(SheetPairs):
     ----------
     name : of the part
     sheets : names of the sheets
-    share : (k,)             length each stands for [m]
+    share : (k,)             tributary length of each solid [m]
     s : (k,)                 arc length [m]
-    length : float           of all, the gap between the ends of a closed line included [m]
+    length : float           total, the gap between the ends of a closed line included [m]
     closed : bool
     """
 
@@ -37,13 +37,13 @@ class HemLine(SheetPairs):
     closed: bool
 
     def from_place(self, s0: float) -> np.ndarray:
-        """Arc length (k,) from a place of the line, the shorter way round of a closed one [m]."""
+        """Signed arc length (k,) from a place of the line, by the shorter way if closed [m]."""
         d = self.s - s0
         return d - self.length * np.round(d / self.length) if self.closed else d
 
 
 def hem_lines(assembly: Assembly) -> list[HemLine]:
-    """The line of every part of adhesive that runs as strings between two sheets."""
+    """The lines of all parts of adhesive that form strings between two sheets."""
     out = []
     for group, rows in solid_parts(assembly, soft=True):
         chains = list(_chains(assembly.solids[group].nodes[rows]))
@@ -56,7 +56,7 @@ def hem_lines(assembly: Assembly) -> list[HemLine]:
 
 
 def _chains(nodes: np.ndarray) -> Iterator[np.ndarray]:
-    """Rows of hexahedra from end to end of each string; nothing where they branch."""
+    """Rows of hexahedra from end to end of each string; none if they branch."""
     m = len(nodes)
     at, column = np.unique(nodes, return_inverse=True)
     where = (np.repeat(np.arange(m), nodes.shape[1]), column.ravel())
@@ -80,7 +80,7 @@ def _chains(nodes: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _joined(middle: np.ndarray, chains: list[np.ndarray]) -> np.ndarray:
-    """Chains one after another, each begun at the end that is nearest to where the last ended."""
+    """Join chains: each starts at the end nearest to the end of the previous one."""
     left = sorted(chains, key=len)
     line = list(left.pop())
     while left:
@@ -96,7 +96,7 @@ def _joined(middle: np.ndarray, chains: list[np.ndarray]) -> np.ndarray:
 
 
 def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
-    """The line through solids in order, where each hangs on two sheets."""
+    """The line through ordered solids, or None unless each is attached to two sheets."""
     solids = assembly.solids[group]
     middle = assembly.points[solids.nodes[rows]].mean(axis=1)
     step = np.linalg.norm(np.diff(middle, axis=0), axis=1)
@@ -118,7 +118,7 @@ def _line(assembly: Assembly, group: int, rows: np.ndarray) -> HemLine | None:
 
 
 def _carriers(assembly: Assembly) -> dict[int, np.ndarray]:
-    """{row of a point that is a mean: rows of the points it is the mean of}."""
+    """{row of an averaged point: rows of the points in its mean}."""
     return {
         mean.reference: np.array([row for row, _, _ in mean.terms])
         for mean in assembly.rigid
@@ -127,7 +127,7 @@ def _carriers(assembly: Assembly) -> dict[int, np.ndarray]:
 
 
 def _part_of(assembly: Assembly) -> np.ndarray:
-    """Position of a part of shells at each point (n,), -1 where there is none."""
+    """Position of a part of shells at each point (n,), -1 without shells."""
     out = np.full(len(assembly.points), -1)
     out[assembly.shells.nodes.ravel()] = np.repeat(assembly.shells.part, 4)
     return out
@@ -136,7 +136,7 @@ def _part_of(assembly: Assembly) -> np.ndarray:
 def _sides(
     part: np.ndarray, carried: dict[int, np.ndarray], nodes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of grids that carry the nodes of a solid in the first and in the last of its parts."""
+    """Rows of the grids to which a solid is attached, in its first and in its second part."""
     rows = np.unique(np.concatenate([carried.get(int(n), np.array([n])) for n in nodes]))
     mine = part[rows]
     known = np.unique(mine[mine >= 0])

@@ -1,4 +1,4 @@
-"""Damping of the modes of a test, as effects may know it, and what it says of a dissipation."""
+"""Identified damping of the modes of a test, and its likelihood under a dissipating effect."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -7,9 +7,9 @@ import numpy as np
 
 SCATTER = 0.33  # sd of ln ζ among modes of one structure, see updating/damping_scatter.py
 TAILS = 5.0  # degrees of freedom of Student's t: ln of that sd is itself known to 0.3 only
-LEVEL_SD = 1.0  # of ln of what damps all modes alike, over the median of what was identified
-SAME = 0.01  # relative distance of natural frequencies over which a mode of the model is one of it
-LEVELS = np.linspace(-3.0, 2.0, 101)  # of that ln, over which it is sought
+LEVEL_SD = 1.0  # of ln of the damping common to all modes over the median of the identified ratios
+SAME = 0.01  # relative width in natural frequency for pairing a model mode with an identified one
+LEVELS = np.linspace(-3.0, 2.0, 101)  # values of that ln that are searched
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +28,13 @@ class IdentifiedDamping:
     sd: np.ndarray
 
     def of(self, keep: np.ndarray) -> Self:
-        """Some of the modes (n,) bool."""
+        """A selection of the modes by a mask (n,)."""
         return replace(
             self, frequency=self.frequency[keep], ratio=self.ratio[keep], sd=self.sd[keep]
         )
 
     def above(self, frequency: float) -> Self:
-        """The modes above a frequency [Hz]: what swings on cords is damped by them."""
+        """The modes above a frequency [Hz]; rigid modes on bungee cords are damped by the cords."""
         return self.of(self.frequency > frequency)
 
     @property
@@ -45,12 +45,13 @@ class IdentifiedDamping:
     def misfit(self, level: np.ndarray, more: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals of ln ζ against ln(ζ_usual e^level + more), and their slopes by that ln.
 
-        r² is -2 ln of Student's t: one mode that something else damps bears little.
+        r² is -2 ln of Student's t, so that one mode with another source of damping has little
+        weight.
 
         Parameters
         ----------
-        level : (..., 1)    ln of what damps all modes alike, over ``usual``
-        more : (n,)         ζ that is dissipated beside it
+        level : (..., 1)    ln of the damping common to all modes, over ``usual``
+        more : (n,)         additional ζ of each mode
         """
         width = np.hypot(SCATTER, self.sd)
         z = (np.log(self.ratio) - np.log(self.usual * np.exp(level) + more)) / width
@@ -64,7 +65,7 @@ class IdentifiedDamping:
         return float(self._by_level(more).min())
 
     def neg2_log_evidence(self) -> float:
-        """-2 ln p of damping that scatters about one level, which is integrated out (Laplace)."""
+        """-2 ln p of damping that scatters about one level, with the level integrated (Laplace)."""
         even = np.zeros_like(self.ratio)
         best = LEVELS[[np.argmin(self._by_level(even))]]
         _, slope = self.misfit(best, even)
@@ -79,15 +80,15 @@ class IdentifiedDamping:
 def paired_with(
     frequency: np.ndarray, model: np.ndarray, same: float = SAME
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Share of each mode of a model in what is told of each identified one, and its slope.
+    """Weight of each model mode i in each identified mode j, and its slope.
 
-    w_ji ∝ exp(-½ (ln f_i/f_j)² / same²), one over all i: of the nearest mode, of several that are
-    as near a mean.  The slope is ∂ ln w_ji / ∂ ln f_i before the w are made one.
+    w_ji ∝ exp(-½ (ln f_i/f_j)² / same²), with sum one over i. The nearest mode dominates; several
+    equally near modes are averaged. The slope is ∂ ln w_ji / ∂ ln f_i before normalisation.
 
     Parameters
     ----------
     frequency : (n,) [Hz]    identified
-    model : (m,) [Hz]        of the model, rigid ones may be zero
+    model : (m,) [Hz]        of the model, zero for rigid modes
 
     Returns
     -------

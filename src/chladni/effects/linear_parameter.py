@@ -1,4 +1,4 @@
-"""A number on which an operator depends linearly: a joint's stiffness, a solid's E, a mass."""
+"""Parameters with a linear operator: the stiffness of a joint, E of a solid, a mass."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from .effect import Effect, MatrixTerm, Parameter
 class LinearScale(Effect):
     """K + d ∂K/∂v + d²/2 ∂²K/∂v², d = v (e^x - 1), and M likewise; v is the structure's value.
 
-    ``bent`` is the second slope of what is not linear in v (Poisson's ratio); ``weight_slope`` is
-    ∂m/∂v [kg]; ``write`` puts a value into an assembly.
+    ``bent`` is the second slope of an operator that is not linear in v (Poisson's ratio).
+    ``weight_slope`` is ∂m/∂v [kg]; ``write`` puts a value into an assembly.
     """
 
     kind = "ordinary"
@@ -27,7 +27,7 @@ class LinearScale(Effect):
     weight_slope: float = 0.0
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The operators' slopes times the change of the value."""
+        """The slopes of the operators times the change of the value."""
         assert self.slope is not None
         v = self.parameters[0].scale
         d, slope = v * np.expm1(x[0]), v * np.exp(x[0])
@@ -35,19 +35,19 @@ class LinearScale(Effect):
         return out if self.bent is None else out + _terms(self.bent, d**2 / 2, d * slope)
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The change of the value times what each unit of it weighs."""
+        """The change of the value times its mass per unit."""
         v = self.parameters[0].scale * self.weight_slope
         return float(v * np.expm1(x[0])), np.array([v * np.exp(x[0])])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The structure with the value in it."""
+        """Write the value into the structure."""
         return (
             assembly if self.write is None else self.write(assembly, self.parameters[0].value(x[0]))
         )
 
 
 def _terms(slope: Slope, change: float, gradient: float) -> tuple[MatrixTerm, ...]:
-    """The operators a slope has, times a change."""
+    """The operators of a slope, times a change."""
     g = np.array([gradient])
     out = [MatrixTerm("K", slope.K, change, g)] if slope.K.nnz else []
     return (*out, *([MatrixTerm("M", slope.M, change, g)] if slope.M.nnz else []))
@@ -58,7 +58,7 @@ def linear_scale(
     write: Callable[[Assembly, float], Assembly] | None = None, sd: float = 0.3,
     bent: Slope | None = None, weight_slope: float = 0.0,
 ) -> LinearScale:  # fmt: skip
-    """The parameter v e^x of a linear operator, x of prior deviation ``sd``."""
+    """The parameter v e^x of a linear operator, with prior standard deviation ``sd`` of x."""
     return LinearScale(
         (Parameter(name, unit, 0.0, sd, value, step=0.3),), text, slope=slope, write=write,
         bent=bent, weight_slope=weight_slope,

@@ -1,10 +1,10 @@
-"""A lump on a spring the model does not know of: a bracket, a plug, a cable that swings by itself.
+"""A mass on a spring that is missing from the model: a bracket, a plug or a cable that resonates.
 
-Across the sheet it answers with s² m ω²/(ω² + s²): below its frequency it is a mass, above it next
-to nothing, and in between one mode becomes two. Its motion is a degree of freedom of its own, for
-no mass or spring at the grid stands for it over a band (den Hartog 1985, Mechanical Vibrations,
-3.2). Along the sheet the lump is carried. Its own loss is left to the damping of the modes, which
-does not enter the comparison.
+Across the sheet it responds with s² m ω²/(ω² + s²). Below its frequency it acts as a mass, above it
+nearly as nothing, and near it one mode becomes two. Its motion is a separate degree of freedom: no
+mass or spring at the grid can represent it over a band (den Hartog 1985, Mechanical Vibrations,
+3.2). In the plane of the sheet the mass is carried rigidly. Its loss is left to the damping of the
+modes, which does not enter the comparison.
 """
 
 from dataclasses import dataclass, field, replace
@@ -26,13 +26,13 @@ from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .surroundings import ElementGrids, Surroundings
 
-SHARE = 0.015  # of the structure's mass: prior median of the lump's
-TYPICAL = 3.0  # times the prior median of its frequency: the highest line
-LOWEST = 20.0  # the lowest of the frequencies tried lies this many times below the highest line
-TRIED = 14  # frequencies, evenly spaced in their logarithm: wide lines smooth what lies between
-PLACES = 60  # where each is tried
-LEAST = 0.05  # of the typical mass: less of it, or a negative one, is no lump
-CARRIED = 1e3  # times the spring: how firmly the written lump follows the sheet along it
+SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
+TYPICAL = 3.0  # highest spectral line over the prior median of its frequency
+LOWEST = 20.0  # highest spectral line over the lowest frequency tried
+TRIED = 14  # frequencies, evenly spaced in their logarithm; broad peaks cover the gaps
+PLACES = 60  # at which each is tried
+LEAST = 0.05  # of the typical mass: the least mass accepted
+CARRIED = 1e3  # times the spring: stiffness that holds the written mass in the plane of the sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +40,15 @@ class LocalResonator(MovableAttachment):
     """x = (ln mass, place along both axes of the patch, ln frequency)."""
 
     name = "local-resonator"
-    lone = True  # resonators in parallel are a partial fraction: enough of them fit anything driven
+    lone = True  # parallel resonators form a partial fraction: enough of them fit any response
     claim = "something on the structure swings on a spring of its own"
     own_dofs: ClassVar[int] = 1
 
-    nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # no grid at all
+    nowhere: sp.csr_array = field(default_factory=lambda: sp.csr_array((1, 0)))  # zero row
 
     @classmethod
     def near(cls, where: Surroundings, k: int) -> Self:
-        """A lump that swings along the normal near the k-th grid."""
+        """A resonator along the normal near the k-th grid."""
         n = where.grids.normal[k]
         m = strength("M", "kg", SHARE * where.setup.weight, 1.0, (-0.7, 0.7))
         lowest = -np.log(LOWEST / TYPICAL)
@@ -61,7 +61,7 @@ class LocalResonator(MovableAttachment):
         return cls((*moved(m), f), patch=at, direction=n, nowhere=nowhere, **there(where, k))
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """K + k (b - e)(b - e)ᵀ, M + m (e eᵀ + t tᵀ): b across, t along the sheet, e the lump."""
+        """K + k (b - e)(b - e)ᵀ, M + m (e eᵀ + t tᵀ): b across, t along the sheet, e the mass."""
         assert self.patch is not None
         at, size = self.patch.size * x[1:3], self.patch.size
         m, k = self.values(x)
@@ -84,35 +84,35 @@ class LocalResonator(MovableAttachment):
         )
 
     def values(self, x: np.ndarray) -> tuple[float, float]:
-        """Mass [kg] and spring m (2πf)² [N/m]."""
+        """Mass m [kg] and spring m (2πf)² [N/m]."""
         m = self.parameters[0].value(x[0])
         return m, m * (2 * np.pi * self.parameters[3].value(x[3])) ** 2
 
     def becomes(self, x: np.ndarray) -> str:
-        """Tuned above the highest line it is a lump that is carried along."""
+        """Return "point-mass" for a tuning above the highest spectral line."""
         f = self.parameters[3]
         return "point-mass" if f.value(x[3]) > TYPICAL * f.scale else ""
 
     def nearly(self, x: np.ndarray, sd: np.ndarray) -> str:
-        """A lump, where the frequency of its spring may lie above the highest line."""
+        """Return "point-mass" if the interval of the tuning exceeds the highest spectral line."""
         return self.becomes(x + 1.96 * self.widened(sd))
 
     def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Its place and the mass that swings."""
+        """Place and mass of the resonator."""
         return self.at(x), self.parameters[0].value(x[0])
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The lump itself."""
+        """The mass of the resonator."""
         m = self.parameters[0].value(x[0])
         return m, np.array([m, 0.0, 0.0, 0.0])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """GRID with CONM2, on a CBUSH from the nearest grid."""
+        """Write a GRID with CONM2, on a CBUSH from the nearest grid."""
         m, k = self.values(x)
         return with_oscillator(assembly, self.nearest(x), self.at(x), self.direction, m, k)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Mass and frequency; the place stands in ``location``."""
+        """Mass and frequency; ``location`` holds the place."""
         every = Effect.reported(self, x, sd)
         return every[0], every[3]
 
@@ -120,9 +120,9 @@ class LocalResonator(MovableAttachment):
 def with_oscillator(
     assembly: Assembly, grid: int, place: np.ndarray, normal: np.ndarray, m: float, k: float
 ) -> Assembly:
-    """A lump m [kg] at a place on a spring k [N/m] along the normal, its foot rigid to a grid.
+    """Add a mass m [kg] on a spring k [N/m] along the normal, its foot rigidly tied to a grid.
 
-    Along the sheet the lump follows its foot; it does not turn.
+    In the plane of the sheet the mass follows its foot; it does not rotate.
     """
     grown, (row,) = with_points(assembly, np.asarray(place)[None])
     frame = np.stack([normal, *tangents(normal)])
@@ -177,7 +177,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 def _scores(
     context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mass and score (n_places, n_hertz); no score where there is no lump."""
+    """Mass and score (n_places, n_hertz); the score is inf where the mass is too small."""
     assert context.scan is not None
     amount, score = context.scan.oscillator_scores(about, mass, hertz, places)
     return amount, np.where(amount > LEAST * mass, score, np.inf)
@@ -186,7 +186,7 @@ def _scores(
 def _best(
     context: SearchContext, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
 ) -> Candidate:
-    """The lump at the best of some places, with the best of some frequencies."""
+    """The resonator at the best of some places and frequencies."""
     where = context.where
     amount, score = _scores(context, about, mass, hertz, places)
     k, level = np.unravel_index(int(np.argmin(score)), score.shape)
@@ -198,7 +198,7 @@ def _best(
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A lump of 1.5 to 5 % of the mass at a grid, tuned between the deck's first elastic modes."""
+    """Add a resonator of 1.5 to 5 % of the mass, tuned between the deck's first elastic modes."""
     grid, m = article.shell_grid(rng), float(rng.uniform(0.015, 0.05)) * article.weight
     elastic = normal_modes(structure(article.deck).system, 12).frequency[6:]
     f = float(np.exp(rng.uniform(np.log(elastic[0]), np.log(elastic[-1]))))

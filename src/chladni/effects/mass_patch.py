@@ -1,4 +1,4 @@
-"""A mass spread over a region of a sheet: trim, mastic, a damping mat, paint that has run."""
+"""A mass distributed over a region of a sheet: trim, mastic, a damping mat or a run of paint."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -23,13 +23,13 @@ SHARE = 0.03  # of the structure's mass: prior median
 
 @dataclass(frozen=True, eq=False)
 class MassPatch(SheetPatch):
-    """M q(x) / ∫ q dA more mass per area, M in all; it does not stiffen the sheet."""
+    """Additional mass per area M q(x) / ∫ q dA, M in total; it does not stiffen the sheet."""
 
     name = "mass-patch"
     claim = "something lies spread on the sheet that the model does not have"
     quantity = "rho"
     scanned = -1.0
-    grows = (0.05, np.inf)  # of the mass scanned: less of it, or a negative one, is none
+    grows = (0.05, np.inf)  # of the mass scanned: range accepted
     rim = RIMMED
 
     area: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the groups [m²]
@@ -37,7 +37,7 @@ class MassPatch(SheetPatch):
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
-        """The mass, of a few per cent of the shells'."""
+        """The mass, with a prior of a few per cent of that of the shells."""
         return strength("M", "kg", SHARE * float(groups.weight.sum()), 1.2, (-1.0, 0.3))
 
     @classmethod
@@ -46,7 +46,7 @@ class MassPatch(SheetPatch):
         return {"area": groups.area, "weight_of": groups.weight}
 
     def log(self, x: np.ndarray) -> np.ndarray:
-        """ln(1 + M q A / (w Σ q A)) over the groups; massless sheets cannot be made heavier."""
+        """ln(1 + M q A / (w Σ q A)) over the groups; zero for sheets without mass."""
         share = self.bump(x, self.centre, self.variance) * self.inside * self.area
         m = self.parameters[0].value(x[0]) * share / max(float(share.sum()), 1e-300)
         heavy = self.weight_of > 0
@@ -54,18 +54,18 @@ class MassPatch(SheetPatch):
 
     @classmethod
     def begun(cls, amount: float) -> float:
-        """Masses up to ten times the one scanned."""
+        """Start of ln mass, at most ten times the mass scanned."""
         return cls.scanned + float(np.log(np.clip(amount, 0.05, 10.0)))
 
     def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Its middle and the mass, wherever that is spread."""
+        """Centre of the patch and its mass."""
         return self.deepest(x)[1], self.parameters[0].value(x[0])
 
     @classmethod
     def of_lump(
         cls, where: Surroundings, point: np.ndarray, mass: float
     ) -> tuple[Self, np.ndarray] | None:
-        """The mass spread as narrowly as a scan begins, round the nearest group of shells."""
+        """The mass with the smallest scanned radius, round the nearest group of shells."""
         groups = where.groups
         sheet = np.flatnonzero(groups.sheet)
         if not len(sheet):
@@ -76,18 +76,18 @@ class MassPatch(SheetPatch):
         return effect, np.array([ln_m, np.log(RADII[0]), 0.0, 0.0, cls.rim[0]])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """Properties of their own with more mass per area, by bands."""
+        """Write new properties with more mass per area, in bands."""
         centre = assembly.points[assembly.shells.nodes].mean(axis=1)
         q = self.bump(x, centre) * self.shells
         return spread_mass(assembly, q, self.parameters[0].value(x[0]))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """The mass and the radius R; the place stands in ``location``."""
+        """The mass and the radius R; ``location`` holds the place."""
         return Effect.reported(self, x, sd)[:2]
 
 
 def spread_mass(assembly: Assembly, q: np.ndarray, m: float) -> Assembly:
-    """M [kg] on the shells, per area in the shares of q (m,), in bands that hold the sum."""
+    """Distribute a mass [kg] over the shells in proportion to q (m,), in bands, sum preserved."""
     share = levels(q)[0]
     return with_bands(assembly, m * share / float(share @ _areas(assembly)), heavier)
 
@@ -97,19 +97,19 @@ def _areas(assembly: Assembly) -> np.ndarray:
 
 
 def heavier(part: Part, load: float) -> Part:
-    """The part with more mass per area [kg/m²]."""
+    """Add mass per area [kg/m²] to a part."""
     section = part.section
     assert isinstance(section, ShellSection)
     return part.with_section(nonstructural=section.nonstructural + load)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The places where a spread mass explains most."""
+    """The places where a distributed mass explains most."""
     return patches(context, MassPatch, each=1)
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """2 to 8 % of the mass spread over a disc of 40 to 90 mm round a grid of the first part."""
+    """Add 2 to 8 % of the mass on a disc of 40 to 90 mm radius round a grid of the first part."""
     made, m = article.assembly, float(rng.uniform(0.02, 0.08)) * article.weight
     first = made.shells.part == 0
     centre = made.points[rng.choice(np.unique(made.shells.nodes[first]))]

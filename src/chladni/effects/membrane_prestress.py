@@ -1,11 +1,11 @@
-"""A sheet under a membrane force: assembled with strain, or warmer or colder than what holds it.
+"""A sheet under a membrane force: assembled with strain, or warmer or colder than its frame.
 
-The forces N [N/m] along and across a part are even over it. Each has its own family of modes (waves
-along, waves across), so that data tell both: three forms of one strength (along, across, all round)
-lost on a plate and a panel to orthotropy and thinning where the truth was none of the three.
+The forces N [N/m] along and across a part are uniform. Each acts on its own family of modes (waves
+along, waves across), so that the data determine both. Three forms with a single strength (along,
+across, biaxial) lost to orthotropy and thinning on a plate and a panel whose truth was another.
 
-N stays within 0.7 of what would buckle the sheet (or, pulled, of as much), both together as well;
-that is also the scale of its prior: a sheet that has not buckled says no more of its N.
+|N| stays below 0.7 of the buckling force, in compression and tension, and so does the combination
+of both. This is also the scale of the prior: an unbuckled sheet gives no other information on N.
 """
 
 from collections.abc import Iterator
@@ -29,16 +29,16 @@ from .estimate import Estimate
 from .family import Article, Family
 from .search_context import Candidate, SearchContext
 
-MOST = 0.7  # of what buckles: of both at once 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
-SD = 0.4  # of N / (0.7 N_cr) where that is small: within a third of buckling, mostly
+MOST = 0.7  # of buckling; with both forces 0.7 √2, where |N_1|/N_cr1 + |N_2|/N_cr2 = 1 is safe
+SD = 0.4  # of N / (0.7 N_cr) where that is small: mostly within a third of buckling
 STARTS = (-0.35, 0.35)
-LARGE = 0.05  # share of the shells' area below which a part is not asked
+LARGE = 0.05  # share of the shells' area below which a part is not tried
 FOLLOWED = 2
 WAYS = ("along", "across")
 RIGID = 1e-6  # of the middle λ: below it a motion is rigid
-ACROSS = 0.7  # cosine between a rim's edge and the force: more, and the edge does not pull
-LEADS = 12  # grids at the rim with which the pulls there turn
-MODES = 40  # that tell what buckles an article
+ACROSS = 0.7  # cosine between a rim's edge and the force, above which the edge is not loaded
+LEADS = 12  # grids at the rim whose mean rotation the forces there follow
+MODES = 40  # from which the buckling force of an article is computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class MembranePrestress(Effect):
     operators: tuple[sp.csr_array, ...] = ()
 
     def force(self, x: np.ndarray) -> np.ndarray:
-        """N (2,) [N/m], positive where it pulls."""
+        """N (2,) [N/m], positive in tension."""
         return np.asarray(MOST * self.critical * x / np.sqrt(1 + x @ x))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
@@ -68,14 +68,14 @@ class MembranePrestress(Effect):
         return tuple(MatrixTerm("K", K, float(N), g) for K, N, g in every)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CELAS2 between the grids of the part, and on the mean turn of its rim."""
+        """Write CELAS2 between the grids of the part, and on the mean rotation of its rim."""
         own = len(assembly.springs)
         for tensor, N in zip(self.tensors, self.force(x), strict=True):
             assembly = prestressed(assembly, self.part, tensor, float(N))
         return with_summed_springs(assembly, own)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """N along and across, each with the other where it is."""
+        """N along and across, each interval with the other force fixed."""
         out = []
         for k, p in enumerate(self.parameters):
             step = 1.96 * self.widened(sd)[k] * np.eye(2)[k]
@@ -85,14 +85,14 @@ class MembranePrestress(Effect):
 
 
 def axes_of(assembly: Assembly, part: int) -> np.ndarray:
-    """Along and across a part (2, 3): in its sheets, where its points lie farthest apart first.
+    """Directions along and across a part (2, 3), in the plane of its sheets, the longest first.
 
-    Of two flanges that face each other the way from one to the other is in neither.
+    The direction between two facing flanges lies in neither sheet and is excluded.
     """
     cells = assembly.shells.nodes[assembly.shells.part == part]
     n = vector_areas(assembly.points, cells)
     n /= np.sqrt(np.linalg.norm(n, axis=1, keepdims=True))
-    plane = np.linalg.eigh(n.T @ n)[1][:, :2]  # what is normal to least of its area
+    plane = np.linalg.eigh(n.T @ n)[1][:, :2]  # the two directions normal to the least area
     X = assembly.points[np.unique(cells)] @ plane
     return np.asarray(np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2] @ plane.T)
 
@@ -114,7 +114,7 @@ def unit_stiffness(built: Structure, part: int, tensor: np.ndarray) -> sp.csr_ar
 
 
 def prestress(built: Structure, part: int, tried: int = 1) -> MembranePrestress:
-    """Forces in a part of which nothing is known yet: N_cr = 1 / 0.7."""
+    """Forces in a part whose buckling force is not yet known: N_cr = 1 / 0.7."""
     a = built.assembly
     both, name = tensors(a, part), a.parts[part].name
     unknown = tuple(
@@ -129,9 +129,9 @@ def prestress(built: Structure, part: int, tried: int = 1) -> MembranePrestress:
 
 
 def buckling(lam: np.ndarray, K_g: np.ndarray) -> float:
-    """The smaller |N| at which K + N K_g loses its stiffness, over modes of λ (r,): [N/m].
+    """Smallest |N| [N/m] at which K + N K_g loses its stiffness, over modes of λ (r,).
 
-    Both ways count: of a sheet that is pulled N beyond that is no small thing either.
+    Both signs of N count, because a tension of that size is a large change too.
     """
     flexible = lam > RIGID * np.median(lam)
     s = 1 / np.sqrt(lam[flexible])
@@ -140,12 +140,12 @@ def buckling(lam: np.ndarray, K_g: np.ndarray) -> float:
 
 
 def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> Assembly:
-    """The assembly with a force N in a part, as scalar springs; their stiffness may be negative.
+    """Write a force N in a part as scalar springs, whose stiffness may be negative.
 
     Raises
     ------
     ModelError
-        If grids of the part count their motion in different frames.
+        If grids of the part have different displacement frames.
     """
     force = field_of(assembly, part, tensor)
     pairs, k = force.springs
@@ -163,9 +163,9 @@ def prestressed(assembly: Assembly, part: int, tensor: np.ndarray, N: float) -> 
 
 
 def with_summed_springs(assembly: Assembly, own: int) -> Assembly:
-    """The assembly with one spring in place of several between two motions, from row ``own`` on.
+    """Merge springs that couple the same two motions, from row ``own`` on.
 
-    Springs without stiffness are left out. The springs must be elastic, as a membrane force's are.
+    Springs without stiffness are left out. The springs must be elastic, as here.
     """
     s = assembly.springs
     motions = np.sort(8 * s.nodes[own:] + s.component[own:], axis=1)[:, ::-1]  # ground is last
@@ -177,7 +177,7 @@ def with_summed_springs(assembly: Assembly, own: int) -> Assembly:
 
 
 def pulled_rim(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
-    """Some grids at the rim of a part where the force pulls, as rows; any where it has no rim."""
+    """Rows of some grids at the rim of a part that the force loads; any grids without a rim."""
     shells = assembly.shells
     nodes = shells.nodes[shells.part == part]
     sides, count = np.unique(edges_of(nodes), axis=0, return_counts=True)
@@ -194,9 +194,10 @@ def pulled_rim(assembly: Assembly, part: int, tensor: np.ndarray) -> np.ndarray:
 def _turns(
     row: int, cost: np.ndarray, moments: sp.csr_array
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Springs that make θᵀ C θ - 2 uᵀ m θ of the turns θ of a point: nodes, components, values.
+    """Springs that give θᵀ C θ - 2 uᵀ m θ for the rotations θ of a point.
 
-    A spring h couples two motions by -h and holds both by h, which springs to ground take back.
+    A spring h between two motions adds -h off the diagonal and h on it; springs to ground cancel
+    the diagonal. Returns nodes, components and values.
     """
     m = sp.coo_array(moments)
     a, b = np.triu_indices(3, 1)
@@ -234,14 +235,14 @@ def _with_springs(
 
 
 def _sheets(assembly: Assembly) -> Iterator[int]:
-    """Parts that are more than a scrap of the sheets."""
+    """Parts with a share of at least ``LARGE`` of the shells' area."""
     shells = assembly.shells
     area = np.bincount(shells.part, cell_areas(assembly.points, shells.nodes), len(assembly.parts))
     yield from np.flatnonzero(area > LARGE * area.sum()).tolist()
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The parts whose forces explain most, each within what would buckle its sheet."""
+    """The parts whose forces explain most, each below its buckling force."""
     built = context.where.groups.structure
     parts = list(_sheets(built.assembly))
     effects = []
@@ -252,7 +253,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
         if np.isfinite(critical).all():
             effects.append(replace(bare, critical=critical))
     out = []
-    for about, base in enumerate(context.bases):  # calibration alone may have gone far astray
+    for about, base in enumerate(context.bases):  # calibration alone may be far from the truth
         found = [context.scores(e, e.starts(), about=about)[0] for e in effects]
         for k in sorted(range(len(effects)), key=lambda j: found[j].min())[:FOLLOWED]:
             start = effects[k].starts()[int(np.argmin(found[k]))]
@@ -261,7 +262,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """Forces along and across the first part, one 0.25 to 0.5 of buckling, the other up to 0.15."""
+    """Load the first part along and across, with 0.25 to 0.5 and up to 0.15 of buckling."""
     made = article.assembly
     share = rng.choice([-1, 1], 2) * np.array([rng.uniform(0.25, 0.5), rng.uniform(0, 0.15)])
     truth = {}
@@ -274,7 +275,7 @@ def conceal(article: Article, rng: np.random.Generator) -> Article:
 
 
 def critical_force(assembly: Assembly, part: int, tensor: np.ndarray) -> float:
-    """N_cr of a part over the structure's lowest modes [N/m]."""
+    """N_cr [N/m] of a part, computed over the structure's lowest modes."""
     built = structure(assembly)
     modes = normal_modes(built.system, min(MODES, len(built.system.dofs)))
     K, lam = unit_stiffness(built, part, tensor), (2 * np.pi * modes.frequency) ** 2

@@ -1,9 +1,9 @@
-"""What a whole family of elements may have more or less of: joints, and shells' own formulation.
+"""Common stiffness factors of element families: joints, and the transverse shear of shells.
 
-Each family is one factor on an operator the structure has already, so that the stiffness stays
-positive. Joints: adhesive, weld solids, bushes, springs between parts. Shells: the transverse shear
-of a part, in which two formulations of one element differ most (MacNeal's residual bending
-flexibility is part of it), and the same for coarse and fine meshes.
+Each family is one factor on an existing operator of the structure, so that the stiffness stays
+positive. Joints are adhesive, weld solids and bushes. For shells the factor acts on the transverse
+shear of a part. Two formulations of one element differ most in it (MacNeal's residual bending
+flexibility is a part of it), and so do coarse and fine meshes.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,14 +25,14 @@ from .linear_parameter import LinearScale
 SOFT = 20e9  # [Pa] below it a solid between sheets is adhesive, above it a weld
 ADHESIVE, WELD, FASTENER = 0.5, 0.3, 0.5  # prior sd of ln k
 JOINTS = "adhesive", "welds", "bushes"  # names of the families of joints
-FAR = 3.0  # prior sd of scatter: what is farther off than that is no scatter
+FAR = 3.0  # limit of scatter in prior standard deviations
 SHEAR = 0.5  # prior sd of ln of the transverse shear stiffness of a part
 FEWEST = 0.002  # share of the shells' area below which a part has no factor of its own
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFamily(LinearScale):
-    """A factor e^x on all that a family has in K."""
+    """A factor e^x on the operator of a family in K."""
 
     name = "family"
     claim = "joints and elements are never quite as stiff as a deck says"
@@ -40,17 +40,17 @@ class ModelFamily(LinearScale):
     writable = False
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """What the family has, times the change of the factor."""
+        """The operator of the family times the change of the factor."""
         assert self.slope is not None
         (factor,), (v,) = self.parameters, x
         return (MatrixTerm("K", self.slope.K, factor.value(v) - 1, np.array([factor.slope(v)])),)
 
 
 def shared_factor(name: str, family: str, sd: float) -> Parameter:
-    """The unknown factor on all that a family has, or on all of it but one.
+    """The unknown factor on a family, or on all of its members but one.
 
-    Coupons of an adhesive scatter, and a bead is higher here and wider there. What is stiffer than
-    any coupon is no scatter: another adhesive, or a hem that does not slide.
+    Coupons of an adhesive scatter, and the section of a bead varies. A stiffness beyond that of any
+    coupon is not scatter, but another adhesive or a hem that does not slide.
     """
     reach = FAR * sd if family == "adhesive" else np.inf
     return Parameter(name, "-", 0.0, sd, step=0.5, reach=reach)
@@ -62,7 +62,7 @@ def model_families(built: Structure) -> list[ModelFamily]:
 
 
 def joint_nuisances(built: Structure) -> list[ModelFamily]:
-    """Every family of joints: it moves what modes alone do not, and a basis has to carry it."""
+    """Every family of joints; the basis must represent them, because modes alone do not."""
     return _families(joint_families(built))
 
 
@@ -75,7 +75,7 @@ def _families(found: Iterable[tuple[str, sp.csr_array, float]]) -> list[ModelFam
 
 
 def joint_families(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
-    """(name, what it has in K, prior sd of ln k) of every family of joints."""
+    """(name, operator in K, prior sd of ln k) of every family of joints."""
     yield from _solids(built)
     yield from _bushes(built)
 
@@ -86,7 +86,7 @@ def _slope(K: sp.csr_array) -> Slope:
 
 
 def _solids(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
-    """Parts of solids beside shells, adhesive and welds gathered by their modulus."""
+    """Solids in a model with shells, classified as adhesive or welds by their modulus."""
     assembly = built.assembly
     kinds: dict[float, list[sp.csr_array]] = {}
     used = {int(p) for group in assembly.solids for p in np.unique(group.part)}
@@ -102,13 +102,13 @@ def _solids(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
 
 def _bushes(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
     """All bushes together."""
-    own = np.flatnonzero(built.assembly.bushes.ids > 0)  # none of the firm ones in rigid ties
+    own = np.flatnonzero(built.assembly.bushes.ids > 0)  # not the firm springs in rigid ties
     if len(own):
         yield "bushes", of_lumps(built, "bushes", own.tolist()).K, FASTENER
 
 
 def _shear(built: Structure) -> Iterator[tuple[str, sp.csr_array, float]]:
-    """γᵀS γ of every part of shells that is more than a scrap."""
+    """γᵀS γ of every part with a share of more than ``FEWEST`` of the shells' area."""
     assembly = built.assembly
     shells = assembly.shells
     if not len(shells):

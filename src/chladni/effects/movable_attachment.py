@@ -1,10 +1,9 @@
-"""A mass or a spring at an unknown place, which a fit may move about.
+"""A mass or a spring at an unknown place, which a fit may move.
 
 Between grids the motion of the sheet is interpolated by moving least squares with quadratic
-polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a fit can follow its
-slope. On a line of beams it moves along the line; the second parameter of its place does nothing
-there and stays at its prior. Nothing sits beside the grids: a fit that goes on beyond them has the
-place where they end.
+polynomials (Lancaster and Salkauskas 1981, Math. Comp. 37, 141-158), so that a fit can use its
+slope. On a line of beams the place moves along the line; the second parameter of the place is then
+inactive and stays at its prior. The place stays within the grids: it is clipped to their range.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +22,8 @@ from .surroundings import ElementGrids, Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face
-FAR = 0.75  # of a patch's size: beyond it the interpolation begins anew where the fit went
-_FLAT = 1e-6  # of a patch's size: grids that reach no farther lie on a line
+FAR = 0.75  # of a patch's size, beyond which the patch is centred again on the fitted place
+_FLAT = 1e-6  # of a patch's size: grids with a smaller extent lie on a line
 STEP = 1e-4  # of the local mesh size, for the slope of the interpolation weights
 
 
@@ -50,7 +49,7 @@ class Patch:
     size: float
 
     def inside(self, at: np.ndarray) -> np.ndarray:
-        """The place of the plane, no farther out than the grids reach (2,)."""
+        """A place of the plane, clipped to the range of the grids (2,)."""
         return np.asarray(np.clip(at, self.flat.min(axis=0), self.flat.max(axis=0)))
 
     def weights(self, at: np.ndarray) -> np.ndarray:
@@ -67,12 +66,12 @@ class Patch:
 
     @cached_property
     def _blocks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Columns (m,) in which the rows are not zero, and the rows there (d, k, m)."""
+        """Nonzero columns (m,) of the rows, and the rows in them (d, k, m)."""
         columns = np.unique(np.concatenate([rows.indices for rows in self.rows]))
         return columns, np.stack([rows[:, columns].toarray() for rows in self.rows])
 
     def _weighted(self, w: np.ndarray) -> sp.csr_array:
-        """The grids' rows by weights (k,), one per direction (d, n)."""
+        """Weighted sum of the grids' rows with weights (k,), one per direction (d, n)."""
         columns, blocks = self._blocks
         (d, _, m), n = blocks.shape, self.rows[0].shape[1]
         ends = m * np.arange(d + 1)
@@ -83,7 +82,7 @@ class Patch:
         return self._weighted(self.weights(at))
 
     def slope(self, at: np.ndarray, axis: int) -> sp.csr_array:
-        """Change of those rows along an axis of the plane, inwards at its end (d, n)."""
+        """Slope of these rows along an axis of the plane, one-sided at its end (d, n)."""
         e = STEP * self.size * np.eye(2)[axis]
         above, below = (self.inside(at + way * e) for way in (1, -1))
         apart = float(above[axis] - below[axis])
@@ -93,14 +92,14 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class MovableAttachment(Effect):
-    """x = (ln strength, place along both axes of the patch in units of its size, what else)."""
+    """x = (ln strength, place along both axes of the patch in units of its size, others)."""
 
     patch: Patch | None = None
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
     matrix = "K"
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """One strength on every direction, at the place."""
+        """One strength in every direction, at the place."""
         assert self.patch is not None
         at = self.patch.size * x[1:3]
         rows = self.patch.at(at)
@@ -111,7 +110,7 @@ class MovableAttachment(Effect):
         return (PointTerm("M" if self.matrix == "M" else "K", rows, c, gradient, moving),)
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """The grids next to the start, so that the place may move."""
+        """Rows of the grids next to the start, so that the place may move."""
         assert self.patch is not None
         nearest = np.argsort((self.patch.flat**2).sum(axis=1))[:7]
         return sp.csr_array(sp.vstack([rows[nearest] for rows in self.patch.rows]))
@@ -122,7 +121,7 @@ class MovableAttachment(Effect):
         raise NotImplementedError
 
     def recentred(self, x: np.ndarray, where: Surroundings) -> tuple[Effect, np.ndarray] | None:
-        """About the grid it moved to, once that lies farther than ``FAR`` of the patch's size."""
+        """The effect centred on the grid it moved to, if beyond ``FAR`` of the patch's size."""
         if np.abs(x[1:3]).max() < FAR:
             return None
         k = where.grids.position(self.nearest(x), self.direction)
@@ -134,11 +133,11 @@ class MovableAttachment(Effect):
         return self.patch.origin + self.patch.inside(self.patch.size * x[1:3]) @ self.patch.plane
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """The strength; the place stands in ``location``."""
+        """The strength; ``location`` holds the place."""
         return super().reported(x, sd)[:1]
 
     def location(self, x: np.ndarray) -> Location:
-        """The place a fit moved it to."""
+        """The fitted place."""
         assert self.patch is not None
         point, grid = tuple(float(v) for v in self.at(x)), self.nearest(x)
         text = f"near grid {grid} ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
@@ -146,11 +145,12 @@ class MovableAttachment(Effect):
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=size)
 
     def located(self, x: np.ndarray, sd: np.ndarray) -> Location:
-        """The place, and the radius [m] in which it lies with 95 %, widened as intervals are.
+        """The place, and its 95 % radius [m], widened as the intervals are.
 
-        Of a place in a plane that is at most √5.99 times the larger of both deviations, along a
-        line (of beams, or the edge of a fold) 1.96 times the one; the mesh size where that is more,
-        and where the fit went on beyond the last grid, where nothing moves the place any more.
+        In a plane the radius is at most √5.99 times the larger standard deviation. Along a line (of
+        beams, or the edge of a fold) it is 1.96 times the standard deviation. It is at least the
+        mesh size. An axis counts only if the fit ended within the grids, because beyond them the
+        place is fixed.
         """
         assert self.patch is not None
         at, size = self.patch.size * x[1:3], self.patch.size
@@ -168,13 +168,13 @@ class MovableAttachment(Effect):
 
 
 def moved(strength: Parameter) -> tuple[Parameter, ...]:
-    """Strength and place of a thing that a fit may move by about a mesh size at a time."""
+    """Parameters of strength and place; one step of a fit moves the place by about a mesh size."""
     place = [Parameter(n, "m", 0.0, 1.5, kind="linear", step=0.7) for n in ("along", "across")]
     return (replace(strength), *place)
 
 
 def there(where: Surroundings, k: int) -> dict[str, Any]:
-    """Fields of an effect that stands near the k-th of ``where.grids``."""
+    """Fields of an effect near the k-th of ``where.grids``."""
     grid, (x, y, z) = int(where.grids.grids[k]), where.grids.point[k]
     point = float(x), float(y), float(z)
     tried = len(where.places)
@@ -182,7 +182,7 @@ def there(where: Surroundings, k: int) -> dict[str, Any]:
 
 
 def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
-    """The grids round the k-th of all that lie in the same face of the sheet, or on its line."""
+    """The neighbours of the k-th grid in the same face of the sheet, or on its line of beams."""
     spots = where.grids
     d = spots.point - spots.point[k]
     if spots.line[k] < 0:
@@ -206,7 +206,7 @@ def patch(where: Surroundings, k: int, directions: np.ndarray) -> Patch:
 
 
 CLOSER = 60  # grids tried round each of the best places
-TRIED = 40  # places that are evaluated one by one where only natural frequencies are known
+TRIED = 40  # places that are evaluated one by one if only natural frequencies are known
 
 
 def attachments(
@@ -218,8 +218,8 @@ def attachments(
     Parameters
     ----------
     near : makes the effect at a grid
-    strengths : [kg] of "M" or [N/m] of "K"
-    known : what the strength is if something else is right; the best place of each is followed too
+    strengths : [kg] for "M" or [N/m] for "K"
+    known : strengths suggested by other evidence; the best place of each is followed too
     """
     where = context.where
     grids, places = where.grids, where.places
@@ -230,7 +230,7 @@ def attachments(
     scan, out = context.scan, []
 
     def follow(about: int, levels: np.ndarray, k: int) -> None:
-        """The best grid round a place, with the strength that is best there."""
+        """Add the best grid round a place, with the best strength there."""
         closer = around(grids, places, k)
         finer = scan.point_scores(about, matrix, levels, closer)
         best, level = np.unravel_index(np.argmin(finer), finer.shape)
@@ -253,7 +253,7 @@ def attachments(
 
 
 def around(grids: ElementGrids, places: ElementGrids, k: int) -> ElementGrids:
-    """A closer sample of the grids round one of the places, as far as the next ones."""
+    """A denser sample of the grids round one of the places, up to its neighbours."""
     d = np.linalg.norm(places.point - places.point[k], axis=1)
     reach = np.sort(d)[min(4, len(d) - 1)]
     near = np.flatnonzero(np.linalg.norm(grids.point - places.point[k], axis=1) <= reach)

@@ -1,6 +1,6 @@
-"""Parameters a user may calibrate anyway, and the scatter no calibration removes.
+"""Calibration parameters, and the scatter that calibration does not remove.
 
-Their optimum is the null of every diagnosis, never a finding.
+Their optimum is the null hypothesis of every diagnosis, never a finding.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from .element_groups import ElementGroups
 SPREAD = {"E": 0.06, "rho": 0.06, "t": 0.05, "wall": 0.05}  # prior sd of ln(value / deck's value)
 OF_FIELDS = {"E": "Pa", "rho": "kg/m3", "t": "m", "wall": "of the deck's"}
 SHEET, TUBE = ("E", "rho", "t"), ("E", "rho", "wall")  # of a part of shells, and of beams
-_AREAS = ("area", "I1", "I2", "I12", "J")  # what goes with the wall of a thin tube
+_AREAS = ("area", "I1", "I2", "I12", "J")  # proportional to the wall of a thin tube
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ class PartScale(Effect):
         return (FieldChange(name, x[0] * self.inside, self.inside[:, None]),)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The deck with the value changed in these parts."""
+        """Change the value in these parts of the deck."""
         return with_scaled(assembly, self.quantity, self.positions, float(np.exp(x[0])))
 
 
 def ordinary(
     groups: ElementGroups, quantity: str, positions: Sequence[int], sd: float | None = None
 ) -> PartScale:
-    """One ordinary parameter of these parts, with its prior."""
+    """One calibration parameter of these parts, with its prior."""
     parts = groups.structure.assembly.parts
     names = tuple(parts[k].name for k in positions)
     nominal = value(parts[positions[0]], quantity)
@@ -66,10 +66,10 @@ def ordinary(
 
 
 def defaults(groups: ElementGroups) -> list[PartScale]:
-    """E and t (of tubes: the wall) of every part, rho of every material: what may be calibrated.
+    """Default calibration parameters: E and t (wall of tubes) of every part, rho of every material.
 
-    A part may have been given the wrong sheet, so that E is each part's own; weighing tells one
-    density at most. Of a solid bar E and rho say all that its modes tell of its section.
+    A part may have the wrong sheet, so that every part has its own E. Weighing determines one
+    density at most. For a solid bar E and rho cover all that modes reveal of its section.
     """
     parts = groups.structure.assembly.parts
     used = sorted(set(groups.part.tolist()))
@@ -83,7 +83,7 @@ def defaults(groups: ElementGroups) -> list[PartScale]:
 
 
 def thickness_of(part: Part) -> str:
-    """What of a part is its thickness: t of a sheet, wall of a tube, "" of what is solid."""
+    """Name of the thickness of a part: t of a sheet, wall of a tube, "" for other parts."""
     section = part.section
     if isinstance(section, BeamSection):
         return "wall" if section.tube else ""
@@ -98,7 +98,7 @@ def _material(part: Part) -> Material | None:
 
 
 def value(part: Part, quantity: str) -> float:
-    """E [Pa], rho [kg/m³] or t [m] of a part of shells, E, rho or wall (1) of one of beams.
+    """E [Pa], rho [kg/m³] or t [m] of a part of shells; E, rho or wall (1) of a part of beams.
 
     E of an orthotropic sheet is sqrt(E1 E2).
     """
@@ -122,7 +122,7 @@ def value(part: Part, quantity: str) -> float:
 def with_scaled(
     assembly: Assembly, quantity: str, positions: Sequence[int], factor: float
 ) -> Assembly:
-    """The assembly with E, rho, t or wall of these parts of shells or beams times a factor."""
+    """Multiply E, rho, t or wall of these parts of shells or beams by a factor."""
     parts = list(assembly.parts)
     for k in positions:
         parts[k] = scaled(parts[k], quantity, factor)
@@ -135,7 +135,7 @@ def with_scaled(
 
 
 def scaled(part: Part, quantity: str, factor: float) -> Part:
-    """The part with E, rho, t or wall times a factor; one of solids is as it was."""
+    """Multiply E, rho, t or wall of a part by a factor; a part of solids is unchanged."""
     section = part.section
     if isinstance(section, BeamSection):
         if quantity == "wall":
@@ -167,7 +167,7 @@ def _scaled_material(material: Material, quantity: str, factor: float) -> Materi
 
 @dataclass(frozen=True, eq=False)
 class RandomField(Effect):
-    """Smooth scatter of a field within the parts, by Karhunen-Loève functions of unit prior."""
+    """Smooth scatter of a field within the parts, by Karhunen-Loève functions with unit prior."""
 
     name = "scatter"
     claim = "thickness and modulus vary smoothly within a part"
@@ -187,8 +187,8 @@ def random_field(
 ) -> RandomField:
     """Gaussian scatter of standard deviation sd within each part, mean removed.
 
-    Correlation exp(-d²/2ℓ²) with ℓ a share ``length`` of the part's longest side; the ``most``
-    strongest functions per square root of parts are kept.
+    The correlation is exp(-d²/2ℓ²), with ℓ a share ``length`` of the part's longest side. Each part
+    keeps its strongest functions: ``most`` over the square root of the number of parts, 3 or more.
     Ghanem and Spanos (1991), Stochastic Finite Elements, ch. 2.
     """
     columns = []
@@ -228,7 +228,7 @@ def _functions(
 
 @dataclass(frozen=True, eq=False)
 class ChannelGain(Effect):
-    """One real factor common to all channels is unknown."""
+    """One unknown real factor, common to all channels."""
 
     name = "gain"
     claim = "the gain of the measuring chain is unknown"
@@ -242,6 +242,6 @@ class ChannelGain(Effect):
 
 
 def channel_gain(n_outputs: int, sd: float) -> ChannelGain:
-    """The unknown gain, a factor e^x."""
+    """The unknown gain e^x."""
     unknown = Parameter("gain", "-", 0.0, sd, step=1.0)
     return ChannelGain((unknown,), "every channel", n_outputs=n_outputs)

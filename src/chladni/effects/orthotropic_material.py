@@ -1,4 +1,4 @@
-"""A sheet stiffer along one axis than across it: rolling, fibres, growth rings."""
+"""A sheet that is stiffer along one axis than across it, due to rolling, fibres or growth rings."""
 
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -31,14 +31,14 @@ class OrthotropicMaterial(Effect):
     positions: tuple[int, ...] = ()
     inside: np.ndarray = field(default_factory=lambda: np.zeros(0))
     axis: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    reference: np.ndarray | None = None  # x that the structure's own material has already
+    reference: np.ndarray | None = None  # x of the structure's own material
 
     def with_reference_state(self, x: np.ndarray) -> Self:
-        """The same effect on a structure that has the material of x."""
+        """The effect on a structure that already has the material of x."""
         return replace(self, reference=x.copy())
 
     def moduli(self, x: np.ndarray) -> tuple[float, float, float, float]:
-        """(E1, E2, G12 [Pa], nu12) with nu12 = nu_m sqrt(E1/E2), nu_m the geometric mean."""
+        """(E1, E2, G12 [Pa], nu12), nu12 = nu_m sqrt(E1/E2), nu_m the mean of nu12 and nu21."""
         E1, E2 = self.E * np.exp(x[0]), self.E * np.exp(x[1])
         G12 = self.E / (2 * (1 + self.nu)) * np.exp(x[2])
         return float(E1), float(E2), float(G12), float(_mean_ratio(x[3]) * np.sqrt(E1 / E2))
@@ -73,7 +73,7 @@ class OrthotropicMaterial(Effect):
         )
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The parts' isotropic sheet replaced by MAT8 with axis 1 along ``axis``."""
+        """Replace the isotropic sheet of the parts by MAT8 with axis 1 along ``axis``."""
         E1, E2, G12, nu12 = self.moduli(x)
         parts = list(assembly.parts)
         for k in self.positions:
@@ -92,7 +92,7 @@ def _mean_ratio(x: float) -> float:
 def _replaced(
     section: object, E1: float, E2: float, G12: float, nu12: float
 ) -> dict[str, Orthotropic]:
-    """Membrane, bending and shear material of an orthotropic section, where it has them."""
+    """Orthotropic membrane, bending and shear materials of a section, where it has them."""
     if not isinstance(section, ShellSection):
         return {}
     out = {}
@@ -105,7 +105,7 @@ def _replaced(
 
 
 def _about(mean: float, sd: float) -> tuple[float, ...]:
-    """Where searches begin: at the prior's mean and a standard deviation to either side."""
+    """Starts of a search: the prior's mean and one standard deviation to either side."""
     return mean - sd, mean, mean + sd
 
 
@@ -114,7 +114,8 @@ def orthotropic(
 ) -> OrthotropicMaterial:
     """Orthotropy of these isotropic parts with axis 1 along a direction of the basic frame.
 
-    It takes the place of E; and of t where the moduli are so little known that t says nothing more.
+    It replaces the parameter E. It also replaces t where the moduli are so uncertain that t adds
+    nothing.
     """
     parts = groups.structure.assembly.parts
     section = parts[positions[0]].section
@@ -165,12 +166,12 @@ def material_axes(where: Surroundings) -> list[OrthotropicMaterial]:
 
 
 def _ways(material: object) -> int:
-    """How many axes are tried: both where the class of the material tells them apart."""
+    """Number of axes tried: both if the prior of the material distinguishes them."""
     return 2 if isinstance(material, Isotropic) and orthotropy(material).directed else 1
 
 
 def isotropic(part: Part) -> Isotropic | None:
-    """The isotropic sheet material of a part, if that is what it has."""
+    """The isotropic sheet material of a part, or None."""
     if not isinstance(part.section, ShellSection):
         return None
     material = part.section.bending or part.section.membrane
@@ -178,7 +179,7 @@ def isotropic(part: Part) -> Isotropic | None:
 
 
 def _extents(groups: ElementGroups, inside: np.ndarray) -> list[np.ndarray]:
-    """Principal directions of some groups, longest first, or the coordinate axes they all but are.
+    """Principal directions of some groups, longest first, snapped to nearby coordinate axes.
 
     The third, if any, is across the sheet.
     """
@@ -195,7 +196,7 @@ def _nearest_axis(direction: np.ndarray) -> np.ndarray:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """E1/E2 off one by 6 to 35 %, G12 by up to 16 %, axis 1 along x, in all parts."""
+    """Change E1/E2 by 6 to 35 % and G12 by up to 16 %, axis 1 along x, in all parts."""
     old = isotropic(article.assembly.parts[0])
     assert old is not None
     ratio = float(rng.choice([-1, 1]) * rng.uniform(0.06, 0.3))

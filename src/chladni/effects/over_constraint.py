@@ -1,9 +1,9 @@
-"""A rigid tie of the model that gives in reality.
+"""A rigid tie of the model that is compliant in reality.
 
-An RBE2 holds what follows it without any give; a clip, a screwed flange or a bearing does not. What
-is searched has a spring k_0 in every tie, far stiffer than the sheets round it
-(:func:`.rigid_ties.on_firm_springs`): that one taken down to k in series with k_0 is a tie that
-gives, and the rest is as with a weld that carries less.
+An RBE2 is rigid; a clip, a screwed flange or a bearing is not. The search uses a model with a
+spring k_0 in every tie, far stiffer than the sheets round it
+(:func:`.rigid_ties.on_firm_springs`). A compliant tie has k in series with k_0 instead. The rest is
+as for a weld of reduced stiffness.
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,9 +20,9 @@ from .joints import Connection
 from .rigid_ties import RigidTie, firmly_held, rigid_ties, sprung
 from .search_context import Candidate, SearchContext, best_places
 
-SD = 2.0  # of ln k about what the sheets set against the tie
-STARTS = tuple(np.arange(-4.0, 4.0).tolist())  # two e off, the right tie looks wrong
-RIGID = 60.0  # ln of k over its median that is no give at all
+SD = 2.0  # of ln k about the stiffness of the sheets at the tie
+STARTS = tuple(np.arange(-4.0, 4.0).tolist())  # a factor e² off, the right tie looks wrong
+RIGID = 60.0  # ln of k over its median that is as good as rigid
 BY_POLES, FOLLOWED = 12, 2
 
 
@@ -32,7 +32,7 @@ class OverConstraint(Effect):
 
     name = "over-constraint"
     claim = "what the model ties rigidly gives in reality"
-    rounds = 1  # what is let loose may have a mode of its own
+    rounds = 1  # a released component may have its own mode
 
     tie: RigidTie | None = None
     firm: float = 1.0
@@ -40,7 +40,7 @@ class OverConstraint(Effect):
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
     def left(self, x: float) -> float:
-        """What is left of the firm spring, k / (k + k_0)."""
+        """Remaining share of the firm spring, k / (k + k_0)."""
         return 1.0 / (1.0 + self.firm / self.parameters[0].value(x))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
@@ -54,7 +54,7 @@ class OverConstraint(Effect):
         return self.rows
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """A CBUSH between the tie's independent grid and one that leads its followers."""
+        """Write a CBUSH between the tie's independent grid and a new one that leads the others."""
         assert self.tie is not None
         return sprung(assembly, self.tie, self.parameters[0].value(x[0]))
 
@@ -62,11 +62,11 @@ class OverConstraint(Effect):
 def over_constraint(
     assembly: Assembly, joint: Connection, share: np.ndarray, tried: int
 ) -> OverConstraint:
-    """The tie a firm spring stands in, one of as many as were tried.
+    """The effect of the tie with a given firm spring, one of ``tried`` ties.
 
     Parameters
     ----------
-    share : (r,)   z/(k_0 + z) of the spring's rows, z what the sheets set against it
+    share : (r,)   z/(k_0 + z) of the spring's rows, z the stiffness of the sheets in series
     """
     tie, firm = firmly_held(assembly, int(joint.elements[0]))
     z = firm * float(np.exp(np.log(share / (1 - np.minimum(share, 0.999))).mean()))
@@ -80,7 +80,7 @@ def over_constraint(
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The rigid ties whose give explains most, by exact re-analysis about the calibrated model."""
+    """The rigid ties whose compliance explains most, by exact re-analysis from each base."""
     every = context.fasteners
     at = [k for k, (joint, _) in enumerate(every) if joint.rigid]
     if not at:
@@ -104,7 +104,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A rigid tie of the article gives: 30 to 1000 N/mm."""
+    """Give a rigid tie of the article a stiffness of 30 to 1000 N/mm."""
     ties = rigid_ties(article.assembly)
     if not ties:
         raise ModelError("the structure has no rigid element beside those of its fasteners")

@@ -1,4 +1,4 @@
-"""A mass the model does not know of."""
+"""A point mass that is missing from the model."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -18,7 +18,7 @@ TRIED = np.exp(np.linspace(-3.0, 1.5, 7))  # multiples of the median
 
 @dataclass(frozen=True, eq=False)
 class PointMass(MovableAttachment):
-    """A mass sits at a place the model does not know of."""
+    """M + m Σ bᵀb over three translations b, at an unknown place."""
 
     name = "point-mass"
     claim = "something sits on the structure that the model does not have"
@@ -31,7 +31,7 @@ class PointMass(MovableAttachment):
         return cls(moved(m), patch=patch(where, k, np.eye(3)), **there(where, k))
 
     def lump(self, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """Its place and the mass."""
+        """Place and mass."""
         return self.at(x), self.parameters[0].value(x[0])
 
     @classmethod
@@ -49,17 +49,17 @@ class PointMass(MovableAttachment):
         return m, np.array([m, 0.0, 0.0])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at the nearest grid, offset to the place."""
+        """Write a CONM2 at the nearest grid, offset to the place."""
         m, grid = self.parameters[0].value(x[0]), self.nearest(x)
         offset = self.at(x) - assembly.points[assembly.rows([grid])[0]]
         return with_masses(assembly, (grid,), m, offset)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """Masses at the places where they explain most, and the one that the scales ask for.
+    """Masses at the places where they explain most, and the one that the weighing suggests.
 
-    Calibration lays what an article weighs more on density and thickness. About such a state a mass
-    looks smaller than it is, and elsewhere.
+    Calibration assigns additional weight of an article to density and thickness. From such a state
+    a mass appears too small and at a wrong place.
     """
     strengths = SHARE * context.where.setup.weight * TRIED
     more = context.weighs_more
@@ -68,7 +68,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """1.5 to 8 % of the article's mass at a grid."""
+    """Add 1.5 to 8 % of the article's mass at a grid."""
     weight, grid = article.weight, article.shell_grid(rng)
     m = float(rng.uniform(0.015, 0.08)) * weight
     at = article.grids_at(np.array([grid]))

@@ -1,4 +1,4 @@
-"""What sits at points: masses and springs at known or unknown places."""
+"""Masses and springs at points."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from ..model.ground_springs import with_springs as with_springs
 from ..model.point_masses import with_masses as with_masses
 from .effect import Effect, Parameter, PointTerm
 
-NOTHING = -30.0  # ln of a strength over its median that is none
+NOTHING = -30.0  # ln of a strength over its median that is as good as zero
 
 
 def _empty() -> sp.csr_array:
@@ -34,17 +34,17 @@ class AtPoints(Effect):
 
 @dataclass(frozen=True, eq=False)
 class MassEffect(AtPoints):
-    """Masses: moved along every direction, weighed once per grid."""
+    """Masses: they act in every direction and count once per grid in the weight."""
 
     matrix = "M"
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """The masses the scales would see, n · m."""
+        """Total mass n · m."""
         total = len(self.grids) * self.parameters[0].value(x[0])
         return total, np.array([total])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at each grid."""
+        """Write a CONM2 at each grid."""
         m = self.parameters[0].value(x[0])
         return with_masses(assembly, self.grids, m)
 

@@ -1,4 +1,4 @@
-"""A smooth field over shells as a deck can hold it: properties of their own, by bands."""
+"""A smooth field over shells in a deck: one new property for each band of values."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,11 +8,11 @@ import numpy as np
 from ..model.assembly import Assembly
 from ..model.properties import Part
 
-BANDS = 6  # properties between nothing and the field's largest value
+BANDS = 6  # properties between zero and the largest value of the field
 
 
 def levels(value: np.ndarray) -> tuple[np.ndarray, float]:
-    """Whole numbers (m,) of equal steps, and the step."""
+    """Round a field to integer levels (m,) of equal steps; return levels and step."""
     step = float(np.abs(value).max(initial=0.0)) / BANDS
     return np.round(value / step).astype(int) if step else np.zeros(len(value), int), step
 
@@ -20,9 +20,9 @@ def levels(value: np.ndarray) -> tuple[np.ndarray, float]:
 def with_bands(
     assembly: Assembly, value: np.ndarray, changed: Callable[[Part, float], Part]
 ) -> Assembly:
-    """The assembly with its shells in parts changed by ``value`` (m,), in equal steps.
+    """Put the shells into parts changed by ``value`` (m,), in equal steps.
 
-    ``changed`` gives a part as it is with a value; its name and id are made here.
+    ``changed`` returns a part changed by a value; name and id are set here.
     """
     level, step = levels(value)
     old, parts = assembly.shells.part, list(assembly.parts)

@@ -1,6 +1,6 @@
-"""Families of effects by name: ours, those of installed packages, those a program registers.
+"""Families of effects by name: built-in, from installed packages, and registered by a program.
 
-A package adds a family by an entry point, with nothing of chladni touched::
+A package adds a family by an entry point, without any change of chladni::
 
     [project.entry-points."chladni.effects"]
     edge-mass = "my_package.edge_mass:FAMILY"
@@ -63,23 +63,23 @@ _added: dict[str, Family] = {}
 
 
 def families() -> tuple[Family, ...]:
-    """Every family that is known, ours first.
+    """All known families, the built-in ones first.
 
     Raises
     ------
     ExtensionError
-        If an installed package offers one that cannot be used.
+        If an installed package offers a family that cannot be used.
     """
     return (*BUILT_IN, *_installed(), *_added.values())
 
 
 def names() -> tuple[str, ...]:
-    """Their names."""
+    """The names of all known families."""
     return tuple(family.name for family in families())
 
 
 def family(name: str) -> Family:
-    """The family of a name."""
+    """Return the family with this name; raise ``LabelError`` if there is no such family."""
     for known in families():
         if known.name == name:
             return known
@@ -100,7 +100,7 @@ def register(family: Family) -> None:
 
 
 def unregister(name: str) -> None:
-    """Take back what :func:`register` added."""
+    """Remove a family added by :func:`register`; raise ``LabelError`` if it was not."""
     if name not in _added:
         raise LabelError(f"no effect {name!r} was registered; there are {', '.join(_added)}")
     del _added[name]
@@ -108,7 +108,7 @@ def unregister(name: str) -> None:
 
 @cache
 def _installed() -> tuple[Family, ...]:
-    """Families of the installed packages, by the order of their names."""
+    """Families of the installed packages, in the order of their names."""
     out: dict[str, Family] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda e: (e.name, e.value)):
         found = _loaded(entry)

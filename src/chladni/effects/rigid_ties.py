@@ -1,8 +1,8 @@
-"""The rigid ties of a structure: who follows whom, and the structure with some of them let loose.
+"""The rigid ties of a structure, and the structure with some of them released.
 
-A tie is what follows one rigid element on one sheet. Let loose, its followers are led by a point of
-their own at the place of the element's independent point, and move by δ (6,), three ways and three
-turns, against that.
+A tie is the set of dependent points of one rigid element on one sheet. After release a new point
+leads them, at the place of the element's independent point. It moves by δ (6,), three translations
+and three rotations, relative to that point.
 """
 
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from ..model.added_points import next_id, with_points
 from ..model.assembly import Assembly, Bushes, RigidBody
 from ..model.properties import ShellSection
 
-FIRM = 100.0  # times E t: firmer than any sheet, and not so firm that its modes drown all others
-LEAST_REACH = 0.005  # [m] by which turns count where a tie holds one grid alone
+FIRM = 100.0  # times E t: stiffer than any sheet, but its modes do not mask all others
+LEAST_REACH = 0.005  # [m] lever arm of rotations where a tie holds one grid only
 
 
 @dataclass(frozen=True, eq=False)
 class RigidTie:
-    """Some followers of a rigid element.
+    """Some dependent points of a rigid element.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class RigidTie:
     reach: float
 
     def within(self, assembly: Assembly) -> tuple[int, RigidBody]:
-        """The rigid element that holds it, and its position."""
+        """Position of the rigid element that contains the tie, and the element."""
         return next(
             (k, body)
             for k, body in enumerate(assembly.rigid)
@@ -47,10 +47,10 @@ class RigidTie:
 
 
 def rigid_ties(assembly: Assembly) -> list[RigidTie]:
-    """Every tie that holds something against something else.
+    """Every tie between two components.
 
-    What leads a fastener or a bush to its sheet is left out: that one's own compliance is in series
-    with it. Of two sheets that follow a point on which nothing else hangs, one is enough.
+    Ties between a fastener or a bush and its sheet are left out, because the compliance of the
+    fastener is in series. If two sheets follow a point with no other attachment, one tie is enough.
     """
     sheet, used = _sheet_of(assembly), _used(assembly)
     led = _fastened(assembly)
@@ -74,7 +74,7 @@ def _tie(assembly: Assembly, body: RigidBody, legs: list[int]) -> RigidTie:
 
 
 def _sheet_of(assembly: Assembly) -> np.ndarray:
-    """Part of the elements at each point (n,), shells before beams before solids; -1: of none."""
+    """Part of the elements at each point (n,), shells before beams before solids, else -1."""
     out = np.full(len(assembly.points), -1)
     groups: tuple[Any, ...] = (*assembly.solids, assembly.beams, assembly.shells)
     for group in groups:
@@ -83,7 +83,7 @@ def _sheet_of(assembly: Assembly) -> np.ndarray:
 
 
 def _used(assembly: Assembly) -> set[int]:
-    """Rows of points on which something hangs beside rigid elements that they lead."""
+    """Rows of points with an attachment other than one rigid element that they lead."""
     a = assembly
     nodes = [a.shells.nodes, a.beams.nodes, *(s.nodes for s in a.solids), a.springs.nodes,
              a.bushes.nodes, a.scalar_masses.nodes, a.masses.node, a.supports[:, 0]]  # fmt: skip
@@ -94,7 +94,7 @@ def _used(assembly: Assembly) -> set[int]:
 
 
 def _others(body: object) -> Iterator[int]:
-    """Points of a rigid element that do not lead it."""
+    """Points of a rigid element other than its independent point."""
     if isinstance(body, RigidBody):
         yield from body.dependent
     else:
@@ -111,7 +111,7 @@ def _fastened(assembly: Assembly) -> set[int]:
 
 
 def loosened(assembly: Assembly, tie: RigidTie) -> tuple[Assembly, int]:
-    """The assembly with the tie's followers led by a point of their own, and its row."""
+    """Release a tie: its followers are led by a new point; return the assembly and its row."""
     grown, at = with_points(assembly, assembly.points[[tie.lead]])
     (position, body), lead = tie.within(assembly), int(at[0])
     legs, bodies = np.isin(body.dependent, tie.rows), list(assembly.rigid)
@@ -130,7 +130,7 @@ def _with_legs(body: RigidBody, legs: np.ndarray) -> RigidBody:
 
 
 def sprung(assembly: Assembly, tie: RigidTie, k: float, id: int | None = None) -> Assembly:
-    """The assembly with springs k [N/m] all ways and k reach² all turns in place of the tie."""
+    """Replace the tie by springs: k [N/m] in translation and k reach² in rotation."""
     made, lead = loosened(assembly, tie)
     old, none = made.bushes, np.zeros((1, 6))
     new = Bushes(
@@ -145,10 +145,10 @@ def sprung(assembly: Assembly, tie: RigidTie, k: float, id: int | None = None) -
 
 
 def on_firm_springs(assembly: Assembly) -> Assembly:
-    """The assembly with a spring of its own in every tie, so firm that nothing gives.
+    """Put a spring into every tie, so stiff that it is practically rigid.
 
-    A rigid motion cannot be let loose, a spring can: what is searched has these. Their elements
-    have ids below zero, which no deck has.
+    A rigid constraint cannot be softened, a spring can. Therefore the search uses this model. The
+    new elements have negative ids, which no deck has.
     """
     ties, firm = rigid_ties(assembly), _firm(assembly)
     for k, tie in enumerate(ties):
@@ -157,7 +157,7 @@ def on_firm_springs(assembly: Assembly) -> Assembly:
 
 
 def firmly_held(assembly: Assembly, row: int) -> tuple[RigidTie, float]:
-    """The tie that a spring of :func:`on_firm_springs` stands in, and its stiffness [N/m]."""
+    """The tie of a spring from :func:`on_firm_springs`, and the stiffness [N/m] of that spring."""
     b = assembly.bushes
     lead, own = b.nodes[row].tolist()
     body = next(x for x in assembly.rigid if isinstance(x, RigidBody) and x.independent == own)
@@ -166,7 +166,7 @@ def firmly_held(assembly: Assembly, row: int) -> tuple[RigidTie, float]:
 
 
 def _firm(assembly: Assembly) -> float:
-    """FIRM times what the stiffest sheet has in its plane, E t [N/m]."""
+    """FIRM times the largest plane stiffness E t [N/m] of any sheet."""
     t = [
         (p.section.membrane or p.section.bending, p.section.thickness)
         for p in assembly.parts

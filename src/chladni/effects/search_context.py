@@ -1,7 +1,7 @@
-"""What a search offers a family of effects that proposes its candidates.
+"""The services of a search to a family of effects that proposes its candidates.
 
-Effects stand below the search and do not know it; they see it as these protocols. A family says
-which service it wants; how the service works is the search's own affair.
+Effects do not import the search, which is a higher layer; they see it as these protocols. A family
+calls a service, and the search implements it.
 """
 
 from collections.abc import Sequence
@@ -47,14 +47,14 @@ class FastenerRow(Protocol):
 
 
 class ResponseScan(Protocol):
-    """Scores of many changes at once, where responses were measured.
+    """Scores of many changes at once, for measured responses.
 
-    ``about`` is the position in :attr:`SearchContext.bases` of the state that is changed.
+    ``about`` is the position of the state that is changed in :attr:`SearchContext.bases`.
     """
 
     @property
     def deviation(self) -> np.ndarray:
-        """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines."""
+        """log10(H_model / H_test) of the calibrated model (n_f, n_out, n_in), fitted lines only."""
 
     def point_scores(
         self, about: int, matrix: str, strengths: np.ndarray, places: ElementGrids | None = None
@@ -67,9 +67,9 @@ class ResponseScan(Protocol):
     def oscillator_scores(
         self, about: int, mass: float, hertz: np.ndarray, places: ElementGrids
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Best mass [kg] of a lump on a spring, and the score with it (n_places, n_hertz).
+        """Best mass [kg] of a resonator, and the score with it (n_places, n_hertz).
 
-        ``mass`` is a typical one, ``hertz`` the frequencies of the lump on the spring alone.
+        ``mass`` is a typical value, ``hertz`` are the natural frequencies of the resonator alone.
         """
 
     def field_scores(
@@ -80,15 +80,15 @@ class ResponseScan(Protocol):
     def bending_scores(
         self, about: int, sets: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Best amount of bending stiffness each set of shells gains, and the score: (k,), (k,).
+        """Best change of bending stiffness of each set of shells, and the score: (k,), (k,).
 
-        The amount is in units of what the set has; the responses are taken as linear in it.
+        The change is relative to the stiffness of the set; the responses are linearised in it.
         """
 
     def fastener_scores(self, about: int, left: np.ndarray) -> np.ndarray:
-        """Score of each of the context's fasteners with some of its stiffness left (n, k).
+        """Score of each fastener of the context with a reduced stiffness (n, k).
 
-        ``left`` (n, k) is in units of what the fastener has; nothing is linearised.
+        ``left`` (n, k) is the remaining share of the stiffness; nothing is linearised.
         """
 
     @property
@@ -102,9 +102,9 @@ class ResponseScan(Protocol):
 
 
 class SearchContext(Protocol):
-    """The structure, the test, two states of the base effects, and scores of what is tried.
+    """The structure, the test, two states of the base effects, and scores of trial effects.
 
-    A score is -2 ln posterior up to a constant: the smaller, the better.
+    A score is -2 ln posterior up to a constant; a smaller score is better.
     """
 
     @property
@@ -117,7 +117,7 @@ class SearchContext(Protocol):
 
     @property
     def bases(self) -> tuple[np.ndarray, ...]:
-        """Base parameters of the nominal and of the calibrated model, scatter idle in both."""
+        """Base parameters of the nominal and of the calibrated model, both without scatter."""
 
     @property
     def null(self) -> np.ndarray:
@@ -125,39 +125,39 @@ class SearchContext(Protocol):
 
     @property
     def weighs_more(self) -> float:
-        """What the scales tell beyond the nominal model [kg]; 0 where nothing was weighed."""
+        """Weighed mass minus that of the nominal model [kg]; 0 if nothing was weighed."""
 
     @property
     def scan(self) -> ResponseScan | None:
-        """Fast scores; None where only natural frequencies are known."""
+        """Fast scores; None if only natural frequencies are known."""
 
     @property
     def fasteners(self) -> tuple[tuple[Connection, np.ndarray], ...]:
-        """Welds and fasteners of the structure; of each the share z/(w + z) of its rows (r,)."""
+        """Welds and fasteners of the structure, each with the share z/(w + z) of its rows (r,)."""
 
     def scores(
         self, effect: Effect, starts: Sequence[np.ndarray], carried: bool = False, about: int = -1
     ) -> np.ndarray:
-        """Score of an effect at each start about one of ``bases`` (n_ways, n_starts).
+        """Score of an effect at each start, from one of ``bases`` (n_ways, n_starts).
 
-        With ``carried``, or where the effect lets clamps go, the basis is widened by what it moves,
-        as it is for a fit.
+        With ``carried``, or if the effect releases clamps, the basis is extended by the responses
+        of the effect, as for a fit.
         """
 
     def modal_operators(self, effect: Effect, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ (m,) of the calibrated model, and φᵀ A φ of the operators of an effect (k, m, m)."""
 
     def valleys(self, effect: Effect) -> list[np.ndarray]:
-        """Where poles alone are known: the lowest minima over the effect's whole prior."""
+        """The lowest local minima over the effect's whole prior, if only poles are known."""
 
 
-APART = 1 / 6  # of the structure's size lie between places that are both followed
+APART = 1 / 6  # of the structure's size: least distance between places that are both followed
 
 
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
-    """Effects whose place is known, each from the best of its starts.
+    """Candidates for effects of known place, each from the best of its starts.
 
-    With poles alone an effect of many parameters begins in each of its lowest valleys.
+    With poles only, an effect of many parameters starts in each of its lowest local minima.
     """
     out: list[Candidate] = []
     for effect in effects:
@@ -174,7 +174,7 @@ def best_places(
     context: SearchContext, effects: Sequence[Effect], point: np.ndarray, wanted: int = 2,
     apart: float = APART, carried: bool = False,
 ) -> list[Candidate]:  # fmt: skip
-    """The same effect at many places, each evaluated at all its starts: the best places.
+    """The best places of an effect, evaluated at many places with all its starts.
 
     Parameters
     ----------
@@ -193,14 +193,14 @@ def best_places(
 def distinct(
     score: np.ndarray, point: np.ndarray, taken: Sequence[int], wanted: int, apart: float = APART
 ) -> list[int]:
-    """The best positions, none within a share of the structure's size of another one chosen.
+    """The best positions, at a minimum distance from each other.
 
     Parameters
     ----------
-    score : (n,)       the smaller, the better
+    score : (n,)       a smaller score is better
     point : (n, 3)     [m]
     taken : positions chosen before
-    apart : the share; negative: they may share a place
+    apart : minimum distance over the structure's size; negative: places may coincide
     """
     reach = apart * np.linalg.norm(np.ptp(point, axis=0))
     out: list[int] = []

@@ -1,4 +1,4 @@
-"""What the test itself does to a channel."""
+"""A wrong gain or sign of a measurement channel."""
 
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +12,7 @@ from .search_context import Candidate, SearchContext
 
 @dataclass(frozen=True, eq=False)
 class SensorFault(Effect):
-    """Gain and sign of one channel: what was recorded is ± e^x times the truth."""
+    """Gain and sign of one channel: the recorded signal is ± e^x times the true one."""
 
     name = "sensor-fault"
     claim = "a channel's gain or sign is wrong"
@@ -24,13 +24,13 @@ class SensorFault(Effect):
     mask: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """The factor on the channel, negative where its sign is wrong too."""
+        """The factor on the channel, negative for a reversed sign."""
         (gain,) = self.parameters
         low, high = sorted(self.sign * v for v in gain.interval(x[0], self.widened(sd)[0]))
         return (Estimate(gain.name, self.sign * gain.value(x[0]), gain.unit, low, high),)
 
     def outputs(self, x: np.ndarray) -> ChannelChange:
-        """x / ln 10 (+ iπ / ln 10 where the sign is wrong) on that channel."""
+        """x / ln 10 (+ iπ / ln 10 for a reversed sign) on that channel."""
         value, slope = np.zeros(self.n_outputs, complex), np.zeros((self.n_outputs, 1), complex)
         value[self.channel] = (x[0] + (1j * np.pi if self.sign < 0 else 0)) / np.log(10)
         slope[self.channel] = 1 / np.log(10)
@@ -51,11 +51,11 @@ LN10 = np.log(10.0)
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The two channels whose level or sign departs most from the calibrated model.
+    """The two channels whose level or sign deviates most from the calibrated model.
 
-    Each begins from that model and from the nominal one: a wrong channel bends the calibration.
-    The level of the only channel is that of the whole recording: no other shows it to be odd, so it
-    is none of a sensor's (``gain = "unknown"`` frees it).
+    Each starts from that model and from the nominal one, because a wrong channel distorts the
+    calibration. With a single channel only the sign is tested. Its level is that of the whole
+    recording, and no other channel shows it to be wrong (``gain = "unknown"`` frees it).
     """
     if context.scan is None:
         return []
@@ -71,7 +71,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def _departure(delta: np.ndarray, channel: int) -> tuple[float, int, int, float]:
-    """Mean square of δ = log10 H_model/H_test that one factor takes away; channel, sign, ln."""
+    """Reduction of the mean square of δ = log10 H_model/H_test by one factor; channel, sign, ln."""
     flipped = np.mean(np.abs(delta.imag)) > np.pi / 2 / LN10
     start = float(np.clip(-np.median(delta.real) * LN10, -2.5, 2.5))
     left = delta + (start + (1j * np.pi if flipped else 0)) / LN10
@@ -82,7 +82,7 @@ def _departure(delta: np.ndarray, channel: int) -> tuple[float, int, int, float]
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """One channel times a factor that halves, doubles or reverses it."""
+    """Multiply one channel by a factor, for example 0.5, 2 or -1."""
     at = int(rng.integers(len(article.outputs)))
     gains = article.gains.copy()
     gains[at] = float(rng.choice([-1.0, 0.5, 0.7, 1.4, 2.0, -1.3]))

@@ -1,4 +1,4 @@
-"""What hangs on the structure only while it is measured."""
+"""Sensor mass: additional mass on the structure during the measurement only."""
 
 from dataclasses import dataclass, replace
 
@@ -13,9 +13,9 @@ from .surroundings import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class SensorMass(MassEffect):
-    """Accelerometers (and their cables) weigh something; taken off before weighing.
+    """M + m Σ bᵀb over all sensors: mass of accelerometers and cables, removed before weighing.
 
-    ``shares`` are the (grid id, weight) each sensor hangs on.
+    ``shares`` are the (grid id, weight) pairs to which each sensor is attached.
     """
 
     name = "sensor-mass"
@@ -24,7 +24,7 @@ class SensorMass(MassEffect):
     shares: tuple[Share, ...] = ()
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CONM2 at the grids, by their weights."""
+        """Write CONM2 at the grids, in proportion to their weights."""
         m = self.parameters[0].value(x[0])
         total: dict[int, float] = {}
         for grid, weight in (pair for share in self.shares for pair in share):
@@ -32,16 +32,16 @@ class SensorMass(MassEffect):
         return with_masses(assembly, tuple(total), np.array(list(total.values())))
 
     def weight(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """Nothing: the article is weighed without its sensors."""
+        """Zero, because the article is weighed without its sensors."""
         return 0.0, np.zeros(1)
 
     def off_the_scales(self, x: np.ndarray) -> float:
-        """All sensors."""
+        """Total mass of the sensors."""
         return len(self.shares) * self.parameters[0].value(x[0])
 
 
 def sensor_mass(where: Surroundings) -> list[SensorMass]:
-    """One mass for all sensors; median 0.4 % of the structure's mass each, at least 2 g."""
+    """One mass for every sensor; median 6 % of the structure's mass in total, 2 g each or more."""
     setup = where.setup
     if not setup.sensors:
         return []
@@ -55,7 +55,7 @@ def sensor_mass(where: Surroundings) -> list[SensorMass]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """0.25 to 0.6 % of the article's mass at every sensor, taken off before weighing."""
+    """Add 0.25 to 0.6 % of the article's mass at every sensor, removed before weighing."""
     each = float(rng.uniform(0.0025, 0.006)) * article.weight
     loaded = with_masses(article.assembly, article.grids_at(article.outputs), each)
     truth = {"value": each, "parameters": {"M": each}}

@@ -1,9 +1,9 @@
-"""What a shaker does to the structure beside its force: its stinger holds, its gauge weighs.
+"""The restraint of a shaker in addition to its force: stinger stiffness and force gauge mass.
 
-A stinger is stiff along its axis, where the gauge reads what it does; across the axis, and against
-turning, it holds the drive point as a beam clamped at the armature, 12EI/L³ and 4EI/L, and no
-gauge reads that. What of the gauge lies beyond its crystal rides on the structure (Ewins 2000,
-Modal Testing, 3.3). It acts where the structure is driven and nowhere else.
+A stinger is stiff along its axis, where the force gauge measures its force. Across the axis and in
+rotation it holds the drive point as a beam clamped at the armature, 12EI/L³ and 4EI/L; the gauge
+does not measure this. The mass of the gauge beyond its crystal moves with the structure (Ewins
+2000, Modal Testing, 3.3). The effect acts at the drive point only.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from .family import Article, Family
 from .points import strength, with_masses
 from .surroundings import Surroundings
 
-MOST = 3  # drive points of shakers that stay where they are; more of them were hit or moved about
+MOST = 3  # drive points of fixed shakers; more points mean a hammer or a roving shaker
 ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad, kg]
 
 
@@ -30,7 +30,7 @@ ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad
 class ShakerRestraint(Effect):
     """x = (ln k_lat, ln k_rot, ln m) at one drive point.
 
-    ``across`` are its rows along two directions square to the drive, ``turns`` the rotations about
+    ``across`` are its rows along two directions normal to the drive, ``turns`` the rotations about
     these, ``moves`` all three translations.
     """
 
@@ -48,7 +48,7 @@ class ShakerRestraint(Effect):
         return np.array([p.value(v) for p, v in zip(self.parameters, x, strict=True)])
 
     def terms(self, x: np.ndarray) -> tuple[PointTerm, ...]:
-        """k_lat and k_rot across the drive to K, m along all directions to M."""
+        """k_lat and k_rot across the drive in K, m in all directions in M."""
         assert self.across is not None
         assert self.turns is not None
         assert self.moves is not None
@@ -60,18 +60,18 @@ class ShakerRestraint(Effect):
         )
 
     def off_the_scales(self, x: np.ndarray) -> float:
-        """The gauge."""
+        """Mass of the gauge."""
         return float(self.values(x)[2])
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """CBUSH to ground in a frame of the drive, CONM2."""
+        """Write a CBUSH to ground in a frame of the drive, and a CONM2."""
         return restrained(assembly, self.shares, self.direction, *self.values(x))
 
 
 def restrained(
     assembly: Assembly, shares: Share, direction: Any, k_lat: float, k_rot: float, m: float
 ) -> Assembly:
-    """The assembly with a stinger's springs [N/m, N m/rad] and a gauge [kg] at one place."""
+    """Add the springs of a stinger [N/m, N m/rad] and a gauge [kg] at one place."""
     grids, weights = [g for g, _ in shares], np.array([w for _, w in shares])
     rows = assembly.rows(grids)
     place = weights @ assembly.points[rows]
@@ -83,7 +83,7 @@ def restrained(
 
 
 def shaker_restraint(where: Surroundings) -> list[ShakerRestraint]:
-    """One at each drive point, where there are few enough to be shakers."""
+    """One effect at each drive point, if there are few enough for shakers."""
     drives = tuple(dict.fromkeys(where.setup.drives))
     if len(drives) > MOST:
         return []
@@ -112,7 +112,7 @@ def _at(
 
 
 def _rows(built: Structure, shares: Share, ways: np.ndarray, turning: bool) -> sp.csr_array:
-    """Motion of a place along, or turning about, each direction (k, 3); those it can (j, n)."""
+    """Rows (j, n) of the possible motions of a place along, or about, each direction (k, 3)."""
     rows = sp.csr_array(
         sum(w * built.along(np.full(len(ways), grid), ways, turning) for grid, w in shares)
     )
@@ -120,7 +120,7 @@ def _rows(built: Structure, shares: Share, ways: np.ndarray, turning: bool) -> s
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A stiff stinger and a heavy gauge where it is driven, the gauge not weighed."""
+    """Add a stiff stinger and a heavy gauge at the drive point, the gauge not weighed."""
     k_lat = float(np.exp(rng.uniform(np.log(5e3), np.log(5e4))))
     k_rot = float(np.exp(rng.uniform(np.log(1.0), np.log(10.0))))
     m = float(rng.uniform(0.005, 0.02)) * article.weight

@@ -1,7 +1,7 @@
-"""Springs between two sheets: how these move against each other at places, and the cards of it.
+"""Springs between two sheets: the relative motion of the sheets at places, and the cards.
 
-The motion is that of two means at one point, each the best rigid motion of the grids of a sheet
-near it; between different points rigid rotation would load what resists it.
+The motion is that between two averages at one point. Each average is the best rigid motion of the
+nearby grids of one sheet. Between two different points a rigid rotation would load the spring.
 """
 
 from dataclasses import dataclass, replace
@@ -21,8 +21,8 @@ class SheetPairs:
 
     Attributes
     ----------
-    middle, along : (k, 3)   places [m], unit vectors of the motion that counts
-    sides : of each place the rows of grids it hangs on in either sheet, three at least
+    middle, along : (k, 3)   places [m], unit vectors of the relative motion
+    sides : rows of the attached grids in either sheet for each place, three at least
     """
 
     middle: np.ndarray
@@ -33,7 +33,7 @@ class SheetPairs:
         return len(self.sides)
 
     def relative_rows(self, built: Structure) -> sp.csr_array:
-        """Rows (k, n): how far the second sheet moves along the direction against the first."""
+        """Rows (k, n): motion of the second sheet relative to the first along the direction."""
         bare, ends = self.tied(replace(built.assembly, axes=None, rigid=()))
         means = average_rows(bare, np.arange(len(bare.rigid)))
         where = (means.dof[means.row], means.on)
@@ -49,7 +49,7 @@ class SheetPairs:
         return sp.csr_array((self.along.ravel(), where), shape=(k, n))
 
     def tied(self, assembly: Assembly, on: np.ndarray | None = None) -> tuple[Assembly, np.ndarray]:
-        """The assembly with both ends of springs at some places (all), and their rows (k, 2)."""
+        """Add both ends of springs at some places (default all); return also their rows (k, 2)."""
         at = np.arange(len(self)) if on is None else on
         grown, rows = with_points(assembly, np.repeat(self.middle[at], 2, axis=0))
         first, T = next_id(assembly), (1, 2, 3)
@@ -64,7 +64,7 @@ class SheetPairs:
         return grown, rows.reshape(-1, 2)
 
     def gripped(self, assembly: Assembly, k: np.ndarray) -> Assembly:
-        """The assembly with springs k (k,) [N/m] along the directions, where there are any."""
+        """Add springs k (k,) [N/m] along the directions, where k is positive."""
         on = np.flatnonzero(k > 0)
         grown, ends = self.tied(assembly, on)
         old, zero = grown.bushes, np.zeros((len(on), 6))

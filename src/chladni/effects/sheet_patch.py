@@ -1,9 +1,9 @@
-"""A smooth patch of a sheet where one field is not what the deck says, at an unknown place.
+"""A smooth patch of a sheet where one field differs from the deck, at an unknown place.
 
-q(x) = exp(-(|x - c|² / 2R²)^p) about a centre c that lies on the quadric following the sheet: a
-bell with p = 1, nearly a disc with p = 4 (a super-Gaussian). How its rim looks nobody knows, and it
-is found with the rest, for a bell in the place of a disc says too much of too small a region.
-Parts that share grids are one sheet: what happens to a pressed panel does not end at a fold.
+q(x) = exp(-(|x - c|² / 2R²)^p) about a centre c on a quadric that follows the sheet. It is a bell
+with p = 1 and nearly a disc with p = 4 (a super-Gaussian). The exponent p is fitted too: a bell in
+place of a disc gives too large a change over too small a region. Parts that share grids are one
+sheet, because a change of a pressed panel does not end at a fold.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,15 +17,15 @@ from .element_groups import ElementGroups
 from .estimate import Location
 from .search_context import Candidate, SearchContext, best_places, distinct
 
-BELL, RIMMED = (0.0, 0.3), (float(np.log(2.0)), 0.5)  # ln p and its sd: pressed; cut, glued on
+BELL, RIMMED = (0.0, 0.3), (float(np.log(2.0)), 0.5)  # ln p and sd: pressed; cut or glued on
 
 
 @dataclass(frozen=True, eq=False)
 class Quadric:
     """c(u) = c0 + u E + h(u) n, h the quadric a + b u + ... that follows a sheet about c0.
 
-    ``axes`` (2, 3) and ``normal`` (3,) are of unit length; ``bend`` (6,) belongs to 1, u, v, u²,
-    uv, v² in metres, and holds within ``reach``: further out h stays at what it is there.
+    ``axes`` (2, 3) and ``normal`` (3,) are of unit length. ``bend`` (6,) are the coefficients of 1,
+    u, v, u², uv, v² in metres. Beyond ``reach`` h is constant.
     """
 
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -35,7 +35,7 @@ class Quadric:
     reach: float = np.inf
 
     def at(self, u: np.ndarray) -> np.ndarray:
-        """The point (3,) [m] that has the coordinates u (2,) [m]."""
+        """The point (3,) [m] with the coordinates u (2,) [m]."""
         near = u * min(1.0, self.reach / max(float(np.linalg.norm(u)), 1e-300))
         h = float(_quadric(near[None])[0] @ self.bend)
         return self.origin + u @ self.axes + h * self.normal
@@ -48,7 +48,7 @@ def _quadric(u: np.ndarray) -> np.ndarray:
 
 
 def surface(groups: ElementGroups, group: int, size: float) -> Quadric:
-    """The quadric through the corners of the part's shells, near ones counting most."""
+    """Fit the quadric to the corners of the part's shells, with larger weight on near ones."""
     assembly = groups.structure.assembly
     own = np.unique(groups.nodes[groups.part[groups.group] == groups.part[group]])
     X, c = assembly.points[own], groups.centre[group]
@@ -64,15 +64,15 @@ def surface(groups: ElementGroups, group: int, size: float) -> Quadric:
 
 @dataclass(frozen=True, eq=False)
 class SheetPatch(Effect):
-    """x = (strength, ln R, u, v [length scale], ln p): a field of the sheet changed by its bump q.
+    """A field of a sheet changed by a bump q, x = (strength, ln R, u, v [length scale], ln p).
 
-    Subclasses say which ``quantity`` of the sheet it is, what the strength makes of q
-    (:meth:`log`), its parameter (:meth:`strength`), and where a scan begins.
+    Subclasses define the ``quantity`` of the sheet, the factor from strength and q (:meth:`log`),
+    the parameter (:meth:`strength`) and the start of a scan.
     """
 
     quantity: ClassVar[str] = "t"  # t, E or rho
-    scanned: ClassVar[float] = 0.0  # strength x[0] of which a scan takes the slope
-    grows: ClassVar[tuple[float, float]] = (0.0, np.inf)  # amounts of it that are such a patch
+    scanned: ClassVar[float] = 0.0  # strength x[0] at which a scan takes the slope
+    grows: ClassVar[tuple[float, float]] = (0.0, np.inf)  # multiples of it that are accepted
     rim: ClassVar[tuple[float, float]] = BELL  # prior of ln p
 
     shells: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # of the sheet (m,)
@@ -101,9 +101,10 @@ class SheetPatch(Effect):
 
     @classmethod
     def on(cls, groups: ElementGroups, group: int, trials_factor: int) -> Self:
-        """A patch of the sheet one group of shells belongs to, searched from that group on.
+        """A patch on the sheet of one group of shells, with the search starting at that group.
 
-        The unknown place is paid for by the spread of u and v; ``trials_factor`` counts the sheets.
+        The prior spread of u and v accounts for the unknown place; ``trials_factor`` is the number
+        of sheets.
         """
         part = int(groups.part[group])
         inside = (groups.connected == groups.connected[group]) & groups.sheet
@@ -129,7 +130,7 @@ class SheetPatch(Effect):
 
     @classmethod
     def more(cls, groups: ElementGroups) -> dict[str, Any]:
-        """Fields of its own that a subclass fills from the groups."""
+        """Additional fields that a subclass fills from the groups."""
         return {}
 
     def bump(self, x: np.ndarray, X: np.ndarray, blur: np.ndarray | float = 0.0) -> np.ndarray:
@@ -139,7 +140,7 @@ class SheetPatch(Effect):
         return R2 / (R2 + blur) * np.exp(-((d2 / (2 * (R2 + blur))) ** np.exp(x[4])))
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """The logarithm over the groups; its slope by central differences of a scalar formula."""
+        """The logarithm over the groups, with its slope by central differences."""
         h = 1e-5
         slope = np.stack(
             [(self.log(x + h * e) - self.log(x - h * e)) / (2 * h) for e in np.eye(5)], 1
@@ -155,7 +156,7 @@ class SheetPatch(Effect):
         return float(self.size * np.exp(x[1]))
 
     def location(self, x: np.ndarray) -> Location:
-        """The place a fit moved it to: where the sheet is changed most."""
+        """The fitted place, where the change of the sheet is largest."""
         grid, deepest = self.deepest(x)
         point = tuple(float(v) for v in deepest)
         text = f"on {self.parts[0]} round ({', '.join(f'{1e3 * v:.0f}' for v in point)} mm)"
@@ -163,7 +164,7 @@ class SheetPatch(Effect):
         return replace(self.where(), text=text, grids=(grid,), point_m=point, radius_m=radius)
 
     def deepest(self, x: np.ndarray) -> tuple[int, np.ndarray]:
-        """Grid and point where q is largest: c, or the grid next to it if c is off the sheet."""
+        """Grid and point with the largest q: c, or the nearest grid if c is off the sheet."""
         c = self.at(x)
         d2 = ((self.points - c) ** 2).sum(axis=1)
         k = int(np.argmin(d2))
@@ -172,15 +173,15 @@ class SheetPatch(Effect):
 
 
 RADII = (0.1, 0.18, 0.3)  # of the square root of the part's area
-TRIED = 30  # groups that are evaluated one by one where only natural frequencies are known
+TRIED = 30  # groups that are evaluated one by one if only natural frequencies are known
 
 
 def patches(context: SearchContext, kind: type[SheetPatch], each: int = 2) -> list[Candidate]:
-    """Patches of a kind: its slope at every group and radius, the best places per baseline.
+    """Scan patches of a kind at every group and radius; return the best places per baseline.
 
     Parameters
     ----------
-    each : places per baseline
+    each : number of places per baseline
     """
     groups = context.where.groups
     every = np.flatnonzero(groups.sheet)

@@ -1,8 +1,8 @@
-"""Element matrices of a sheet taken apart: by the power of t, by the component of Q.
+"""Element matrices of a sheet, split by the power of t and by the component of Q.
 
 Transverse shear in series with residual bending, S = (Z_s + Z_r)⁻¹, is neither linear nor cubic in
-t; S Z_s S grows with t and S Z_r S with t³ in value *and* first derivative, so that is how it is
-split.
+t. It is split into S Z_s S and S Z_r S: with the powers t and t³ for these two, the value *and* the
+first derivative are exact.
 """
 
 from collections.abc import Iterator
@@ -31,9 +31,9 @@ def thickness_split(
 
 
 def component_matrices(assembly: Assembly) -> Iterator[tuple[str, Pair]]:
-    """(A, B) as above for one component after another: ∂K/∂ln Q_k = A_k + B_k, Σ_k A_k + B_k = K.
+    """(A, B) as above for each component k: ∂K/∂ln Q_k = A_k + B_k, Σ_k A_k + B_k = K.
 
-    Shear flexibility of the material itself and the drilling stiffness go with Q66.
+    Shear flexibility of the material and the drilling stiffness are assigned to Q66.
     """
     geo = shell.geometry(assembly.points, assembly.shells)
     arrays = section_arrays(assembly, geo)

@@ -1,9 +1,9 @@
-"""A region of a sheet that is softer than the deck says, its mass unchanged.
+"""A region of a sheet that is softer than in the deck, with unchanged mass.
 
-It is the name for what lies between the others: a heat-affected zone, creased or perforated sheet,
-a layer that has come off. Only what is softer is looked for. Coarse and fine elements of two codes
-differ as a slightly stiffer region does: a corner 11 % stiffer beside the shaker gained 43 in
--2 ln evidence where nothing was missing.
+It covers causes without their own effect: a heat-affected zone, a creased or perforated sheet, a
+delaminated layer. Only softer regions are searched. Coarse and fine elements of two codes differ
+like a slightly stiffer region: a corner 11 % stiffer near the shaker gained 43 in -2 ln evidence
+where nothing was missing.
 """
 
 from dataclasses import dataclass, replace
@@ -26,19 +26,19 @@ MOST = 0.9  # of the stiffness may be lost in the middle
 
 @dataclass(frozen=True, eq=False)
 class StiffnessPatch(SheetPatch):
-    """E(x) = E0 (1 - β q(x)), β = 0.9 / (1 + e^-x): membrane and bending alike, always positive."""
+    """E(x) = E0 (1 - β q(x)), β = 0.9 / (1 + e^-x), for membrane and bending; always positive."""
 
     name = "stiffness-patch"
     elastic = True
     claim = "the sheet is softer here than the deck says, and no lighter"
     quantity = "E"
     scanned = -1.0
-    grows = (0.1, np.inf)  # less of it, or a stiffening, is no such patch
+    grows = (0.1, np.inf)  # a smaller loss, or a stiffening, is not accepted
     rim = RIMMED
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
-        """The logit of β / 0.9: a third of the stiffness is lost, within 8 and 70 %."""
+        """The logit of β / 0.9, with a prior loss of a third of the stiffness (8 to 70 %)."""
         return Parameter(
             "E", "of the deck's", -0.5, 1.2, 1.0, "linear", 0.8, starts=(-0.5,), nominal=-40.0
         )
@@ -50,18 +50,18 @@ class StiffnessPatch(SheetPatch):
 
     @classmethod
     def begun(cls, amount: float) -> float:
-        """Losses from 5 to 75 %."""
+        """Start of the logit, for losses from 5 to 75 %."""
         beta = np.clip(amount * lost(cls.scanned), 0.05, 0.75)
         return float(np.log(beta / (MOST - beta)))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """Properties of their own, by bands of equal ratio."""
+        """Write new properties, in bands of equal ratio."""
         centre = assembly.points[assembly.shells.nodes].mean(axis=1)
         log = np.log1p(-lost(x[0]) * self.bump(x, centre) * self.shells)
         return with_bands(assembly, log, softened)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """What is left of E where it is least, and the radius R."""
+        """Remaining share of E where it is lowest, and the radius R."""
         rows = Effect.reported(self, x, sd)
         q = float(self.bump(x, self.deepest(x)[1][None])[0])
         here, high, low = (1 - q * lost(x[0] + s * 1.96 * self.widened(sd)[0]) for s in (0, -1, 1))
@@ -74,7 +74,7 @@ def lost(x: float) -> float:
 
 
 def softened(part: Part, log: float) -> Part:
-    """The part with E times e^log."""
+    """Multiply E of a part by e^log."""
     return scaled(part, "E", float(np.exp(log)))
 
 
@@ -84,7 +84,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """E of a disc of 60 to 110 mm round a grid of the first part times 0.35 to 0.6."""
+    """Multiply E by 0.35 to 0.6 on a disc of 60 to 110 mm round a grid of the first part."""
     made = article.assembly
     first = made.shells.part == 0
     centre = made.points[rng.choice(np.unique(made.shells.nodes[first]))]

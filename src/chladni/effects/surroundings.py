@@ -1,4 +1,4 @@
-"""What an effect may know before anything is fitted: shells, beams, their grids, the test."""
+"""The inputs of effects before any fit: shells, beams, their grids and the test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,16 +18,16 @@ from .identified_damping import IdentifiedDamping
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What effects may know of the test.
+    """The test, as effects see it.
 
     Attributes
     ----------
-    sensors : of each output the (grid id, weight) it hangs on
+    sensors : (grid id, weight) pairs of each output
     hangers : grid ids
     weight : mass of the structure [kg]
     f_max : highest frequency of interest [Hz]
-    drives : of each force the (grid id, weight) it acts on, and its direction
-    damping : of the modes that were identified, where responses are compared
+    drives : (grid id, weight) pairs of each force, and its direction
+    damping : of the identified modes, where responses are compared
     """
 
     sensors: tuple[Share, ...]
@@ -39,16 +39,16 @@ class Setup:
 
     @property
     def stiffness(self) -> float:
-        """Spring on which a tenth of the mass swings at a third of the top frequency [N/m]."""
+        """Spring [N/m] on which a tenth of the mass resonates at a third of ``f_max``."""
         return 0.1 * self.weight * (2 * np.pi * self.f_max / 3) ** 2
 
 
 @dataclass(frozen=True, eq=False)
 class ElementGrids:
-    """Grids of shells and beams where something unknown may sit, each with a direction.
+    """Grids of shells and beams that are possible places of an effect, each with a direction.
 
-    A grid of shells stands here once, with the normal of the surface; one of beams once for every
-    direction across a beam that ends there.
+    A grid of shells is listed once, with the normal of the surface. A grid of beams is listed once
+    for every direction across a beam that ends there.
 
     Attributes
     ----------
@@ -71,20 +71,20 @@ class ElementGrids:
         return len(self.grids)
 
     def position(self, grid: int, towards: np.ndarray | None = None) -> int:
-        """Position of a grid among them; of several the first, or that most in this direction."""
+        """Position of a grid: the first of several, or the one closest to a direction."""
         at = np.flatnonzero(self.grids == grid)
         if towards is None:
             return int(at[0])
         return int(at[np.argmax(np.abs(self.normal[at] @ towards))])
 
     def only(self, chosen: np.ndarray) -> Self:
-        """Some of them."""
+        """A selection of the grids."""
         return type(self)(**{name: value[chosen] for name, value in vars(self).items()})
 
     def spread(self, most: int) -> np.ndarray:
-        """Positions of a sample far from each other, in all directions each has.
+        """Positions of a sample of distant grids, with all directions of each.
 
-        Of grids with one direction ``most`` at most, of others half as many.
+        The sample has at most ``most`` grids, or half as many if grids have several directions.
         """
         grids, first = np.unique(self.grids, return_index=True)
         several = len(grids) < len(self.grids)
@@ -94,7 +94,7 @@ class ElementGrids:
 
 
 def element_grids(groups: ElementGroups) -> ElementGrids:
-    """All grids of shells that can move along the normal there, and of beams that can across."""
+    """All grids of shells that can move along their normal, and of beams that can move across."""
     assembly = groups.structure.assembly
     normal = point_normals(assembly.points, assembly.shells.nodes)
     on_shells = np.flatnonzero(normal.any(axis=1))
@@ -110,13 +110,13 @@ def element_grids(groups: ElementGroups) -> ElementGrids:
     return found.only(moving)
 
 
-SAME = 0.95  # cosine between directions across two beams of one grid that count as one
+SAME = 0.95  # cosine from which directions across two beams of one grid count as one
 
 
 def _across_beams(
     groups: ElementGroups,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Points on beams alone, with direction, line and its way there: (k,), (k, 3), (k,), (k, 3)."""
+    """Points on beams only, direction across, line, and tangent: (k,), (k, 3), (k,), (k, 3)."""
     assembly = groups.structure.assembly
     points, shells = assembly.points, len(assembly.shells)
     nodes = groups.nodes[shells:, :2]
@@ -139,15 +139,15 @@ def _across_beams(
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The structure and its test as every effect may know them.
+    """The structure and its test, as every effect sees them.
 
     Attributes
     ----------
     groups : shells and beams in groups
     grids : ElementGrids        all of them
-    places : ElementGrids       a sample of them, tried where a place is unknown
-    setup : Setup             of the test
-    frequency : (r,) Hz, shapes : (n, r)    modes of the deck up to the highest line
+    places : ElementGrids       a sample of them, tried if a place is unknown
+    setup : Setup               of the test
+    frequency : (r,) Hz, shapes : (n, r)    modes of the deck up to the highest spectral line
     """
 
     groups: ElementGroups
@@ -163,7 +163,7 @@ class Surroundings:
         return self.groups.structure.along(ids, np.tile(np.eye(3), (len(grids), 1)))
 
     def at_shares(self, shares: Sequence[Share]) -> sp.csr_array:
-        """Rows of all three translations of places that hang on grids by weights (3k, n)."""
+        """Rows (3k, n) of all three translations of places given as weighted grids."""
         weighted = [
             sp.csr_array(sum(w * self.translations([grid]) for grid, w in share))
             for share in shares

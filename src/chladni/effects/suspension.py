@@ -1,4 +1,4 @@
-"""What the structure hangs on."""
+"""Stiffness of the suspension, such as bungee cords."""
 
 from dataclasses import dataclass, replace
 
@@ -12,13 +12,13 @@ from .surroundings import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class Suspension(AtPoints):
-    """Cords at the hangers hold the structure, so it is not free."""
+    """Springs to ground at the hangers, one stiffness for all."""
 
     name = "suspension"
     claim = "the suspension's stiffness is missing from the model"
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """A spring to ground at each hanger: CELAS2, or CBUSH where it is askew."""
+        """Write a spring to ground at each hanger: CELAS2, or CBUSH in an oblique direction."""
         k = self.parameters[0].value(x[0])
         return with_springs(assembly, self.grids, self.directions, k)
 
@@ -26,7 +26,8 @@ class Suspension(AtPoints):
 def suspension(where: Surroundings) -> list[Suspension]:
     """Springs at the hangers, along the surface normal or along every direction.
 
-    A tube has no normal: where a hanger is on one, every direction comes first, then each axis.
+    A tube has no normal. If a hanger is on a tube, springs in every direction come first, then each
+    axis.
     """
     hangers = tuple(where.setup.hangers)
     if not hangers:
@@ -56,7 +57,7 @@ def suspension(where: Surroundings) -> list[Suspension]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """Cords of 0.8 to 6 kN/m along z at the hangers."""
+    """Add cords of 0.8 to 6 kN/m along z at the hangers."""
     K = float(np.exp(rng.uniform(np.log(800), np.log(6000))))
     at = article.grids_at(article.hangers)
     up = np.tile([0.0, 0.0, 1.0], (len(at), 1))

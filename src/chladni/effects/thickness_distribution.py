@@ -1,4 +1,4 @@
-"""Thickness that is not what the deck says, here and there."""
+"""Local thinning of a sheet."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ class ThicknessDistribution(SheetPatch):
     claim = "the sheet is thinner here than the deck says"
     quantity = "t"
     scanned = -2.0
-    grows = (0.05, np.inf)  # less of it, or a thickening, is no thinning
+    grows = (0.05, np.inf)  # a smaller thinning, or a thickening, is not accepted
 
     @classmethod
     def strength(cls, groups: ElementGroups) -> Parameter:
@@ -37,19 +37,19 @@ class ThicknessDistribution(SheetPatch):
 
     @classmethod
     def begun(cls, amount: float) -> float:
-        """Depths from 2 to 40 %."""
+        """Start of the logit, for depths from 2 to 40 %."""
         alpha = np.clip(amount * thinning(cls.scanned), 0.02, 0.4)
         return float(np.log(alpha / (0.6 - alpha)))
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """Thickness at the corners of the sheet's shells."""
+        """Write the thickness at the corners of the sheet's shells."""
         shells = assembly.shells
         q = self.bump(x, assembly.points)[shells.nodes]
         factor = np.where(self.shells[:, None], 1 - thinning(x[0]) * q, 1.0)
         return replace(assembly, shells=replace(shells, thickness=shells.thickness * factor))
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """The deepest thinning on the sheet and the radius R; the place stands in ``location``."""
+        """The deepest thinning on the sheet and the radius R; ``location`` holds the place."""
         rows = Effect.reported(self, x, sd)
         there = float(self.bump(x, self.deepest(x)[1][None])[0])
         value, low, high = (
@@ -69,7 +69,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """8 to 25 % thinner round a grid of the first part, with R of 40 to 90 mm."""
+    """Thin the first part by 8 to 25 % round a grid, with R of 40 to 90 mm."""
     made = article.assembly
     first = made.shells.nodes[made.shells.part == 0]
     centre = made.points[rng.choice(np.unique(first))]

@@ -1,13 +1,13 @@
-"""A joint whose stuff dissipates: a mastic, a rubber bush, a layer of damping in place of an epoxy.
+"""A joint of a dissipative material: a mastic, a rubber bush, or a damping layer for an epoxy.
 
-E(iω) = E_0 (iω/ω_0)^a is the only modulus whose loss factor is the same at all frequencies, and one
-number gives loss and rise: η = tan(aπ/2), |E| ~ ω^a (Bagley and Torvik 1983, J. Rheology 27, 201;
-causal, as Kramers and Kronig want it).  Real stuff follows it over the decade a test sees (Jones
-2001, Handbook of Viscoelastic Vibration Damping, ch. 2).
+E(iω) = E_0 (iω/ω_0)^a is the only modulus with a constant loss factor. One number gives loss and
+rise: η = tan(aπ/2), |E| ~ ω^a (Bagley and Torvik 1983, J. Rheology 27, 201). It is causal in the
+sense of Kramers and Kronig. Real materials follow it over the decade of a test (Jones 2001,
+Handbook of Viscoelastic Vibration Damping, ch. 2).
 
-Responses with equalised damping see the rise alone; the loss is seen in which modes are damped: by
-η/2 times the joint's share of their strain energy (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34,
-954-957).  The hypothesis is held against both.
+Responses with equalised damping show only the rise. The loss shows in the modal damping ratios: η/2
+times the joint's share of the strain energy of a mode (Ungar and Kerwin 1962, J. Acoust. Soc. Am.
+34, 954-957). The hypothesis is compared with both.
 """
 
 from collections.abc import Sequence
@@ -31,13 +31,13 @@ from .search_context import Candidate, SearchContext, best_places
 SD = 3.0  # of ln of the factor on E, as of any bead
 STARTS = (-4.0, -2.0, 0.0, 2.0)
 LOSS, LOSS_SD = 0.3, 0.8  # η: mastics, rubbers and damping layers have 0.06 to 1.4 (Jones 2001)
-NO_LOSS = -40.0  # of ln of the loss over that
-FAINT = 0.05  # η of a structural epoxy: below it the bead is an ordinary one
-FEWEST = 5  # modes below which their damping says nothing
-WORTH = 2.0  # in -2 ln p: the one number it takes (Akaike), below it a joint is worth no fit
+NO_LOSS = -40.0  # ln of the loss over that, as good as zero
+FAINT = 0.05  # η of a structural epoxy, below which the bead is a purely elastic one
+FEWEST = 5  # modes below which their damping is not used
+WORTH = 2.0  # least gain in -2 ln p for a fit: the cost of its one parameter (Akaike)
 FOLLOWED = 2
-RIGID = 0.02  # of the highest line: below it a mode of the deck is rigid
-CORDS = 0.7  # of the first flexible mode: what rings lower is damped by what holds it
+RIGID = 0.02  # of the highest spectral line: below it a mode of the deck is rigid
+CORDS = 0.7  # of the first flexible mode: lower modes are damped by the suspension
 NEAR = 0.03  # relative error of natural frequencies while joints are only ranked
 AMOUNTS = np.geomspace(0.3, 100.0, 18)  # of the usual damping, in the mode that has most
 
@@ -48,15 +48,15 @@ class ViscoelasticJoint(Effect):
 
     Attributes
     ----------
-    operator, others : what the joint has in K, and all others of its kind
-    band : from the first flexible mode of the deck to the highest line [Hz]
-    damping : of the modes that were identified
+    operator, others : contribution to K of the joint, and of all others of its kind
+    band : from the first flexible mode of the deck to the highest spectral line [Hz]
+    damping : of the identified modes
     """
 
     name = "viscoelastic-joint"
     claim = "a joint gives and dissipates: its modulus is complex and rises with frequency"
     rounds = 2
-    lone = True  # the damping of the modes bears one such name
+    lone = True  # the damping of the modes supports only one such effect
 
     joint: Connection | None = None
     operator: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
@@ -66,7 +66,7 @@ class ViscoelasticJoint(Effect):
 
     @property
     def reference(self) -> float:
-        """f_0 [Hz], at which the modulus is told: the middle of the band."""
+        """Reference frequency f_0 [Hz] of the modulus, the geometric middle of the band."""
         return float(np.sqrt(self.band[0] * self.band[1]))
 
     def exponent(self, x: np.ndarray) -> tuple[float, float, float]:
@@ -75,7 +75,7 @@ class ViscoelasticJoint(Effect):
         return eta, float(2 / np.pi * np.arctan(eta)), float(2 / np.pi * eta / (1 + eta**2))
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The joint as the deck has it taken out, as it is put in, and the others of its kind."""
+        """Remove the deck's joint, add the viscoelastic one, and scale the others of its kind."""
         e, (eta, a, slope) = np.eye(len(x)), self.exponent(x)
         rise = Rise(a / 2, slope / 2 * e[1], self.reference, self.band, eta, eta * e[1])
         factor = float(np.exp(x[0]))
@@ -89,15 +89,15 @@ class ViscoelasticJoint(Effect):
         return (*out, MatrixTerm("K", self.others, p.value(x[3]) - 1, p.slope(x[3]) * e[3]))
 
     def basis_rows(self, x: np.ndarray, shapes: np.ndarray) -> sp.csr_array:
-        """A φ of the joint; the basis carries all of a kind together already."""
+        """A φ of the joint; the basis already represents all of its kind together."""
         return sp.csr_array((self.operator @ shapes).T)
 
     def reloads(self, static: np.ndarray, M: sp.csr_array) -> np.ndarray:
-        """What the joint answers, for any stiffness of it (as of ``adhesive-stiffness``)."""
+        """Loads A u of the joint, for any stiffness of it (as for ``adhesive-stiffness``)."""
         return self.operator @ static
 
     def beside(self, x: np.ndarray, lam: np.ndarray, dissipated: np.ndarray) -> Beside | None:
-        """The identified damping against what damps all modes alike and what the joint takes."""
+        """Residuals of the identified damping against a common level plus the joint's loss."""
         if self.damping is None:
             return None
         f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
@@ -112,11 +112,11 @@ class ViscoelasticJoint(Effect):
 
     @property
     def neg2_log_without(self) -> float:
-        """Of the same damping where the modes are damped alike."""
+        """-2 ln p of the identified damping with a common level only."""
         return 0.0 if self.damping is None else self.damping.neg2_log_evidence()
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """E and loss factor at the reference; that of the others as it was fitted beside it."""
+        """Write E and loss factor at the reference, and E of the others as fitted with it."""
         assert self.joint is not None
         others = self.parameters[3].value(x[3]) if len(x) > 3 else 1.0
         made = _with_all(assembly, self.joint, others)
@@ -138,19 +138,19 @@ class ViscoelasticJoint(Effect):
         return super().reported(x, sd)[:2]
 
     def location(self, x: np.ndarray) -> Location:
-        """The joint, and how its stiffness goes with frequency: no card of a MAT1 can say that."""
+        """The joint, and the frequency dependence of its stiffness, which MAT1 cannot represent."""
         name, (_, a, _) = self.parameters[0].name, self.exponent(x)
         rise = f"{name} is that at {self.reference:.3g} Hz and goes with frequency to the {a:.2f}"
         return replace(self.where(), text=f"{self.text}; {rise}")
 
     def becomes(self, x: np.ndarray) -> str:
-        """An ordinary bead where it loses no more than an epoxy does."""
+        """Return "adhesive-stiffness" for a bead whose loss is below that of an epoxy."""
         solid = self.joint is not None and self.joint.kind == "solids"
         return "adhesive-stiffness" if solid and self.exponent(x)[0] < FAINT else ""
 
 
 def _with_all(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
-    """The assembly with all of a joint's kind times a factor."""
+    """Multiply the stiffness of all joints of a kind by a factor."""
     if joint.kind == "solids":
         return with_solids(assembly, factor, soft=True)
     stiff = np.where(assembly.bushes.ids[:, None] > 0, factor, 1.0) * assembly.bushes.stiffness
@@ -159,7 +159,7 @@ def _with_all(assembly: Assembly, joint: Connection, factor: float) -> Assembly:
 
 @dataclass(frozen=True, eq=False)
 class _Suspect:
-    """A joint that may dissipate: what it has in K, and the name of the family it is of."""
+    """A joint that may dissipate, its contribution to K and the name of its family."""
 
     joint: Connection
     operator: sp.csr_array
@@ -167,7 +167,7 @@ class _Suspect:
 
 
 def _suspects(built: Structure, bushes: Sequence[Connection]) -> list[_Suspect]:
-    """Every bead, longest first, all bushes together and each of them; ``MOST`` of either."""
+    """Beads, longest first; all bushes together, then each of them; at most ``MOST`` of either."""
     out = [_Suspect(b, stiffness(built, b), "adhesive") for b in longest_beads(built)]
     whole = [_together(bushes)] if len(bushes) > 1 else []
     for joint in [*whole, *bushes][:MOST]:
@@ -177,7 +177,7 @@ def _suspects(built: Structure, bushes: Sequence[Connection]) -> list[_Suspect]:
 
 
 def _together(bushes: Sequence[Connection]) -> Connection:
-    """All bushes as one joint: mounts of one make are of one rubber."""
+    """All bushes as one joint, because mounts of one product have the same rubber."""
     return replace(
         bushes[0],
         elements=np.concatenate([b.elements for b in bushes]),
@@ -216,13 +216,13 @@ def _of_one(
 
 
 def _first(frequency: np.ndarray, f_max: float) -> float:
-    """First flexible mode of the deck [Hz], or the highest line where it has none below."""
+    """First flexible mode of the deck below the highest spectral line, or that line [Hz]."""
     flexible = frequency[frequency > RIGID * f_max]
     return float(flexible.min(initial=f_max))
 
 
 def _heard(context: SearchContext) -> IdentifiedDamping | None:
-    """Damping of the flexible modes, where there are enough of them."""
+    """Damping of the flexible modes, or None if there are too few."""
     damping, where = context.where.setup.damping, context.where
     if damping is None:
         return None
@@ -233,11 +233,11 @@ def _heard(context: SearchContext) -> IdentifiedDamping | None:
 def speaks_for(
     damping: IdentifiedDamping, frequency: np.ndarray, share: np.ndarray, same: float = NEAR
 ) -> float:
-    """How much likelier damping is (2 ln p) that follows a share of the modes (m,) by any amount.
+    """Gain in 2 ln p of damping proportional to a modal energy share (m,) over uniform damping.
 
     Parameters
     ----------
-    frequency : (m,) [Hz]   of the modes that have the share
+    frequency : (m,) [Hz]   of the modes with these shares
     """
     even = damping.neg2_log_likely(np.zeros_like(damping.ratio))
     w, _ = paired_with(damping.frequency, frequency, same)
@@ -246,7 +246,7 @@ def speaks_for(
 
 
 def _spoken_for(context: SearchContext, effect: ViscoelasticJoint) -> float:
-    """The same of a joint, at the best of its stiffnesses in the calibrated model."""
+    """Gain of :func:`speaks_for` for a joint, at the best of its trial stiffnesses."""
     lam, operators = context.modal_operators(effect, effect.starts()[0])
     out, damping = [], effect.damping
     assert damping is not None
@@ -260,7 +260,7 @@ def _spoken_for(context: SearchContext, effect: ViscoelasticJoint) -> float:
 
 
 def candidates(context: SearchContext) -> list[Candidate]:
-    """The joints that the damping of the modes speaks for most, if it speaks for any."""
+    """The joints that the modal damping supports most, if it supports any."""
     if _heard(context) is None:
         return []
     built = context.where.groups.structure
@@ -277,7 +277,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """E of a bead times e^-3.5 to e^-2.5, with a loss factor of 0.3 to 0.8 at all frequencies."""
+    """Multiply E of a bead by e^-3.5 to e^-2.5, with a constant loss factor of 0.3 to 0.8."""
     bead, factor, E = softened_bead(article.assembly, rng, (-3.5, -2.5))
     eta = float(rng.uniform(0.3, 0.8))
     truth = {

@@ -1,4 +1,4 @@
-"""A weld or a fastener that the deck has and the structure has not."""
+"""A weld or a fastener of the deck that is missing from the structure."""
 
 from dataclasses import dataclass, replace
 
@@ -12,23 +12,23 @@ from .joints import without_joint
 from .search_context import Candidate, SearchContext
 from .weld_compliance import NEEDS, NONE_LEFT, SOUND, WeldCompliance, drawn, proposed, with_all
 
-GONE = -12.0  # ln of what is left over what carries half of the load: nothing
+GONE = -12.0  # ln of the remaining stiffness over that which carries half of the load: as good as 0
 
 
 @dataclass(frozen=True, eq=False)
 class WeldMissing(WeldCompliance):
-    """The joint times e^-12 s, others of its kind times e^g: nothing tells how much it is gone."""
+    """The joint times e^-12 s, others of its kind times e^g; the rest is too small to estimate."""
 
     name = "weld-missing"
     claim = "a weld or a fastener that the deck has is missing, or holds nothing"
 
     @staticmethod
     def strength(softness: float) -> Parameter:
-        """ln of what is left over what carries half of the load: nothing."""
+        """ln of the remaining stiffness over that which carries half of the load: as good as 0."""
         return Parameter("K", "of the deck's", GONE, 1.0, softness, starts=(GONE,), nominal=SOUND)
 
     def apply(self, assembly: Assembly, x: np.ndarray) -> Assembly:
-        """The joint's elements taken out where it is gone; the others as fitted beside it."""
+        """Remove the elements of a missing joint, and write the others as fitted with it."""
         assert self.joint is not None
         if x[0] > NONE_LEFT:
             return super().apply(assembly, x)
@@ -36,11 +36,11 @@ class WeldMissing(WeldCompliance):
         return without_joint(with_all(assembly, self.joint.kind, np.exp(beside)), self.joint)
 
     def reported(self, x: np.ndarray, sd: np.ndarray) -> tuple[Estimate, ...]:
-        """Nothing is left, or less than would carry a twentieth of the load."""
+        """Zero stiffness, with an upper limit that would carry a twentieth of the load."""
         return (Estimate("K", 0.0, "of the deck's", 0.0, self.left(NONE_LEFT)[0]),)
 
     def becomes(self, x: np.ndarray) -> str:
-        """It is the simplest."""
+        """Return "", because there is no simpler effect."""
         return ""
 
 
@@ -50,7 +50,7 @@ def candidates(context: SearchContext) -> list[Candidate]:
 
 
 def conceal(article: Article, rng: np.random.Generator) -> Article:
-    """A fastener is taken out."""
+    """Remove a fastener."""
     joint, truth = drawn(article, rng)
     made = without_joint(article.assembly, joint)
     return replace(article, assembly=made, truth={**truth, "value": 0.0, "parameters": {"K": 0.0}})
