@@ -1,8 +1,8 @@
 """From an assembly to the matrices of its free degrees of freedom.
 
-Every point has six motions in the basic frame, u = T q with q the free dofs: T turns displacement
-frames, carries rigid elements and constraint equations, and leaves out supports and dofs without
-stiffness. An element matrix A over any points adds Tᵀ A T.
+Every point has six motions in the basic frame, u = T q with q the free dofs. T contains the
+displacement frames, rigid elements and constraint equations. It leaves out supports and dofs
+without stiffness. An element matrix A over any points adds Tᵀ A T.
 """
 
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ PIECE = 1024  # shells whose matrices are in memory at a time
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """The assembled matrices and the way from the free dofs to any point's motion.
+    """The assembled matrices and the transformation from the free dofs to the motion of points.
 
     Attributes
     ----------
@@ -162,13 +162,13 @@ def _each_family(assembly: Assembly, residual_bending: bool) -> Iterator[Matrice
 
 
 def _lossy(eta: np.ndarray, K: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array | None:
-    """Σ η_e K_e of the elements whose material has losses; None where none has."""
+    """Σ η_e K_e of the elements whose material has losses; None if there are no such elements."""
     at = np.flatnonzero(eta)
     return blocks(eta[at, None, None] * K[at], nodes[at], n) if len(at) else None
 
 
 def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:
-    """Shells in pieces; the mass lumped where the assembly says so."""
+    """Matrices of shells, computed in pieces; the mass is lumped unless ``coupled_mass``."""
     geo = shell.geometry(assembly.points, assembly.shells)
     sections = section_arrays(assembly, geo, residual_bending=residual_bending)
     lossy = bool(sections.loss.any())
@@ -182,7 +182,7 @@ def _shells(assembly: Assembly, residual_bending: bool) -> Matrices:
 def _pieces(
     assembly: Assembly, geo: shell.ShellGeometry, sections: SectionArrays, lossy: bool
 ) -> Iterator[tuple[slice, tuple[np.ndarray, ...]]]:
-    """(rows, (M, K[, loss K])) of one piece after another."""
+    """(rows, (M, K[, loss K])) of each piece."""
     for start in range(0, len(geo), PIECE):
         rows = slice(start, start + PIECE)
         part, s, t = geo[rows], sections[rows], assembly.shells.thickness[rows]
@@ -205,9 +205,9 @@ def _transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
 
 
 def supported(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
-    """Motion of all points if a support moved by one (6n, k), and (row, component) of each (k, 2).
+    """Unit motions of all points (6n, k), one for each support, with (row, component) (k, 2).
 
-    What hangs on a support by rigid elements moves with it.
+    Points that a rigid element ties to a support move with it.
     """
     T, dofs = _transformation(assembly)
     held = _held(replace(assembly, scalar_points=None), dofs)
@@ -226,7 +226,7 @@ def frames(assembly: Assembly) -> sp.csr_array:
 
 
 def _held(assembly: Assembly, dofs: np.ndarray) -> np.ndarray:
-    """Supports, and all but the one motion of scalar points."""
+    """Mask of supports, and of all components of scalar points except the first."""
     held = np.zeros((len(assembly.points), 6), bool)
     held[assembly.supports[:, 0], assembly.supports[:, 1] - 1] = True
     if assembly.scalar_points is not None:
@@ -237,11 +237,10 @@ def _held(assembly: Assembly, dofs: np.ndarray) -> np.ndarray:
 def _without_stiffness(
     K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, auto_spc: bool
 ) -> np.ndarray:
-    """Dofs with neither stiffness nor mass, and with ``auto_spc`` those without stiffness.
+    """Mask of dofs without stiffness and mass; with ``auto_spc``, of all dofs without stiffness.
 
-    AUTOSPC looks at the three translations and the three rotations of a point: where their 3 x 3
-    stiffness has a direction softer than ``EMPTY`` times the stiffest, the dof nearest to that
-    direction goes.
+    AUTOSPC tests the three translations and the three rotations of a point. If a direction of their
+    3 x 3 stiffness is softer than ``EMPTY`` times the stiffest, it removes the dof nearest to it.
     """
     stiff = K.diagonal()
     if not auto_spc:
@@ -256,7 +255,7 @@ def _without_stiffness(
 
 
 def _diagonal_blocks(K: sp.csr_array, dofs: np.ndarray, triple: np.ndarray) -> np.ndarray:
-    """Stiffness among the dofs of each triple (k, 3, 3); absent dofs have none."""
+    """Stiffness among the dofs of each triple (k, 3, 3), zero for absent dofs."""
     D = np.zeros((triple[-1] + 1 if len(triple) else 0, 3, 3))
     component = (dofs[:, 1] - 1) % 3
     for shift in range(3):
@@ -268,7 +267,7 @@ def _diagonal_blocks(K: sp.csr_array, dofs: np.ndarray, triple: np.ndarray) -> n
 
 
 def _suspects(D: np.ndarray) -> np.ndarray:
-    """Triples whose determinant is small against the product of their diagonal."""
+    """Triples with a small determinant in comparison with their cubed trace."""
     scale = np.einsum("kii->k", D)
     return np.flatnonzero(np.linalg.det(D) <= 10 * EMPTY * scale**3)
 

@@ -1,9 +1,9 @@
 """Weighted means (RBE3): the reference point moves as the best rigid motion of the others.
 
-x = argmin Σ w_k (u_k - S_k x)² = A⁻¹ Σ S_kᵀ w_k u_k with A = Σ S_kᵀ w_k S_k, where S_k x is what a
-rigid motion x of the reference point does to dof k. Forces at the reference are so spread over the
-others with their moments. Weights of rotations are multiplied by the squared mean distance of the
-points from the reference, as NX and MSC Nastran do it.
+x = argmin Σ w_k (u_k - S_k x)² = A⁻¹ Σ S_kᵀ w_k u_k with A = Σ S_kᵀ w_k S_k. S_k x is the motion of
+dof k in a rigid motion x of the reference point. Forces and moments at the reference are thus
+distributed over the other points. Weights of rotations are multiplied by the squared mean distance
+of the points from the reference, as in NX and MSC Nastran.
 """
 
 from dataclasses import dataclass
@@ -106,12 +106,12 @@ def _lengths(terms: _Terms, arm: np.ndarray, n: int) -> np.ndarray:
 
 
 def _inverse(A: np.ndarray, means: list[Average], axes: np.ndarray) -> np.ndarray:
-    """A⁻¹, or A⁺ where the points leave a motion open that the reference does not ask for.
+    """A⁻¹, or A⁺ if the points do not determine a motion that the reference does not use.
 
     Raises
     ------
     ModelError
-        If they leave one open that it does ask for, as three points in a line do.
+        If the points do not determine a component of the reference (three points in a line).
     """
     inverse = np.linalg.pinv(A, rcond=1e-10, hermitian=True)
     open_ = np.abs(inverse @ A - np.eye(6)).reshape(-1, 2, 3, 6).max(axis=(2, 3)) > 1e-6
@@ -127,7 +127,7 @@ def _inverse(A: np.ndarray, means: list[Average], axes: np.ndarray) -> np.ndarra
 
 
 def _moved(rows: Rows, moved: dict[int, Average]) -> Rows:
-    """The same dependencies solved for other dofs (Nastran's UM set)."""
+    """Solve the dependencies for other dofs (Nastran's UM set)."""
     plain = ~np.isin(rows.owner, list(moved))
     entry = plain[rows.row]
     number = np.cumsum(plain) - 1
@@ -144,7 +144,7 @@ def _moved(rows: Rows, moved: dict[int, Average]) -> Rows:
 
 
 def _exchanged(rows: Rows, owner: int, mean: Average) -> Rows:
-    """[1, -G] u = 0 of one RBE3 solved for its UM dofs."""
+    """Solve [1, -G] u = 0 of one RBE3 for its UM dofs."""
     mine = np.flatnonzero(rows.owner == owner)
     entry = np.isin(rows.row, mine)
     all_dofs, at = np.unique(np.concatenate([rows.dof[mine], rows.on[entry]]), return_inverse=True)
@@ -168,8 +168,8 @@ def _exchanged(rows: Rows, owner: int, mean: Average) -> Rows:
 def average_weights(r: np.ndarray, R: float) -> tuple[np.ndarray, np.ndarray]:
     """w(r/R) = (1 - r²/R²)² inside R, 0 outside, and dw/dR [1/m]: smooth in R.
 
-    With it the radius of a spider is a continuous parameter: weights fade to zero, with zero
-    slope, where points enter or leave.
+    With these weights the radius of a spider is a continuous parameter: weights and their slopes
+    are zero where points enter or leave.
 
     >>> w, dw = average_weights(np.array([0.0, 1.0, 3.0]), 2.0)
     >>> w.tolist(), dw.tolist()
@@ -186,7 +186,7 @@ def average_derivative(
 
     Parameters
     ----------
-    S : (t, 6)       what a rigid motion of the reference does to each dof (``lever``)
+    S : (t, 6)       motion of each dof in a rigid motion of the reference (``lever``)
     w, dw : (t,)     weights and their derivative by a parameter, such as a radius
     """
     inverse = np.linalg.inv(S.T @ (w[:, None] * S))

@@ -1,10 +1,10 @@
-"""A structure whose supports are all moved together: the motion relative to them and its load.
+"""Base excitation: all supports move together; the relative motion and its load.
 
-With u = T q + R b ξ (every point follows the base rigidly and moves by q beside it) the free dofs
-obey M q'' + V q' + K q = -Tᵀ M_full R b ξ'', and an output that the base carries by d answers
-X/ξ = d - s² r (K + s V + s² M)⁻¹ Tᵀ M_full R b: exact, no large mass (Craig and Kurdila 2006,
-Fundamentals of Structural Dynamics, section 9.5).  What holds the structure to ground holds it to
-the base.
+With u = T q + R b ξ every point follows the base rigidly and moves by q relative to it. The free
+dofs obey M q'' + V q' + K q = -Tᵀ M_full R b ξ''. An output with rigid motion d has
+X/ξ = d - s² r (K + s V + s² M)⁻¹ Tᵀ M_full R b. This is exact and needs no large mass. Source:
+Craig and Kurdila (2006), Fundamentals of Structural Dynamics, section 9.5. Connections to ground
+become connections to the base.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class BaseMotion:
     ----------
     whole : (6 n_points, k)    R b, rigid motion of every point in the basic frame [-]
     free : (n_free, k)         the same over the free dofs
-    force : (n_free, k)        Tᵀ M_full R b [kg]: less this is the load of a unit acceleration
+    force : (n_free, k)        Tᵀ M_full R b [kg]; a unit acceleration has the load minus this
     """
 
     whole: np.ndarray
@@ -33,18 +33,18 @@ class BaseMotion:
     force: np.ndarray
 
     def over(self, built: Structure) -> "BaseMotion":
-        """The same of the structure with more dofs, whose motion is one beside the base as well."""
+        """Extend to a structure with additional dofs, whose motion is relative to the base too."""
         more = built.T.shape[1] - len(self.free)
         force = built.T.T @ (over_all_motions(built.assembly)[0] @ self.whole)
         return BaseMotion(self.whole, np.pad(self.free, ((0, more), (0, 0))), np.asarray(force))
 
     def carried(self, rows: sp.csr_array) -> np.ndarray:
-        """Motion of rows (m, n) that the base carries along (m, k)."""
+        """Motion (m, k) of rows (m, n) in the rigid motion of the base."""
         return np.asarray(rows @ self.free[: rows.shape[1]])
 
 
 def base_motion(built: Structure, directions: np.ndarray) -> BaseMotion:
-    """The supports moved along each of these unit vectors (k, 3) of the basic frame."""
+    """Motion of the supports along each of these unit vectors (k, 3) of the basic frame."""
     b, assembly = np.asarray(directions, float).T, built.assembly
     whole = rigid_motions(assembly)[:, :3] @ b
     at, component = assembly.rows(built.system.dofs[:, 0]), built.system.dofs[:, 1] - 1

@@ -1,7 +1,7 @@
 """Two-node beams, bars and rods (SI): axial, torsion, bending in two planes with shear.
 
-The stiffness is a sum of squares over the six ways the element can deform (natural modes): the
-formula of a beam is then three lines, whichever of its terms vanish.
+The stiffness is a sum of squares over the six deformations of the element (natural modes). One
+short formula then covers all kinds of beams, whichever terms vanish.
 
 Sources: Argyris, Recent advances in matrix methods (1964), natural modes; Przemieniecki, Theory of
 Matrix Structural Analysis (1968), ch. 5 and 11; masses as in the NASTRAN Theoretical Manual, 5.2.
@@ -48,9 +48,9 @@ def _sections(assembly: Assembly) -> list[BeamSection]:
 
 
 def frames(ends: np.ndarray, up: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors R (m, 3, 3) as rows and lengths L (m,) [m]: x along, x-y holds ``up``.
+    """Unit vectors R (m, 3, 3) as rows and lengths L (m,) [m]: x along, ``up`` in the x-y plane.
 
-    Where ``up`` is zero (rods) any normal serves.
+    For a zero ``up`` (rods) any normal is used.
     """
     x = ends[:, 1] - ends[:, 0]
     L = np.linalg.norm(x, axis=1)
@@ -90,8 +90,8 @@ def stiffness(
 ) -> np.ndarray:
     """K_e = e^T EA/L e + t^T GJ/L t + κᵀ EI/L κ + wᵀ S w, S = 12/L³ EI (1 + 12/L² c EI)⁻¹.
 
-    The squares are elongation e (of the neutral axis), twist t, the two end rotation differences
-    κ and the two deflections w of one end off the chord L (θ_a + θ_b) / 2.
+    The squares are elongation e (of the neutral axis), twist t, the two end rotation differences κ,
+    and the two deflections w. The latter are relative to the chord L (θ_a + θ_b) / 2.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def _mass(sections: list[BeamSection], L: np.ndarray, *, coupled: bool) -> np.nd
 def _lumped(
     m: np.ndarray, at: np.ndarray, polar: np.ndarray, _L: np.ndarray, _bends: np.ndarray
 ) -> np.ndarray:
-    """Half the mass and half the polar inertia at either end, off the line by ``at`` (y, z)."""
+    """Half the mass and half the polar inertia at either end, at the offset ``at`` (y, z)."""
     end = _offset_mass(m / 2, at)
     end[:, 3, 3] += polar / 2
     M = np.zeros((len(m), 12, 12))
@@ -208,7 +208,7 @@ def _halves() -> np.ndarray:
 
 
 def _moved(M: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Mᵀ of a line at (y, z) from the dofs' line: Tᵀ M T with T = [1, -r×] at both ends."""
+    """Tᵀ M T for a line at the offset (y, z), with T = [1, -r×] at both ends."""
     T = np.tile(np.eye(12), (len(M), 1, 1))
     y, z = at.T
     for k in (0, 6):

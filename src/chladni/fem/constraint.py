@@ -9,12 +9,12 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Dependent dofs and what they depend on; dofs are 6 * row of points + component - 1.
+    """Dependent dofs and their independent ones; dofs are 6 * row of points + component - 1.
 
     Attributes
     ----------
     dof, owner : (m,) int     dependent dof and the position of its element in ``Assembly.rigid``
-    row, on : (e,) int        entries: which of the m rows, and the dof it leans on
+    row, on : (e,) int        entries: index of the m rows, and the dof on which it depends
     factor : (e,)             [-], [m] or [1/m]
     """
 
@@ -26,13 +26,13 @@ class Rows:
 
     @classmethod
     def none(cls) -> Self:
-        """No dependency at all."""
+        """An empty set of dependencies."""
         nothing = np.zeros(0, dtype=np.int64)
         return cls(nothing, nothing, nothing, nothing, np.zeros(0))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """All rows of several sets."""
+        """Join the rows of several sets."""
         first = np.cumsum([0] + [len(p.dof) for p in parts])
         return cls(
             np.concatenate([p.dof for p in parts]),

@@ -1,4 +1,4 @@
-"""What a deck asks for in SOL 108 and 111: its structure under its own harmonic loads."""
+"""Frequency responses of a deck in SOL 108 and 111, under its own harmonic loads."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,8 +23,8 @@ def response(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacements u(f) of a subcase under its DLOAD: frequencies (n_f,) and (n_f, n_out).
 
-    SOL 108 solves line by line; SOL 111 sums the modes its METHOD asks for, with SDAMP's damping,
-    with the residual vectors of the loads where RESVEC asks for them. Enforced motion has none.
+    SOL 108 solves line by line. SOL 111 sums the modes of METHOD, with the damping of SDAMP. With
+    RESVEC it adds the residual vectors of the loads; enforced motion has no residual vectors.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def _frequencies(analysis: Analysis, case: Subcase, modal: ModalModel | None) ->
 
 
 def _modes(built: Structure, analysis: Analysis, case: Subcase) -> ModalModel:
-    """The modes EIGRL or EIGR keeps."""
+    """The modes requested by EIGRL or EIGR."""
     low, high, count = analysis.eigen.get(case.method, (np.nan, np.nan, 0))
     band = high if np.isfinite(high) else None
     if band is None and not count:
@@ -78,7 +78,7 @@ def _places(built: Structure) -> np.ndarray:
 def _completed(
     built: Structure, analysis: Analysis, case: Subcase, modal: ModalModel, patterns: np.ndarray
 ) -> ModalModel:
-    """The modes with residual vectors, all damped by TABDMP1 at their frequencies."""
+    """Add residual vectors to the modes, and the damping of TABDMP1 at their frequencies."""
     if case.residual and patterns.shape[1] and len(modal):
         modal = with_residual_vectors(built.system, modal, patterns, points=_places(built))
     if case.damping in analysis.damping:
@@ -88,7 +88,7 @@ def _completed(
 
 
 def _patterns(built: Structure, loads: tuple[Excitation, ...], f: np.ndarray) -> np.ndarray:
-    """Real load patterns Tᵀ p (n_free, k) that the forces among the loads are made of."""
+    """Real load patterns Tᵀ p (n_free, k) of all forces among the loads."""
     out = [np.zeros((len(built.system.dofs), 0))]
     for load in loads:
         if load.kind == "force":
@@ -101,7 +101,7 @@ def _patterns(built: Structure, loads: tuple[Excitation, ...], f: np.ndarray) ->
 
 
 def _spread(built: Structure, load: Excitation, pattern: np.ndarray) -> np.ndarray:
-    """Forces on the load's dofs (k, r) as forces on all (6n, r)."""
+    """Expand forces on the load's dofs (k, r) to all motions (6n, r)."""
     whole = np.zeros((built.T.shape[0], pattern.shape[1]), dtype=complex)
     np.add.at(whole, 6 * load.rows + load.components - 1, pattern)
     return whole
@@ -110,7 +110,7 @@ def _spread(built: Structure, load: Excitation, pattern: np.ndarray) -> np.ndarr
 def _forced(
     built: Structure, load: Excitation, f: np.ndarray, outputs: np.ndarray, modal: ModalModel | None
 ) -> np.ndarray:
-    """Σ_k H_k(f) c_k(f): the load as few fixed patterns times functions of frequency."""
+    """Σ_k H_k(f) c_k(f), with the load as a few fixed patterns times functions of frequency."""
     amplitude, pattern = _factored(load.at(f))
     whole, pick = _spread(built, load, pattern), built.rows(outputs)
     if modal is None:
@@ -123,7 +123,7 @@ def _forced(
 
 
 def _factored(P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """P (n_f, k) = amplitude (n_f, r) patternᵀ with the least r, by singular values."""
+    """P (n_f, k) = amplitude (n_f, r) patternᵀ with the smallest r, by singular values."""
     U, s, Vh = np.linalg.svd(P, full_matrices=False)
     r = max(1, int((s > _RANK * s[0]).sum())) if len(s) else 0
     return U[:, :r] * s[:r], Vh[:r].T

@@ -1,9 +1,10 @@
-"""Exact derivatives of M, V and K by what a part, a joint or a mass is made of.
+"""Exact derivatives of M, V and K with respect to the properties of a part, a joint or a mass.
 
 Every function gives Tᵀ dA T over the free dofs, from the formulas of the elements, never by
-differences of matrices.  A spring, a damper and a mass are linear in their value; a solid is linear
-in E and ρ; a shell's t enters as A t + B t³ and, with residual bending, through S; the weights of a
-mean (RBE3) that fade smoothly with a radius R change the transformation, dA = dTᵀ A T + Tᵀ A dT.
+differences of matrices. A spring, a damper and a mass are linear in their value; a solid is linear
+in E and ρ. The thickness of a shell enters as A t + B t³ and, with residual bending, through S. The
+weights of an RBE3 may be smooth functions of a radius R. They change the transformation,
+dA = dTᵀ A T + Tᵀ A dT.
 """
 
 from collections.abc import Sequence
@@ -37,7 +38,7 @@ SOLID = ("E", "nu", "rho")
 
 @dataclass(frozen=True, eq=False)
 class Slope:
-    """∂M/∂p, ∂V/∂p, ∂K/∂p over the free dofs (n, n); what does not change is empty."""
+    """∂M/∂p, ∂V/∂p, ∂K/∂p over the free dofs (n, n); an unchanged matrix is empty."""
 
     M: sp.csr_array
     V: sp.csr_array
@@ -45,7 +46,7 @@ class Slope:
 
 
 def by_part(structure: Structure, part: int, name: str) -> Slope:
-    """By t, E, nu, rho (or E1, E2, G12, nu12) of a part of shells or solids, others kept.
+    """Slope by t, E, nu, rho (or E1, E2, G12, nu12) of a part of shells or solids, others fixed.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def _shell(structure: Structure, a: Assembly, section: ShellSection, name: str) 
 def _shell_modulus(
     geo: shell.ShellGeometry, a: Assembly, section: ShellSection, name: str
 ) -> np.ndarray:
-    """Membrane, bending, coupling, residual bending, transverse shear and drilling."""
+    """Slope of K through membrane, bending, coupling, transverse shear and drilling stiffness."""
     s, t = section_arrays(a, geo), a.shells.thickness
     slopes = {
         field: modulus_derivative(m, name)
@@ -103,7 +104,7 @@ def _shell_modulus(
 
 
 def _shear_slope(material: Material | None, name: str) -> float:
-    """∂ln G/∂p of the transverse moduli, which an orthotropic sheet has of its own."""
+    """∂ln G/∂p of the transverse moduli, which are independent in an orthotropic sheet."""
     if not isinstance(material, Isotropic) or material.G is not None:
         return 0.0
     return {"E": 1 / material.E, "nu": -1 / (1 + material.nu)}.get(name, 0.0)
@@ -131,10 +132,11 @@ def _solid(structure: Structure, a: Assembly, section: SolidSection, name: str) 
 
 
 def of_part(structure: Structure, part: int, name: str) -> Slope:
-    """What a part of solids or beams has in K ("E": all moduli together), M ("rho"), both ("wall").
+    """Contribution of a part of solids or beams to K ("E": all moduli), M ("rho"), both ("wall").
 
-    All are linear in it: K (1 + c) is the part with every modulus times 1 + c, M likewise; what is
-    non-structural stays out. With the wall of a tube go its area and all its moments.
+    The matrices are linear in the value: K (1 + c) belongs to the part with every modulus times
+    1 + c, M likewise. Non-structural mass is excluded. The area and all moments of a tube are
+    proportional to its wall.
     """
     a = only(structure.assembly, part)
     section = a.parts[part].section
@@ -149,7 +151,7 @@ def of_part(structure: Structure, part: int, name: str) -> Slope:
 
 
 def of_lumps(structure: Structure, family: str, rows: Sequence[int]) -> Slope:
-    """What some members of "springs" or "bushes" have in K, or of "masses" in M."""
+    """Contribution of some "springs" or "bushes" to K, or of some "masses" to M."""
     old = getattr(structure.assembly, family)
     some = picked(old, np.asarray(rows, dtype=int))
     K, _, M, _ = spring.matrices(_bare(structure.assembly, **{family: some}))
@@ -171,7 +173,7 @@ def by_damper(structure: Structure, row: int) -> Slope:
 
 
 def by_bush(structure: Structure, row: int, direction: int, name: str = "K") -> Slope:
-    """By stiffness K or damping B of one bush along one of its directions 1 to 6."""
+    """Slope by stiffness K or damping B of one bush in one of its directions 1 to 6."""
     old = structure.assembly.bushes
     if name not in ("K", "B") or not 1 <= direction <= 6:
         raise ModelError(f"a bush has K and B along 1 to 6, no {name!r} along {direction}")
@@ -202,7 +204,7 @@ def _unit(structure: Structure, family: str, row: int) -> Scalars:
 
 
 def _bare(assembly: Assembly, **lumps: object) -> Assembly:
-    """The points with these lumps alone."""
+    """The points with these lumped elements only."""
     return replace(bare(assembly), **lumps)  # type: ignore[arg-type]
 
 
@@ -221,7 +223,7 @@ def _carried(structure: Structure, A: np.ndarray, nodes: np.ndarray) -> sp.csr_a
 
 
 def with_radius(assembly: Assembly, position: int, R: float) -> Assembly:
-    """The assembly with the weights w(r/R) = (1 - r²/R²)² in one RBE3, r from its reference."""
+    """Set the weights w(r/R) = (1 - r²/R²)² in one RBE3, r from its reference."""
     mean = _mean(assembly, position)
     w, _ = average_weights(_distance(assembly, mean), R)
     if np.count_nonzero(w) < 3:
@@ -233,10 +235,10 @@ def with_radius(assembly: Assembly, position: int, R: float) -> Assembly:
 
 
 def by_radius(structure: Structure, mean: Average, R: float) -> Slope:
-    """By the radius of one RBE3 with smooth weights; ``mean`` names its points before any fades.
+    """Slope by the radius of one RBE3 with smooth weights; ``mean`` lists all its points.
 
-    Its reference must lead on to nothing else, its points must be free and their displacement
-    frames basic, its terms translations 123 and its components all six.
+    No other rigid element may share its points, and the points must be free with basic displacement
+    frames. Its terms must be translations 123 and its components all six.
 
     Raises
     ------
@@ -276,7 +278,7 @@ def _distance(assembly: Assembly, mean: Average) -> np.ndarray:
 
 
 def _plain(assembly: Assembly, mean: Average) -> None:
-    """Raise where the formula of :func:`by_radius` does not hold."""
+    """Raise if the formula of :func:`by_radius` does not hold."""
     translations = all(tuple(sorted(c)) == (1, 2, 3) for _, c, _ in mean.terms)
     others = [e for e in assembly.rigid if e.id != mean.id]
     mine = {mean.reference, *(n for n, _, _ in mean.terms)}

@@ -1,4 +1,4 @@
-"""Where a structure keeps its mass and, in a motion, its strain and kinetic energy."""
+"""Mass properties of a structure, and the strain and kinetic energy of its parts in a motion."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from .shell_section import section_arrays
 def rigid_motions(assembly: Assembly) -> np.ndarray:
     """Six rigid motions of all points about the origin, u = d + θ x r: (6 n, 6), basic frame.
 
-    Scalar points have no place and do not take part.
+    Scalar points have no place; their rows are zero.
     """
     n, r = len(assembly.points), assembly.points
     R = np.zeros((n, 6, 6))
@@ -48,7 +48,7 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    (parts, r); what is missing from 1 is in springs and bushes; nan where φᵀ K φ is nothing
+    (parts, r); the rest to 1 is in springs and bushes; nan where φᵀ K φ is zero
     """
     return _shares(structure, phi, 2, structure.system.K)
 
@@ -56,7 +56,7 @@ def part_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
 def part_kinetic_energies(structure: Structure, phi: np.ndarray) -> np.ndarray:
     """Share φᵀ M_p φ / φᵀ M φ of each part in the kinetic energy (parts, r).
 
-    What is missing from 1 is in concentrated masses.
+    The rest to 1 is in concentrated masses.
     """
     return _shares(structure, phi, 0, structure.system.M)
 
@@ -73,7 +73,7 @@ def _shares(structure: Structure, phi: np.ndarray, which: int, whole: sp.csr_arr
 
 
 def bare(assembly: Assembly) -> Assembly:
-    """The points alone: nothing that is stiff or heavy, no ties."""
+    """The points only, without elements, masses and constraints."""
     none = Scalars()
     return replace(
         assembly, shells=Shells(), beams=Beams(), solids=(), springs=none, dampers=none,
@@ -82,7 +82,7 @@ def bare(assembly: Assembly) -> Assembly:
 
 
 def only(assembly: Assembly, part: int) -> Assembly:
-    """The elements of one part alone, over the same points, without ties."""
+    """The elements of one part only, over the same points, without constraints."""
     beams, shells = assembly.beams, assembly.shells
     return replace(
         bare(assembly),

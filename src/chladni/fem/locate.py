@@ -1,4 +1,4 @@
-"""Places that are no grids: the nearest shell and the weights of its corners."""
+"""Places away from grids: the nearest shell and the weights of its corners."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,7 @@ def rows_at(
 ) -> sp.csr_array:
     """Translation of points of shells along directions (k, 3): rows over the free dofs (k, n).
 
-    Their rotation about the directions where ``turning``.
+    With ``turning``, rotation about the directions.
     """
     k = len(directions)
     columns = 6 * feet.nodes[:, :, None] + (3 if turning else 0) + np.arange(3)
@@ -49,7 +49,7 @@ Share = tuple[tuple[int, float], ...]  # (grid id, weight) of one place, the wei
 
 
 def shares_of(assembly: Assembly, grids: np.ndarray, points: np.ndarray) -> list[Share]:
-    """What each place hangs on: its grid, or the corners of the nearest shell by their weights.
+    """Grids and weights of each place: its grid, or the corners of the nearest shell.
 
     Parameters
     ----------

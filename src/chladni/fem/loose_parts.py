@@ -1,4 +1,4 @@
-"""Motions without strain that are none of the structure as a whole: something hangs loose."""
+"""Mechanisms: strain-free motions other than rigid motions of the whole structure."""
 
 import numpy as np
 from scipy.linalg import orth
@@ -7,23 +7,23 @@ from .assemble import Structure
 from .energy import rigid_motions
 
 _BESIDE = 0.05  # sine of the angle to the rigid motions of the whole; rounding is far below
-_FOLLOWS = 1e-3  # weight of a scalar point: what it is tied to is moved as a whole with it
+_FOLLOWS = 1e-3  # weight of a scalar point, so that the grid tied to it is reported instead
 
 
 def loose_grids(structure: Structure, phi: np.ndarray) -> tuple[int, ...]:
     """The grid that moves most in each mechanism, P = 1 - R R⁺ of modes without strain.
 
-    Sines of the angles between the modes and the six rigid motions R are singular values of
-    P orth(Tφ) (Björck and Golub 1973); each that is not zero is a mechanism. Turns count by half
-    the structure's size, so that a bar which merely spins is one, too.
+    The singular values of P orth(Tφ) are the sines of the angles between the modes and the six
+    rigid motions R (Björck and Golub 1973). Each nonzero one is a mechanism. Rotations are scaled
+    by half the structure's size, so that a bar spinning about its axis is a mechanism too.
 
     Parameters
     ----------
-    phi : (n_free, r)   modes that have no frequency
+    phi : (n_free, r)   modes of zero frequency
 
     Returns
     -------
-    ids of grids, one for each mechanism; none where the whole structure moves as one
+    ids of grids, one for each mechanism; () if the whole structure moves as one
     """
     made = structure.assembly
     size = float(np.linalg.norm(np.ptp(made.points, axis=0))) or 1.0

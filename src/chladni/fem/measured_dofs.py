@@ -1,4 +1,4 @@
-"""Where sensors and shakers are on a structure: one type from the case to the picture."""
+"""Places and directions of sensors and shakers on a structure."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ class MeasuredDofs:
     Attributes
     ----------
     labels : (k,) text
-    grids : (k,) int       id, 0 where the place is no grid
+    grids : (k,) int       id, 0 for a place away from grids
     points : (k, 3)        [m], basic frame; nan for the motion of the base
     directions : (k, 3)    unit vectors, basic frame
     sd : (k,)              uncertainty of the place [m]
@@ -42,29 +42,29 @@ class MeasuredDofs:
 
     @property
     def device(self) -> np.ndarray:
-        """Of each channel the first one at its place (k,): the channels of one sensor."""
+        """Index (k,) of the first channel at the place of each channel: one value per sensor."""
         apart = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
         here = (apart < _ONE_DEVICE) | np.eye(len(apart), dtype=bool)
         return np.array([row.argmax() for row in here], dtype=np.int64)
 
     @property
     def channels(self) -> np.ndarray:
-        """How many channels the sensor of each has (k,)."""
+        """Number of channels of each channel's sensor (k,)."""
         return np.asarray(np.bincount(self.device)[self.device])
 
     @property
     def nodes(self) -> dict[int, np.ndarray]:
-        """Places (3,) [m] by the node of the label; a label that begins with a name has none."""
+        """Places (3,) [m] by the node number of the label; labels with a name are left out."""
         named = (
             (label.partition(":")[0], x) for label, x in zip(self.labels, self.points, strict=True)
         )
         return {int(node): x for node, x in named if node.isdecimal()}
 
     def rows(self, built: Structure, turning: bool = False) -> sp.csr_array:
-        """Motion of each dof over the free dofs of the structure (k, n); the base has none (zero).
+        """Motion of each dof over the free dofs of the structure (k, n); zero for the base.
 
-        A place that is no grid moves with the nearest point of the shells. Where ``turning``, the
-        rotation about the direction instead.
+        A place away from grids moves with the nearest point of the shells. With ``turning``, rows
+        of the rotation about the direction.
         """
         found = sp.lil_array((len(self.labels), built.T.shape[1]))
         real = np.flatnonzero(~self.base)
@@ -75,32 +75,32 @@ class MeasuredDofs:
         return sp.csr_array(found)
 
     def across(self) -> tuple["MeasuredDofs", "MeasuredDofs"]:
-        """The same places along two directions u, v square to their own, u x v = n."""
+        """Copies with the two directions u, v normal to n, u x v = n."""
         u, v = tangents(self.directions)
         return replace(self, directions=u), replace(self, directions=v)
 
     def loads(self, built: Structure) -> sp.csr_array:
-        """What each input does to the free dofs, all forces or all motions of the base (k, n).
+        """Load of each input on the free dofs (k, n), for forces or for motions of the base.
 
-        A unit force is its row; a unit acceleration of the base is less the inertia it carries.
+        A unit force is its row; a unit acceleration of the base is minus the inertia load.
         """
         if not self.base.any():
             return self.rows(built)
         return sp.csr_array(-base_motion(built, self.directions).force.T)
 
     def carried_by(self, inputs: "MeasuredDofs") -> np.ndarray:
-        """Motion of each dof for a unit motion of the base, nothing deforming (k, n_in)."""
+        """Motion of each dof for a unit rigid motion of the base (k, n_in)."""
         return np.where(inputs.base, self.directions @ inputs.directions.T, 0.0)
 
     def shares(self, assembly: Assembly) -> tuple[Share, ...]:
-        """Grids each place hangs on with their weights; the motion of the base has none."""
+        """Grids and weights of each place; the motion of the base is left out."""
         real = np.flatnonzero(~self.base)
         return tuple(shares_of(assembly, self.grids[real], self.points[real]))
 
     def around(self, built: Structure) -> sp.csr_array:
-        """Rows at each place, then at four more round each that is uncertain (k + 4 m, n).
+        """Rows at each place, then at four points round each uncertain place (k + 4 m, n).
 
-        They lie √2 standard deviations away in the sheet, so that the mean square of the four along
+        These points lie √2 standard deviations away in the sheet, so that their mean square along
         either axis is sd².
         """
         rows = [self.rows(built)]

@@ -1,14 +1,14 @@
-"""What a membrane force in sheets adds to their stiffness: K_g = ∫ ∂u/∂a · N_ab ∂u/∂b dA.
+"""Geometric stiffness of a membrane force in sheets, K_g = ∫ ∂u/∂a · N_ab ∂u/∂b dA.
 
-The same force pulls every component of u back, so that K_g = L ⊗ 1 with L a symmetric matrix of one
-row a point whose rows sum to zero: translations cost exactly nothing, and L is a net of springs
--L_ij between points (Zienkiewicz and Taylor 2000, The Finite Element Method 2, 4.6 and 11.3; the
-terms of motions in the sheet are small beside its own stiffness there).
+The force acts on every component of u in the same way, so that K_g = L ⊗ 1. L is symmetric, with
+one row for each point, and its rows sum to zero: translations cost no energy. L is a net of springs
+-L_ij between points (Zienkiewicz and Taylor 2000, The Finite Element Method 2, 4.6 and 11.3). The
+terms of motions in the plane are small in comparison with the plane stiffness of the sheet.
 
-Where the force does not vanish at the rim somebody holds it there. Were these pulls fixed in space,
-to turn the sheet as a whole would cost; they are taken to turn with some grids at the rim instead,
-as those of a frame do round a sheet: with θ the mean turn of these, the springs of the net feel
-u_i - u_j - θ × (x_i - x_j). What is held at its rim has no such θ.
+A force that does not vanish at the rim is held there. Forces fixed in space would resist a rigid
+rotation of the sheet. Instead they rotate with some grids at the rim, as in a frame round a sheet.
+With θ the mean rotation of these grids, the springs of the net take u_i - u_j - θ × (x_i - x_j). A
+sheet with supports at its rim has no such θ.
 """
 
 from collections.abc import Iterator
@@ -31,13 +31,13 @@ NOTHING = 1e-12  # of the largest entry: rounding
 
 @dataclass(frozen=True, eq=False)
 class MembraneForce:
-    """A force field over some shells, by what it does; all per unit of force.
+    """Operators of a force field over some shells, all per unit of force.
 
     Attributes
     ----------
     net : (n, n) csr        L over the points of the assembly [-]
-    moments : (6 n, 3) csr  K_g R, what turns of the whole do to motions of points [m]
-    turning : (3, 3)        C = Rᵀ K_g R, what they cost [m²]
+    moments : (6 n, 3) csr  K_g R, loads on the points in rigid rotations R of the whole [m]
+    turning : (3, 3)        C = Rᵀ K_g R, twice the energy of these rotations [m²]
     """
 
     net: sp.csr_array
@@ -46,7 +46,7 @@ class MembraneForce:
 
     @property
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (k, 2) that are tied, and -L_ij of each pair (k,)."""
+        """Pairs of points (k, 2), and the stiffness -L_ij of each pair (k,)."""
         upper = sp.coo_array(sp.triu(self.net, 1))
         return np.column_stack([upper.row, upper.col]), -upper.data
 
@@ -57,7 +57,7 @@ def membrane_force(assembly: Assembly, shells: np.ndarray, tensor: np.ndarray) -
     Parameters
     ----------
     shells : (k,) int      rows of ``assembly.shells``
-    tensor : (3, 3)        F in the basic frame: e eᵀ is a unit force along e, 1 one all round
+    tensor : (3, 3)        F in the basic frame: e eᵀ is a unit force along e, 1 a biaxial one
     """
     n = len(assembly.points)
     entries = zip(*_entries(assembly, shells, tensor), strict=True)
@@ -93,7 +93,7 @@ def _entries(
 
 
 def with_mean(assembly: Assembly, rows: np.ndarray) -> tuple[Assembly, int]:
-    """The assembly with a point that moves and turns as the mean of others, and its row."""
+    """Add a point that translates and rotates as the mean of others; return also its row."""
     grown, at = with_points(assembly, assembly.points[rows].mean(axis=0)[None])
     terms = tuple((int(r), (1, 2, 3), 1.0) for r in rows)
     mean = Average(next_id(assembly), int(at[0]), (1, 2, 3, 4, 5, 6), terms)
@@ -101,9 +101,9 @@ def with_mean(assembly: Assembly, rows: np.ndarray) -> tuple[Assembly, int]:
 
 
 def geometric_stiffness(built: Structure, force: MembraneForce, rim: np.ndarray) -> sp.csr_array:
-    """(1 - R B)ᵀ K_g (1 - R B) over the free motions, θ = B u the mean turn of the points ``rim``.
+    """(1 - R B)ᵀ K_g (1 - R B) over the free dofs, θ = B u the mean rotation of points ``rim``.
 
-    No rigid motion costs anything, and what pulls everywhere has no negative stiffness.
+    Rigid motions cost no energy, and a force in tension everywhere is positive semidefinite.
     """
     bare = replace(built.assembly, axes=None, rigid=())
     grown, at = with_mean(bare, rim)

@@ -1,4 +1,4 @@
-"""A structure and its normal modes, solved once and shared by all who ask."""
+"""A structure and its normal modes, solved once and shared by all users."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ from ..model.assembly import Assembly
 from ..sparse.freed_memory import give_back_freed_memory
 from .assemble import Structure, structure
 
-LARGE = 100_000  # dofs from which the assembly has freed more than it takes to give that back
-_ROUNDING = 1e-9  # a band may be asked for again as another product of the same numbers
+LARGE = 100_000  # dofs from which it saves memory to return what the assembly has freed
+_ROUNDING = 1e-9  # tolerance, because callers compute the same band by different products
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Modelled:
 
     @property
     def assembly(self) -> Assembly:
-        """What was modelled."""
+        """The assembly of the structure."""
         return self.structure.assembly
 
     def up_to(self, frequency: float) -> ModalModel:

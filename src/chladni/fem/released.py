@@ -1,9 +1,9 @@
-"""A structure whose supports can move: rigid motions of its clamps as degrees of freedom beside.
+"""A structure with movable supports: rigid motions of its clamps are additional dofs.
 
-u = T q + N g: g (6 a clamp) translates a clamp and turns it about its centre, N is what the points
-it holds do then. Elements' A become [T N]ᵀ A [T N], so that the response of the structure to a
-motion of a clamp, all else held, is -K_qq⁻¹ K_qg (constraint modes; Craig and Bampton 1968, AIAA
-Journal 6, 1313-1319).
+u = T q + N g: g (6 per clamp) translates a clamp and rotates it about its centre. N is the motion
+of the points that it holds. A matrix A of elements becomes [T N]ᵀ A [T N]. The static
+response of the structure to a motion of a clamp is then -K_qq⁻¹ K_qg (constraint modes; Craig and
+Bampton 1968, AIAA Journal 6, 1313-1319).
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from .sparse_assembly import congruence
 
 @dataclass(frozen=True, eq=False)
 class Clamp:
-    """Supports of points that elements join, taken for one rigid thing.
+    """Supports of points that elements connect, treated as one rigid body.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class Clamp:
 def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
     """The clamps of a structure, in the order of their first grids.
 
-    A point belongs to one where a translation is held and elements or rigid bodies end there. What
-    is held at every point, as the rotation about z of a flat model, clamps nothing.
+    A point belongs to a clamp if a translation is held and elements or rigid bodies end there. A
+    component that is held at every point, as the rotation about z of a flat model, is not a clamp.
     """
     n = len(assembly.points)
     touching = _elements(assembly)
@@ -61,7 +61,7 @@ def clamps(assembly: Assembly) -> tuple[Clamp, ...]:
 
 
 def _elements(assembly: Assembly) -> sp.csr_array:
-    """Which points each element, or rigid body, joins (elements, points)."""
+    """Incidence of points on each element or rigid body (elements, points)."""
     tables = [assembly.shells.nodes, assembly.beams.nodes, *(s.nodes for s in assembly.solids)]
     each = [nodes for table in tables for nodes in table.tolist()]
     for body in assembly.rigid:
@@ -77,7 +77,7 @@ def _elements(assembly: Assembly) -> sp.csr_array:
 
 
 def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
-    """N (6 n_points, 6 clamps): all points when a clamp translates, or turns about its centre."""
+    """N (6 n_points, 6 clamps): motion of all points when a clamp translates or rotates."""
     T, dofs = supported(assembly)
     at, component = dofs[:, 0], dofs[:, 1] - 1
     axes = np.eye(3)[component % 3]
@@ -98,13 +98,13 @@ def motions_of(assembly: Assembly, held_by: tuple[Clamp, ...]) -> sp.csr_array:
 def released(
     built: Structure, held_by: tuple[Clamp, ...], hold: np.ndarray | float = 0.0
 ) -> Structure:
-    """The structure with six degrees of freedom more for each of its clamps.
+    """Add six degrees of freedom for each clamp of the structure.
 
-    They stand behind those it has, under the first grid of the clamp.
+    They follow the existing ones, with the label of the first grid of the clamp.
 
     Parameters
     ----------
-    hold : (6 clamps,)    springs to ground they stand on [N/m, N m/rad]
+    hold : (6 clamps,)    springs to ground at these dofs [N/m, N m/rad]
     """
     T = sp.csr_array(sp.hstack([built.T, motions_of(built.assembly, held_by)]))
     M, V, K, loss = over_all_motions(built.assembly)

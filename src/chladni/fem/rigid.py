@@ -1,7 +1,7 @@
 """Constraints turned into one transformation u = T q: rigid bodies, weighted means, equations.
 
-Every constraint says that some dofs are linear in others, u_m = G u. Dependents that lead on to
-other dependents are followed to the end, so that q holds independent dofs alone.
+Every constraint makes some dofs linear in others, u_m = G u. Chains of dependent dofs are followed
+to the end, so that q contains independent dofs only.
 
 Source: MSC Nastran Linear Static Analysis User's Guide, R-type elements and multipoint constraints.
 """
@@ -30,13 +30,13 @@ def transformation(assembly: Assembly) -> tuple[sp.csr_array, np.ndarray]:
     -------
     T : (6n, n_q) sparse
     independent : (n_q,) int, increasing
-        6 * row + component - 1 of each kept dof; dependent ones and those of scalar points beyond
-        the first are left out.
+        6 * row + component - 1 of each kept dof; dependent dofs, and all but the first of scalar
+        points, are left out.
 
     Raises
     ------
     ModelError
-        If a dof depends twice, on itself, or is held by a support too; the sentence names grid,
+        If a dof depends twice, or on itself, or is also held by a support; the message names grid,
         component and elements.
     """
     n = 6 * len(assembly.ids)
@@ -63,7 +63,7 @@ def _to_basic(assembly: Assembly) -> sp.csr_array:
 
 
 def dependencies(assembly: Assembly) -> Rows:
-    """u_m = G u as it stands in the elements, chains not yet followed.
+    """u_m = G u as defined by the elements, before chains are followed.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def _refuse_held(assembly: Assembly, rows: Rows) -> None:
 
 
 def _followed(assembly: Assembly, rows: Rows, n: int) -> sp.csr_array:
-    """(1 - G_mm)⁻¹ G_mi = (1 + G_mm)(1 + G_mm²)(1 + G_mm⁴)... G_mi, which ends as chains do."""
+    """(1 - G_mm)⁻¹ G_mi = (1 + G_mm)(1 + G_mm²)(1 + G_mm⁴)... G_mi, finite for finite chains."""
     G = sp.csr_array((rows.factor, (rows.dof[rows.row], rows.on)), shape=(n, n))
     G.eliminate_zeros()
     dependent = np.zeros(n)
@@ -172,7 +172,7 @@ def _followed(assembly: Assembly, rows: Rows, n: int) -> sp.csr_array:
 
 
 def _refuse_cycles(assembly: Assembly, rows: Rows, G_mm: sp.csr_array) -> None:
-    """Raise if a dof depends, in however many steps, on itself."""
+    """Raise if a dof depends on itself, in any number of steps."""
     count, group = connected_components(G_mm, connection="strong")
     in_cycle = np.bincount(group, minlength=count)[group] > 1
     in_cycle |= G_mm.diagonal() != 0

@@ -1,14 +1,14 @@
 """Shell elements as matrices: K = ∫ t εᵀQ_m ε + t³/12 κᵀQ_b κ + γᵀS γ + s (ω - rz)² dA.
 
 Every matrix here is (m, 24, 24) in the basic frame, nodal order ux uy uz rx ry rz; a triangle's
-fourth node has empty rows. ε, κ, γ, ω depend on geometry alone (and, through the incompatible
-bubbles of the quadrilateral, on the *shape* of the membrane material), so the stiffness is
-**linear** in Q_m, Q_b, Q_c, S and s as long as ``reference`` stays the same:
+fourth node has empty rows. ε, κ, γ, ω depend on geometry only. The incompatible bubbles of the
+quadrilateral also depend on the *shape* of the membrane material. Hence the stiffness is **linear**
+in Q_m, Q_b, Q_c, S and s for a constant ``reference``:
 
     stiffness(geo, t, Qm=a*Q1 + b*Q2) = a*stiffness(geo, t, Qm=Q1) + b*stiffness(geo, t, Qm=Q2)
 
-With ``reference`` = the nominal Q_m the nominal stiffness is exactly QM6 and every operator built
-from another Q is the exact derivative of the condensed element (see :mod:`.shell_membrane`).
+With ``reference`` = the nominal Q_m, the nominal stiffness is exactly QM6. An operator of another Q
+is then the exact derivative of the condensed element (see :mod:`.shell_membrane`).
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ from .shell_membrane import jacobians
 from .shell_membrane import membrane as _quad_membrane
 from .shell_plate import plate as _quad_plate
 
-CHUNK = 256  # elements a pass: what fits the cache
+CHUNK = 256  # elements a pass, chosen to fit the cache
 POISSON_03 = np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])  # isotropic, nu = 0.3
 MEMBRANE, BENDING, SHEAR, DRILL = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 9)
 Rows = np.ndarray | slice
@@ -103,14 +103,14 @@ def stiffness(
         Plane stiffness of membrane, bending (times 12 I/t³) and coupling (MID4's sign: curvature
         counted as Nastran does, ε(z) = ε - z χ) in the material frame [Pa].
     S : (m, 2, 2) or (m, 2, 2, 2)
-        Transverse shear stiffness in the element frame; where two are given, that of the mean of
-        γ over the element and that of what varies within it [N/m].
+        Transverse shear stiffness in the element frame; two values are for the mean of γ over the
+        element and for its variation within it [N/m].
     drill : (m,) or (m, 2)
-        s, stiffness against rz other than the membrane's spin; where two are given, that of the
-        field and that of the corners (Nastran's K6ROT), see :mod:`.shell_drilling` [N/m]
+        s, stiffness of rz relative to the membrane's spin; two values are for the field and for
+        the corners (Nastran's K6ROT), see :mod:`.shell_drilling` [N/m]
     reference : (m, 3, 3) or (3, 3)
-        Membrane stiffness for which the bubbles of the quadrilateral are condensed; Qm where not
-        given (an isotropic sheet with nu = 0.3 where Qm is None).
+        Membrane stiffness for which the bubbles of the quadrilateral are condensed; default Qm (an
+        isotropic sheet with nu = 0.3 if Qm is None).
 
     Returns
     -------
@@ -168,8 +168,8 @@ def mass(
 ) -> np.ndarray:
     """M_e = ∫ (ρt + nsm) N Nᵀ ⊗ 1 + ρt³/12 N Nᵀ ⊗ (1 - n nᵀ) dA; linear in rho and nsm.
 
-    Lumped (coupled=False) it is what Nastran makes by default: each node carries the translational
-    mass ∫ (ρt + nsm) N dA and no inertia.
+    The lumped mass (coupled=False) is Nastran's default: each node has the translational mass
+    ∫ (ρt + nsm) N dA and no inertia.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def turned(Q: np.ndarray, turn: np.ndarray) -> np.ndarray:
 
 
 def _chunks(geo: ShellGeometry) -> Iterator[Rows]:
-    """Rows of one shape, a cache's worth at a time."""
+    """Rows of one shape, in pieces that fit the cache."""
     mixed = geo.triangle.any() and not geo.triangle.all()
     for kind in (False, True) if mixed else (None,):
         rows = np.arange(len(geo)) if kind is None else np.flatnonzero(geo.triangle == kind)
@@ -259,7 +259,7 @@ def _integrated(
 ) -> np.ndarray:
     """∫ Bᵀ C B dA + A γ̄ᵀ dS γ̄ + s |J| Σ bᵀ b, C (m, g, 9, 9) from section(rows, geometry, N).
 
-    DS is the excess of shear stiffness, s that of the corners against twist.
+    Here dS is the excess of shear stiffness and s the drilling stiffness of the corners.
     """
     K = np.zeros((len(geo), 24, 24))
     for rows in _chunks(geo):
@@ -280,12 +280,12 @@ def _integrated(
 
 
 def _varying(S: np.ndarray | None) -> np.ndarray | None:
-    """Shear stiffness of all of γ, before the mean's excess is added."""
+    """Shear stiffness of γ at every point, before the excess of the mean is added."""
     return S if S is None or S.ndim == 3 else S[:, 1]
 
 
 def _excess(S: np.ndarray | None) -> np.ndarray | None:
-    """What the mean of γ has beyond that, usually negative (m, 2, 2)."""
+    """Excess of shear stiffness for the mean of γ, usually negative (m, 2, 2)."""
     return None if S is None or S.ndim == 3 else S[:, 0] - S[:, 1]
 
 
@@ -295,7 +295,7 @@ def _field(drill: np.ndarray | None) -> np.ndarray | None:
 
 
 def _corners(drill: np.ndarray | None) -> np.ndarray | None:
-    """Drilling stiffness of the corners (m,); None where they have none."""
+    """Drilling stiffness of the corners (m,), or None if it is zero."""
     return None if drill is None or drill.ndim == 1 or not drill[:, 1].any() else drill[:, 1]
 
 
@@ -326,7 +326,7 @@ def _section(
 
 
 def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
-    """Those rows of what is given for each element; one (3, 3) stands for all."""
+    """Select rows of arrays given for each element; one (3, 3) applies to all elements."""
     for a in arrays:
         yield a if a is None or a.shape == (3, 3) else a[rows]
 
@@ -334,7 +334,7 @@ def _of(rows: Rows, *arrays: np.ndarray | None) -> Iterator[np.ndarray | None]:
 def _mass(
     geo: ShellGeometry, N: np.ndarray, areal: np.ndarray, rotary: np.ndarray, coupled: bool
 ) -> np.ndarray:
-    """Nodal mass and inertia through the link of an offset (never of warp): (m, 24, 24)."""
+    """Nodal mass and inertia with the rigid link of an offset, but not of warp: (m, 24, 24)."""
     NN = N[:, :, None] * (N[:, None, :] if coupled else np.eye(4))
     m_ij, j_ij = ((w @ NN.reshape(-1, 16)).reshape(-1, 4, 4) for w in (areal, rotary))
     n = geo.frames[:, 2]

@@ -1,4 +1,4 @@
-"""What ties the rotation rz about the normal to the spin ω = ½ (v,x - u,y) of the membrane.
+"""Drilling stiffness: it ties the rotation rz about the normal to the spin ω = ½ (v,x - u,y).
 
 Two rules, each linear in its stiffness s [N/m]; a sheet usually has one of them:
 
@@ -9,17 +9,17 @@ Two rules, each linear in its stiffness s [N/m]; a sheet usually has one of them
                                              Jacobian of the unit square at corner i of a CQUAD4
                                              (the area of a rectangle), twice the area of a CTRIA3
 
-The second was measured, not taken from a manual. It meets rotations about the normal of MSC's
-results to 5e-8 on a bracket of rectangles and trapezoids (K6ROT 1; the field misses them by 17 %,
-the element's area for |J| by 1.4 %) and to 4e-8 on a plate without the parameter, for which 100 is
-to be taken (field: 84 %). On NX's wing box (K6ROT 100) moments of 192 CBUSH on flat sheets give
-s = 1.001e-4 G t. Twice the area of a CTRIA3 rests on MYSTRAN's comparison with MSC alone
-(MystranSolver, pull request 175).
+The second rule was identified from results, not taken from a manual. It reproduces the rotations
+about the normal of MSC's results to 5e-8 on a bracket of rectangles and trapezoids (K6ROT 1). There
+the field is wrong by 17 %, and the element's area for |J| by 1.4 %. On a plate without the
+parameter, where 100 applies, it agrees to 4e-8 (field: 84 %). On NX's wing box (K6ROT 100) the
+moments of 192 CBUSH on flat sheets give s = 1.001e-4 G t. Twice the area of a CTRIA3 is based on
+MYSTRAN's comparison with MSC only (MystranSolver, pull request 175).
 
-Corners alone carry little twist round a bend: MacNeal-Harder's twisted beam is 1.64 times too soft
-at K6ROT 100 (field 0.99), Raasch's hook 1.26 times, sheets of a tailgate 0.2 % in frequency.
-Nastran's shell normals (PARAM,SNORM) mend that there and are not read here. So the field stays
-where no deck asks for K6ROT.
+Corners alone transfer little twist round a bend. At K6ROT 100 MacNeal-Harder's twisted beam is 1.64
+times too soft (field 0.99) and Raasch's hook 1.26 times. Sheets of a tailgate change by 0.2 % in
+frequency. Nastran corrects this by shell normals (PARAM,SNORM), which are not read here. Therefore
+the field is used unless a deck gives K6ROT.
 """
 
 import numpy as np
@@ -28,15 +28,15 @@ from . import triangle
 from .shell_geometry import ShellGeometry, to_element
 from .shell_membrane import corner_jacobians, corner_slopes, spin
 
-VARYING_SPIN = 0.1  # squared: share of the drilling stiffness for what varies of ω - rz
+VARYING_SPIN = 0.1  # squared: share of the drilling stiffness for the varying part of ω - rz
 
 
 def damped(B: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The mean over the element and a tenth of what varies.
+    """The mean over the element plus a tenth of the varying part.
 
-    Drilling stiffness is there to carry twist from element to element (MacNeal-Harder's twisted
-    beam, Raasch's hook), which the mean does; held at every point it locks coarse doubly curved
-    shells (hemisphere, 8 x 8: 3 % low; this way 1 % high as MacNeal's element).
+    Drilling stiffness transfers twist from element to element (MacNeal-Harder's twisted beam,
+    Raasch's hook), and the mean is enough for this. The full field locks coarse doubly curved
+    shells: a hemisphere of 8 x 8 is 3 % low. With a tenth it is 1 % high, as MacNeal's element.
     """
     share = weight / weight.sum(axis=1, keepdims=True)
     mean = (share[:, :, None, None, None] * B).sum(axis=1, keepdims=True)

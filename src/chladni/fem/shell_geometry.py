@@ -1,13 +1,14 @@
-"""Where flat four- and three-node shells lie: frames, flattened corners, way to the nodes.
+"""Geometry of flat four- and three-node shells: frames, flattened corners, link to the nodes.
 
-A quadrilateral's plane is the mean plane of its corners (normal along the cross product of the
-diagonals, x along their bisector, as Nastran's CQUAD4); a triangle's x runs along side 1-2. The
-corners of a warped quadrilateral lie alternately above and below the plane. A force in the plane
-is carried to its corner with the couple balanced by normal forces at that corner and its two
-neighbours, not by moments (NASTRAN-95, QDMM1D; MacNeal, Computers and Structures 8, 1978,
-175-183), so that a rigid motion of the nodes strains nothing and membrane forces do not turn
-nodes. MSC Nastran 2020 does the same: a patch of its results is met to 1.3e-6 in; with one slope
-of the middle for all corners it is missed by 1.8e-4 in.
+A quadrilateral's plane is the mean plane of its corners, as in Nastran's CQUAD4: the normal is
+along the cross product of the diagonals, x along their bisector. A triangle's x is along side 1-2.
+
+The corners of a warped quadrilateral lie alternately above and below the plane. A force in the
+plane acts on its corner. Normal forces at that corner and its two neighbours balance the couple,
+not moments (NASTRAN-95, QDMM1D; MacNeal, Computers and Structures 8, 1978, 175-183). Hence a rigid
+motion of the nodes causes no strain, and membrane forces do not rotate nodes. MSC Nastran 2020 does
+the same: a patch of its results agrees to 1.3e-6 in, but only to 1.8e-4 in with the slope of the
+middle for all corners.
 """
 
 from dataclasses import dataclass, replace
@@ -94,10 +95,10 @@ def geometry(points: np.ndarray, shells: Shells) -> ShellGeometry:
 
 
 def to_element(geo: ShellGeometry) -> np.ndarray:
-    """Motion of the flattened mid-surface in the element frame from the nodes': (m, 24, 24).
+    """Motion of the flattened mid-surface in the element frame from that of the nodes (m, 24, 24).
 
-    u_i' = R u_i + d (R r_i x n) + z_i (w,x w,y)_i with d the offset, z_i the warp and the slope at
-    corner i of the bilinear w through the corners' deflections, as NASTRAN-95's QDMM1D has it.
+    u_i' = R u_i + d (R r_i x n) + z_i (w,x w,y)_i with d the offset and z_i the warp. The slope at
+    corner i is that of the bilinear w through the corners' deflections (NASTRAN-95, QDMM1D).
     """
     T = np.zeros((len(geo), 4, 6, 4, 6))
     x, y, n = (geo.frames[:, k] for k in range(3))
@@ -150,7 +151,7 @@ def _sides(corners: np.ndarray, triangle: np.ndarray) -> np.ndarray:
 
 
 def _check(ids: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> None:
-    """Every corner turns left: area and convexity."""
+    """Raise unless every corner turns left, which ensures area and convexity."""
     side = np.roll(corners, -1, axis=1) - corners
     side[triangle, 2] = side[triangle, 3]
     turn = np.stack([_cross2(side[:, k - 1], side[:, k]) for k in range(4)], axis=1)

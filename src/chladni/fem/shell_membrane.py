@@ -70,9 +70,9 @@ def membrane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """ε = (B + A G) u with G = -(∫AᵀQA)⁻¹ ∫AᵀQB, and ω = ½(v,x - u,y), at the Gauss points.
 
-    A holds the strains of the two incompatible bubbles 1-ξ², 1-η², condensed for the material
-    ``reference``; by stationarity ∫(B+AG)ᵀ dQ (B+AG) is the exact derivative of the condensed
-    stiffness there.
+    A contains the strains of the two incompatible bubbles 1-ξ², 1-η², condensed for the material
+    ``reference``. By stationarity ∫(B+AG)ᵀ dQ (B+AG) is the exact derivative of the condensed
+    stiffness at that material.
 
     Parameters
     ----------

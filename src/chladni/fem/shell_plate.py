@@ -20,7 +20,7 @@ def curvature(grad: np.ndarray) -> np.ndarray:
 def plate(corners: np.ndarray, inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Curvatures and tied transverse shear at the Gauss points.
 
-    γ = (w,x + ry  w,y - rx); its covariant parts are read at the middle of the sides only.
+    γ = (w,x + ry  w,y - rx); its covariant parts are sampled at the middle of the sides only.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
-"""From parts and materials to what a shell element needs: Q_m, Q_b, Q_c, S, drilling, density.
+"""Section values of shell elements from parts and materials: Q_m, Q_b, Q_c, S, drilling, density.
 
-Residual bending flexibility (MacNeal, A simple quadrilateral shell element, Computers and
-Structures 8, 1978, 175-183; Nastran's CQUAD4): a linear deflection with tied shear misses the
+Residual bending flexibility is that of Nastran's CQUAD4 (MacNeal, A simple quadrilateral shell
+element, Computers and Structures 8, 1978, 175-183). A linear deflection with tied shear misses the
 cubic part of bending between corners. Its flexibility L²/12D is put in series with transverse
-shear, S⁻¹ = (k_s G t)⁻¹ + diag(L_x²/D_11, L_y²/D_22)/12, of the *mean* of γ over a quadrilateral;
-what varies within it, by which torsion is carried along free edges, has only ``VARYING`` of it
-(all of it, MacNeal-Harder's strip is seven times too soft in torsion; 0.04 brings a wing box of
-NX Nastran from 4.6 to 0.3 %). It brings frequencies to within half a per cent of Nastran's and
-makes very coarse panels (two elements a side) too soft.
+shear, S⁻¹ = (k_s G t)⁻¹ + diag(L_x²/D_11, L_y²/D_22)/12, of the *mean* of γ over a quadrilateral.
+The varying part of γ transfers torsion along free edges and has only ``VARYING`` of it. With all of
+it MacNeal-Harder's strip is seven times too soft in torsion. With 0.04 the error of a wing box
+against NX Nastran falls from 4.6 to 0.3 %. Frequencies then agree with Nastran's within half a per
+cent, but very coarse panels (two elements a side) are too soft.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from .shell import ShellGeometry, geometry, turned
 
 DRILLING = 0.1  # of G t: MacNeal-Harder's twisted beam to 0.1 %; 1e-3 is 30 % too soft
 PENALTY = 1e-6  # of G t: a unit of K6ROT at the corners, exact (see .shell_drilling)
-VARYING = 0.04  # share of the residual flexibility that the varying part of shear sees
-STIFF = 1e-3  # shear flexibility, as a fraction of 1/(5/6 G_12 t), where the deck asks for none
+VARYING = 0.04  # share of the residual flexibility for the varying part of shear
+STIFF = 1e-3  # shear flexibility over 1/(5/6 G_12 t) where the deck has rigid shear
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,8 @@ class SectionArrays:
     Attributes
     ----------
     Qm, Qb, Qc : (m, 3, 3)      material frame, Qb times 12 I/t³, Qc in MID4's sign [Pa]
-    S : (m, 2, 2, 2)            transverse shear with residual bending, of the mean of γ and of
-                                what varies within the element, element frame [N/m]
+    S : (m, 2, 2, 2)            transverse shear with residual bending, for the mean of γ and for
+                                its variation within the element, element frame [N/m]
     drill : (m, 2)              drilling, of the field and of the corners [N/m]
     rho, nsm : (m,)             [kg/m³], [kg/m²]
     loss : (m,)                 loss factor of the section [-]
@@ -106,14 +106,14 @@ def section_arrays(
     Parameters
     ----------
     geo : ShellGeometry
-        Of all the assembly's shells; made here where not given.
+        Geometry of all shells of the assembly; computed by default.
     residual_bending : bool
         Add MacNeal's residual bending flexibility to transverse shear (agreement with Nastran).
 
     Raises
     ------
     ModelError
-        If a shell refers to a part that is no shell, or its thickness is not positive.
+        If a shell refers to a part without a shell section, or its thickness is not positive.
     """
     shells = assembly.shells
     geo = geometry(assembly.points, shells) if geo is None else geo
@@ -147,8 +147,8 @@ def _drilling(k6rot: float | None) -> tuple[float, float]:
 def modulus_derivative(material: Material, name: str) -> np.ndarray:
     """dQ/dp of the plane stiffness for p = E, nu, E1, E2, nu12 or G12; dQ = -Q dC Q, C = Q⁻¹.
 
-    An isotropic sheet is taken as the orthotropic one that equals it: E1, E2 and G12 then change
-    on their own, with nu12 kept (nu21 = nu12 E2/E1 follows).
+    An isotropic sheet is treated as an equal orthotropic one. E1, E2 and G12 then change
+    independently at constant nu12 (nu21 = nu12 E2/E1 follows).
     """
     Q = material.plane_stress()
     if name == "E" and isinstance(material, Isotropic):
@@ -225,7 +225,7 @@ def _constants(section: object) -> tuple:
 
 
 def _flexibility(section: ShellSection) -> np.ndarray:
-    """Inverse of the transverse moduli (2, 2) [1/Pa]; a tiny one where there is none."""
+    """Inverse of the transverse moduli (2, 2) [1/Pa]; a small value for rigid shear."""
     if section.bending is None:
         return np.zeros((2, 2))
     least = STIFF / section.bending.plane_stress()[2, 2] * np.eye(2)
@@ -254,6 +254,6 @@ def _diagonal(d: np.ndarray) -> np.ndarray:
 
 
 def _inverse(Z: np.ndarray, Qb: np.ndarray) -> np.ndarray:
-    """Z⁻¹ where the shell bends, zero where it is a membrane alone."""
+    """Z⁻¹ for shells with bending stiffness, zero for pure membranes."""
     bends = (Qb[:, 0, 0] > 0)[:, None, None, None]
     return np.where(bends, np.linalg.inv(np.where(bends, Z, np.eye(2))), 0.0)

@@ -46,7 +46,7 @@ def loss_factors(assembly: Assembly) -> list[np.ndarray]:
 
 
 def _sections(assembly: Assembly, solids: Solids) -> tuple[list[SolidSection], np.ndarray]:
-    """The sections in use, and which of them each element has."""
+    """The sections in use, and the index of each element's section."""
     used, which = np.unique(solids.part, return_inverse=True)
     found = []
     for part in (assembly.parts[k] for k in used):
@@ -73,7 +73,7 @@ def elasticity(material: object) -> np.ndarray:
 
 
 def elasticity_derivative(material: Isotropic, name: str) -> np.ndarray:
-    """dC/dE or dC/dnu (6, 6); a G of its own stays."""
+    """dC/dE or dC/dnu (6, 6); an independent G stays constant."""
     E, nu = material.E, material.nu
     below, own = (1 + nu) * (1 - 2 * nu), material.G is not None
     if name == "E":
@@ -90,7 +90,7 @@ def elasticity_derivative(material: Isotropic, name: str) -> np.ndarray:
 
 
 def _check(X: np.ndarray, solids: Solids, assembly: Assembly) -> None:
-    """Raise where an element has no volume or turns inside out."""
+    """Raise if an element has no volume or is turned inside out."""
     family = FAMILIES[X.shape[1]]
     dV = np.stack([np.linalg.det(family.gradients(xi) @ X) for xi in family.mass_points])
     bad = (np.abs(dV).max(axis=0) == 0) | (dV.min(axis=0) < 0) & (dV.max(axis=0) > 0)
@@ -119,14 +119,14 @@ def stiffness(X: np.ndarray, C: np.ndarray, modes: np.ndarray | int = 21) -> np.
     X : (m, k, 3)        corners [m]
     C : (m, 6, 6)        elasticity [Pa]
     modes : (m,) or int  internal strains of a hexahedron: 21, 9 (incompatible modes) or 0 (plain);
-                         any but 0 gives a wedge its three, and tied shear
+                         any value but 0 gives a wedge three, and tied shear
 
     Notes
     -----
     The internal strains vary along the element's axes at its centre and are scaled by
-    det J₀ / det J, so that constant stress does no work on them: the patch test is passed. With
-    them a brick bends without locking and nearly incompressible material does not lock. On a
-    box 21 reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL.
+    det J₀ / det J. Constant stress then does no work on them, so that the patch test is passed.
+    They prevent locking of a brick in bending and of nearly incompressible material. On a box, 21
+    reproduce NX Nastran's hexahedron to its printed digits; plain is its ISOP=FULL.
     """
     modes = np.broadcast_to(np.asarray(modes), len(X))
     K = np.empty((len(X), 3 * X.shape[1], 3 * X.shape[1]))
@@ -157,7 +157,7 @@ def stiffness_derivative(
 
 
 def _integrated(family: SolidFamily, X: np.ndarray, C: np.ndarray, modes: int) -> np.ndarray:
-    """The same with the internal strains condensed out."""
+    """Σ w |det J| Bᵀ C B with the internal strains condensed out."""
     return _condensed(_whole(family, X, C, modes), 3 * X.shape[1])
 
 
@@ -190,10 +190,10 @@ def _compatible(
 def _tied(X: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
     """B of a wedge with its transverse shear tied at the middles of its three walls.
 
-    Only the shear along a wall's own edge t_k is believed, e_k = t_k · γ, taken at the middle of
-    the wall. At edge k γ is e_k t_k + (c · n_k) n_k, where c is the constant that fits the three
-    best, Σ l_k t_k (t_k · c - e_k) = 0, each weighted by its length. Found here by matching NX
-    Nastran's CPENTA, which it reproduces to the printed digits on a right prism.
+    Only the shear along the edge t_k of a wall is used, e_k = t_k · γ, at the middle of the wall.
+    At edge k γ is e_k t_k + (c · n_k) n_k. The constant c fits the three best, weighted by length:
+    Σ l_k t_k (t_k · c - e_k) = 0. The rule was identified from NX Nastran's CPENTA, which it
+    reproduces to the printed digits on a right prism.
     """
     R, t, n, length = _walls(X)
     middle = [np.array([a, b, 0.0]) for a, b, _ in FAMILIES[6].points[:3]]

@@ -44,15 +44,15 @@ def _hexa_values(xi: np.ndarray) -> np.ndarray:
 
 
 def _hexa_gradients(xi: np.ndarray) -> np.ndarray:
-    """dN_i/dξ = ξ_i (1 + η_i η)(1 + ζ_i ζ) / 8, and so on round."""
+    """dN_i/dξ = ξ_i (1 + η_i η)(1 + ζ_i ζ) / 8, and cyclically."""
     a, b, c = (1 + _CUBE * xi).T
     return np.stack([_CUBE[:, 0] * b * c, a * _CUBE[:, 1] * c, a * b * _CUBE[:, 2]]) / 8
 
 
 def _hexa_enhanced(xi: np.ndarray) -> np.ndarray:
-    """Strains (6, 21) along the element's own axes, the nine of incompatible modes first.
+    """Strains (6, 21) along the element's axes, the nine of incompatible modes first.
 
-    εξ gains ξ, then ξη and ξζ; γξη gains ξ and η, then ξζ and ηζ; and so on round.
+    εξ gains ξ, then ξη and ξζ; γξη gains ξ and η, then ξζ and ηζ; the others follow cyclically.
     """
     cycle = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
     linear = [(i, xi[i]) for i in range(3)]
@@ -81,7 +81,7 @@ def _wedge_gradients(xi: np.ndarray) -> np.ndarray:
 def _wedge_enhanced(xi: np.ndarray) -> np.ndarray:
     """Strains (6, 3): of one in-plane bubble Q = a² + ab + b² along ξ and along η, and εζ = ζ.
 
-    a and b are ξ and η from the centroid; Q is the same whichever corner comes first.
+    a and b are ξ and η from the centroid; Q does not depend on the first corner.
     """
     a, b = xi[:2] - 1 / 3
     M = np.zeros((6, 3))

@@ -1,7 +1,7 @@
-"""Answers of a structure to loads: static, enforced, harmonic, and motion of its base.
+"""Responses of a structure: static, enforced, harmonic, and to motion of its base.
 
-Loads and motions are (6n, k) over all points in the basic frame, six motions a point, one column a
-load case; dependent dofs may carry loads, which Tᵀ hands on to those they depend on.
+Loads and motions are (6n, k) over all points in the basic frame: six motions a point, one column a
+load case. Dependent dofs may have loads, which Tᵀ transfers to their independent dofs.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ def static(built: Structure, load: np.ndarray) -> np.ndarray:
 
 
 def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-    """K⁻¹ f, refined once; refused where K is singular to working precision."""
+    """K⁻¹ f, refined once; raise ``ModelError`` if K is singular to working precision."""
     try:
         factor = factorise(K, nodes=dofs[:, 0])
     except ModelError as fault:
@@ -50,7 +50,7 @@ def _solved(K: sp.csr_array, f: np.ndarray, dofs: np.ndarray) -> np.ndarray:
 
 
 def subcase_statics(assembly: Assembly, analysis: Analysis, case: Subcase) -> np.ndarray:
-    """Displacements (6n, 1) of one static subcase: its loads, its weight, its moved supports.
+    """Displacements (6n, 1) of one static subcase: its loads, weight and enforced supports.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def subcase_statics(assembly: Assembly, analysis: Analysis, case: Subcase) -> np
 def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
     """Weight f = M R a (6n, k) [N] of every mass in fields a (3 or 6, k) [m/s², rad/s²].
 
-    In gravity g it is a = g; on a base accelerated by b it is a = -b. Rows 4-6 turn about the
+    In gravity g, a = g; on a base accelerated by b, a = -b. Rows 4-6 are rotations about the
     origin.
     """
     a = np.asarray(acceleration, dtype=float)
@@ -85,18 +85,18 @@ def inertia_load(assembly: Assembly, acceleration: np.ndarray) -> np.ndarray:
 def enforced(
     assembly: Assembly, dofs: np.ndarray, values: np.ndarray, load: np.ndarray | None = None
 ) -> np.ndarray:
-    """Displacements (6n, k) with some dofs q_s moved: K_ff q_f = (Tᵀ f)_f - K_fs q_s.
+    """Displacements (6n, k) with some enforced dofs q_s: K_ff q_f = (Tᵀ f)_f - K_fs q_s.
 
     Parameters
     ----------
     dofs : (s, 2) int     row of points and component 1-6 in displacement frames, supports or not
     values : (s, k)       [m, rad]
-    load : (6n, k)        forces besides [N, N m]
+    load : (6n, k)        additional forces [N, N m]
 
     Raises
     ------
     LabelError
-        If a dof to be moved depends on others, or has no stiffness.
+        If an enforced dof depends on others, or has no stiffness.
     """
     built, s, f = _split(assembly, dofs)
     q = np.zeros((len(built.system.dofs), np.shape(values)[1]))
@@ -109,7 +109,7 @@ def enforced(
 
 
 def _split(assembly: Assembly, dofs: np.ndarray) -> tuple[Structure, np.ndarray, np.ndarray]:
-    """The structure with these dofs free, and its rows that are moved (s) and the others (f)."""
+    """The structure with these dofs free, and the rows of the enforced (s) and other dofs (f)."""
     dofs, held = np.asarray(dofs, dtype=np.int64), assembly.supports
     moved = np.isin(8 * held[:, 0] + held[:, 1], 8 * dofs[:, 0] + dofs[:, 1])
     built = structure(replace(assembly, supports=held[~moved]))
@@ -125,17 +125,17 @@ def driven(
     outputs: np.ndarray,
     modal: ModalModel | None = None,
 ) -> np.ndarray:
-    """Motion where dofs vibrate with given amplitudes, Z_ff q_f = -Z_fs q_s (n_f, n_out, k) [m].
+    """Motion for dofs of given amplitudes, Z_ff q_f = -Z_fs q_s (n_f, n_out, k) [m].
 
     Parameters
     ----------
-    dofs : (s, 2) int        row of points and component 1-6 that are moved, supports or not
+    dofs : (s, 2) int        row of points and component 1-6 of enforced dofs, supports or not
     values : (n_f, s, k)     their complex displacements, or (s, k) for all lines [m]
     frequency : (n_f,)       [Hz]
     outputs : (n_out, 2)     point id and component 1-6
-    modal : ModalModel       of the structure with the moved dofs held, damped: the sum over these
-                             modes of the absolute motion, as SOL 111 does it with SPCD; without it
-                             the equations are solved line by line
+    modal : ModalModel       damped modes of the structure with the enforced dofs held: the absolute
+                             motion is a sum over these, as in SOL 111 with SPCD; by default the
+                             equations are solved line by line
     """
     built, s, f = _split(assembly, dofs)
     free = built.system.dofs[f]
@@ -226,7 +226,7 @@ def base_response(
     *,
     residual: Residual | None = None,
 ) -> FRF:
-    """Acceleration per acceleration of the base, T = r - ω² H(ω) (-Tᵀ M r), all supports moving.
+    """Acceleration per base acceleration, T = r - ω² H(ω) (-Tᵀ M r), with all supports moving.
 
     Parameters
     ----------

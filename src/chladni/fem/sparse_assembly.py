@@ -1,4 +1,4 @@
-"""Element matrices into sparse ones: six by six blocks between points, then Tᵀ A T."""
+"""Assembly of element matrices into sparse ones: 6 x 6 blocks between points, then Tᵀ A T."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ INERTIA = np.kron(np.eye(2, dtype=bool), np.ones((3, 3), dtype=bool)) & (
 
 @dataclass(frozen=True, eq=False)
 class DofPairs:
-    """The b pairs of points that share an element, row by row, and where elements meet them.
+    """The b pairs of points that share an element, row by row, and their positions for elements.
 
     Attributes
     ----------
@@ -49,10 +49,10 @@ def pairs(nodes: np.ndarray, n: int) -> DofPairs:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """A csr of six rows a point whose 6 x 6 blocks are filled where ``mask`` says.
+    """A csr of six rows a point whose 6 x 6 blocks are filled according to ``mask``.
 
-    Entry (r, c) of a block lies ``start + width * above[r] + slot * along[r] + rank(r, c)`` from
-    the beginning.
+    Entry (r, c) of a block has the position ``start + width * above[r] + slot * along[r] +
+    rank(r, c)``.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Pattern:
 
 
 def pattern(shared: DofPairs, mask: np.ndarray) -> Pattern:
-    """Pattern of these pairs with blocks filled where the mask (6, 6) says."""
+    """Pattern of these pairs with blocks filled according to the mask (6, 6)."""
     along = mask.sum(axis=1)
     start = shared.before * int(along.sum())
     return Pattern(shared, mask, along, np.cumsum(along) - along, start)
@@ -120,7 +120,7 @@ def accumulate(
     nodes : (m, k) int
     n : int                 points
     parts : pairs of (rows of elements, one (r, 6k, 6k) of each kind)
-    masks : (6, 6) bool of each kind, where a block between two points may be other than zero
+    masks : (6, 6) bool of each kind, where a block between two points may be nonzero
 
     Returns
     -------
@@ -136,7 +136,7 @@ def accumulate(
 
 
 def _csr(data: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csr_array:
-    """Without the zeros; the index arrays are taken over."""
+    """A csr without explicit zeros; the index arrays are not copied."""
     n = len(indptr) - 1
     out = sp.csr_array((data, indices, indptr), shape=(n, n))
     out.eliminate_zeros()
@@ -151,7 +151,7 @@ def blocks(matrices: np.ndarray, nodes: np.ndarray, n: int) -> sp.csr_array:
 
 
 def with_rotations(matrices: np.ndarray) -> np.ndarray:
-    """(m, 3k, 3k) of translations alone as (m, 6k, 6k) with empty rotations."""
+    """Expand (m, 3k, 3k) of translations to (m, 6k, 6k) with empty rotations."""
     m, k = len(matrices), matrices.shape[1] // 3
     wide = np.zeros((m, k, 6, k, 6))
     wide[:, :, :3, :, :3] = matrices.reshape(m, k, 3, k, 3)
@@ -159,7 +159,7 @@ def with_rotations(matrices: np.ndarray) -> np.ndarray:
 
 
 def narrowed(A: sp.csr_array) -> sp.csr_array:
-    """A with indices of four bytes where these suffice: eight make it a third larger."""
+    """A with four-byte indices if these suffice; eight bytes make it a third larger."""
     if A.indices.dtype == np.int32 or max(A.nnz, *A.shape) > np.iinfo(np.int32).max:
         return A
     indices, indptr = A.indices.astype(np.int32), A.indptr.astype(np.int32)
@@ -167,7 +167,7 @@ def narrowed(A: sp.csr_array) -> sp.csr_array:
 
 
 def congruence(T: sp.csr_array, A: sp.csr_array) -> sp.csr_array:
-    """Tᵀ A T for symmetric A; rows of T that only pick a dof cost no product."""
+    """Tᵀ A T for symmetric A; rows of T that only select a dof need no product."""
     if not A.nnz:
         return sp.csr_array((T.shape[1], T.shape[1]), dtype=A.dtype)
     rows, columns, rest = _split(T)
@@ -181,7 +181,7 @@ def congruence(T: sp.csr_array, A: sp.csr_array) -> sp.csr_array:
 
 
 def _split(T: sp.csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows that alone pick a column (sorted by it), their columns, and all other rows."""
+    """Rows that select one column (sorted by it), their columns, and all other rows."""
     count = np.diff(T.indptr)
     single = np.flatnonzero(count == 1)
     at = T.indptr[single]
@@ -194,7 +194,7 @@ def _split(T: sp.csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _embed(A: sp.csr_array, columns: np.ndarray, n: int) -> sp.csr_array:
-    """A's rows and columns at increasing ``columns`` of a wider square matrix."""
+    """Embed A in a larger square matrix, at increasing ``columns``."""
     if len(columns) == n:
         return sp.csr_array(A)
     lifted = _lift(A, columns, n)
@@ -202,7 +202,7 @@ def _embed(A: sp.csr_array, columns: np.ndarray, n: int) -> sp.csr_array:
 
 
 def _lift(A: sp.csr_array, rows: np.ndarray, n: int) -> sp.csr_array:
-    """A's rows at increasing ``rows`` of n."""
+    """Place the rows of A at increasing ``rows`` of n."""
     count = np.zeros(n, dtype=A.indptr.dtype)
     count[rows] = np.diff(A.indptr)
     indptr = np.concatenate([[0], np.cumsum(count)]).astype(A.indptr.dtype)

@@ -1,7 +1,7 @@
-"""Springs, dampers, bushes and concentrated masses, straight into sparse matrices (SI).
+"""Springs, dampers, bushes and concentrated masses, assembled directly as sparse matrices (SI).
 
-Scalar components are counted in the displacement frames of their points, bushes in frames of their
-own; the matrices come out in the basic frame, six dofs a point in the order of ``points``.
+Scalar components refer to the displacement frames of their points, bushes to their own frames. The
+matrices are in the basic frame, six dofs a point in the order of ``points``.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def _scalar(assembly: Assembly, elements: Scalars, value: np.ndarray) -> sp.csr_
 
 
 def _relative(assembly: Assembly, bushes: Bushes) -> np.ndarray:
-    """E (m, 6, 12) of δ = E (q_a, q_b): what b moves more than a, at the bush, in its frame."""
+    """E (m, 6, 12) of δ = E (q_a, q_b): motion of b relative to a, at the bush, in its frame."""
     m = len(bushes)
     E = np.zeros((m, 6, 12))
     for end, sign in ((0, -1), (1, 1)):

@@ -15,7 +15,7 @@ SLOPES = np.array([[-1.0, 1, 0, 0], [-1, 0, 1, 0]])
 
 
 def membrane(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """ε and ω = ½(v,x - u,y), constant but given at three points: (m, 3, 3, 8), (m, 3, 1, 8)."""
+    """ε and ω = ½(v,x - u,y), constant, given at three points: (m, 3, 3, 8), (m, 3, 1, 8)."""
     grad = _gradients(corners)
     return _thrice(symmetric(grad)), _thrice(spin(grad))
 
