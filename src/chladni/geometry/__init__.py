@@ -1,1 +1,1 @@
-"""Points on shells: nearest ones, edges, curvature, clearance, mapped thickness."""
+"""Geometry of shells: nearest points, edges, curvature, clearance and mapped thickness."""

@@ -1,7 +1,7 @@
-"""The beams of a structure that are members of it, and the lines along which they run.
+"""Member beams of a structure, and the lines that they form.
 
-A short bar between two spiders, or bars in a row, hold sheets together as a screw does: they are
-fasteners, and what may be wrong with them is asked of joints. All other beams are members.
+A short bar between two spiders, or a few bars in a row, connects sheets as a screw does. These bars
+are fasteners, and effects of joints cover their errors. All other beams are members.
 """
 
 from collections.abc import Iterator
@@ -14,11 +14,11 @@ from .cells import components
 from .facets import unit
 
 MOST_BARS = 3  # of a fastener
-STRAIGHT = 0.85  # cosine between two beams that go on along one line
+STRAIGHT = 0.85  # cosine between two beams from which they form one line
 
 
 def connected_rows(nodes: np.ndarray) -> Iterator[np.ndarray]:
-    """Rows (k,) of elements that hang together by their nodes (m, n)."""
+    """Rows (k,) of each set of elements that share nodes (m, n)."""
     at, column = np.unique(nodes, return_inverse=True)
     corners = column.reshape(nodes.shape)
     piece = components(corners, len(at))[corners[:, 0]]
@@ -26,7 +26,7 @@ def connected_rows(nodes: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
-    """Rows (k,) of bars by themselves between sheets whose ends are those of spiders or means."""
+    """Rows (k,) of each isolated chain of bars whose ends lead RBE2 or RBE3."""
     nodes = assembly.beams.nodes
     if not len(nodes) or not len(assembly.shells):
         return []
@@ -41,7 +41,7 @@ def fastener_bars(assembly: Assembly) -> list[np.ndarray]:
 
 
 def member_beams(assembly: Assembly) -> np.ndarray:
-    """Rows (k,) of the beams whose part has no fastener."""
+    """Rows (k,) of the beams in parts without fasteners."""
     part = assembly.beams.part
     fasteners = [part[piece] for piece in fastener_bars(assembly)]
     taken = np.concatenate(fasteners) if fasteners else np.zeros(0, int)
@@ -49,7 +49,7 @@ def member_beams(assembly: Assembly) -> np.ndarray:
 
 
 def lines(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Number of the line every beam (m, 2) lies on (m,): it goes on where two meet nearly straight.
+    """Number of the line of every beam (m,): a line continues where two meet nearly straight.
 
     >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
     >>> lines(corner, np.array([[0, 1], [1, 2], [2, 3]])).tolist()

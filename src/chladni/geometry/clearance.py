@@ -1,7 +1,8 @@
-"""Clearance between sheets, and how far the two sides move against each other in each mode.
+"""Clearance between sheets, and the relative motion of the two sides in each mode.
 
-A facet lies up to h² κ/8 inside the curved sheet it stands for; a clearance is known no better
-than that on both sides, and a pair closer than its uncertainty is called touching.
+A facet lies up to h² κ/8 inside the curved sheet that it approximates. The uncertainty of a
+clearance is the sum of this value for both sides. A pair closer than its uncertainty counts as
+touching.
 """
 
 from collections.abc import Sequence
@@ -20,13 +21,13 @@ from .thickness_mapping import shell_area
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Places of one part over against another.
+    """Places of one part that face another part.
 
     Attributes
     ----------
     parts : (str, str)
     rows : (k,) int          rows of points on the first part
-    opposite : (k, 3) int    rows of the triangle opposite
+    opposite : (k, 3) int    rows of the opposite triangle
     weight : (k, 3)          of these
     normal : (k, 3)          unit, from the first part to the second
     clearance : (k,)         distance less half of both thicknesses [m]
@@ -65,13 +66,13 @@ class Gaps:
         damping: np.ndarray | float,
         drive: np.ndarray,
     ) -> np.ndarray:
-        """Force amplitude at resonance until a place closes, F = c 2ζω² / (|φ_f| |δ|): (k, r) [N].
+        """Force at resonance that closes each place, F = c 2ζω² / (|φ_f| |δ|): (k, r) [N].
 
         Parameters
         ----------
         shapes : (n_points, 3, r)   mass-normalised [1/√kg]
         frequency, damping : (r,)   [Hz], [-]
-        drive : (r,)                the shapes' motion at the exciter [1/√kg]
+        drive : (r,)                motion of the shapes at the exciter [1/√kg]
         """
         omega = 2 * np.pi * np.asarray(frequency)
         per_force = np.abs(self.relative_motion(shapes) * drive) / (2 * damping * omega**2)
@@ -81,7 +82,7 @@ class Gaps:
 
 @dataclass(frozen=True, eq=False)
 class _Sheets:
-    """What every pair of parts needs: thickness and facet error at the points, places of joints."""
+    """Data shared by all pairs of parts: thickness and facet error at points, places of joints."""
 
     thickness: np.ndarray
     error: np.ndarray
@@ -99,7 +100,7 @@ def _sheets(assembly: Assembly) -> _Sheets:
 
 
 def joint_points(assembly: Assembly) -> np.ndarray:
-    """Rows of the points at which an RBE2 or RBE3 grips the sheets."""
+    """Rows of the points at which an RBE2 or RBE3 is attached to sheets."""
     bodies = {tie.independent for tie in assembly.rigid if isinstance(tie, RigidBody)}
     means = {tie.reference for tie in assembly.rigid if isinstance(tie, Average)}
     return np.array(sorted(bodies | means), dtype=int)
@@ -108,7 +109,7 @@ def joint_points(assembly: Assembly) -> np.ndarray:
 def gaps(
     assembly: Assembly, first: str, second: str, *, within: float = 0.010, away: float = 0.018
 ) -> Gaps:
-    """All points of one part that lie within a distance of another."""
+    """All points of one part within a distance of another."""
     return _gaps(assembly, _sheets(assembly), (first, second), within, away)
 
 
@@ -127,7 +128,7 @@ def _gaps(
     t, error = (
         v[rows] + (v[opposite] * weight).sum(axis=1) for v in (sheets.thickness, sheets.error)
     )
-    shared = assembly.points[np.intersect1d(a.nodes, b.nodes)]  # a fold holds two parts together
+    shared = assembly.points[np.intersect1d(a.nodes, b.nodes)]  # a fold connects two parts
     joints = np.concatenate([sheets.joints, shared])
     free = np.ones(len(rows), bool)
     if len(joints):
@@ -151,17 +152,17 @@ def _in_box(points: np.ndarray, other: np.ndarray, margin: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class PairClearance:
-    """The nearest that two parts come.
+    """The smallest clearance of two parts.
 
     Attributes
     ----------
     parts : (str, str)
     least : float              clearance at the nearest place [m]
-    least_free : float         the same away from joints; inf where there is no such place [m]
+    least_free : float         the same away from joints; inf if there is no such place [m]
     uncertainty : float        at that place [m]
-    close : int                places away from joints with less than half a millimetre
-    touching : bool            somewhere away from joints within the uncertainty
-    place : (3,)               of the nearest place away from joints [m]
+    close : int                number of places away from joints with less than half a millimetre
+    touching : bool            True if any place away from joints is within its uncertainty
+    place : (3,)               the nearest place away from joints [m]
     """
 
     parts: tuple[str, str]
@@ -176,7 +177,7 @@ class PairClearance:
 def all_gaps(
     assembly: Assembly, *, within: float = 0.010, away: float = 0.018, both_ways: bool = False
 ) -> tuple[Gaps, ...]:
-    """The places of all pairs of parts that come within a distance; from either part or both."""
+    """Places of all pairs of parts within a distance of each other, from one part or from both."""
     names = [assembly.parts[p].name for p in np.unique(assembly.shells.part)]
     sheets = _sheets(assembly)
     pairs = permutations(names, 2) if both_ways else combinations(names, 2)
@@ -185,7 +186,7 @@ def all_gaps(
 
 
 def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
-    """Least clearance of each point (n,) [m]; nan without a sheet near it, or by a joint."""
+    """Least clearance of each point (n,) [m]; nan without a near sheet, or close to a joint."""
     least = np.full(len(assembly.points), np.inf)
     for g in gaps:
         np.minimum.at(least, g.rows[g.free], g.clearance[g.free])
@@ -193,7 +194,7 @@ def nearest(assembly: Assembly, gaps: Sequence[Gaps]) -> np.ndarray:
 
 
 def summary(assembly: Assembly, g: Gaps) -> PairClearance:
-    """What there is to say about a pair."""
+    """Summarise the places of one pair."""
     free = np.flatnonzero(g.free)
     if not len(free):
         free_least, at = float("inf"), int(g.clearance.argmin())

@@ -1,4 +1,4 @@
-"""A plane cut through sheets and solids: what a saw would show."""
+"""A plane cut through sheets and solids."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ OBLIQUE = 3.0  # a sheet that lies nearly in the plane is drawn at most this man
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """Where a plane square to an axis meets faces.
+    """The cuts of faces by a plane normal to an axis.
 
     Attributes
     ----------
     axis : int             0, 1 or 2: x, y or z is constant
     lines : (k, 2, 2)      ends of the cuts in the plane, along the two other axes in order [m]
-    face : (k,) int        which face each cut is of
+    face : (k,) int        index of the face of each cut
     """
 
     axis: int
@@ -46,9 +46,9 @@ def cross_section(points: np.ndarray, faces: np.ndarray, axis: int, at: float) -
 def thick_lines(
     section: CrossSection, points: np.ndarray, faces: np.ndarray, thickness: np.ndarray
 ) -> np.ndarray:
-    """Quadrilaterals (k, 4, 2) [m] that the sheets' walls leave in the plane.
+    """Quadrilaterals (k, 4, 2) [m] of the cut sheets in the plane.
 
-    A wall of thickness t (m,) whose normal makes the angle α with the plane is cut t / cos α wide.
+    A sheet of thickness t (m,) whose normal has the angle α to the plane has the width t / cos α.
     """
     along = np.diff(section.lines, axis=1)[:, 0]
     length = np.linalg.norm(along, axis=1, keepdims=True)

@@ -27,7 +27,7 @@ class Curvature:
 
 
 def triangles(nodes: np.ndarray) -> np.ndarray:
-    """The cells as triangles; a quad counts with both its diagonals (each half twice weighed)."""
+    """The cells as triangles; a quad is split along both of its diagonals."""
     three = nodes[:, 2] == nodes[:, 3]
     quads = nodes[~three]
     corners = ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))
@@ -76,7 +76,7 @@ def _principal(tensor: np.ndarray, normal: np.ndarray) -> Curvature:
 
 
 def part_curvature(assembly: Assembly) -> np.ndarray:
-    """κ at the corners of every shell (n, 4), each part for itself [1/m]."""
+    """κ at the corners of every shell (n, 4), computed for each part separately [1/m]."""
     shells = assembly.shells
     out = np.zeros(shells.nodes.shape)
     for part in np.unique(shells.part):

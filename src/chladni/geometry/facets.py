@@ -1,24 +1,24 @@
-"""Areas, normals and tangents of shells: the one account that labels, effects and pictures share.
+"""Areas, normals and tangents of shells: one definition for labels, effects and pictures.
 
 The sign of a normal. A shell's normal follows the right-hand rule round its grids in the deck's
-order, as Nastran's does. The normal at a grid is the mean of the normals of the shells around it,
-weighted by area; a shell that looks the other way (more than 135 degrees from the first of them,
-in the deck's order) is turned over first, so that neither a panel with some shells numbered the
-other way round nor a flange folded flat makes the mean vanish. The sense is that of most of the
-area; where that is even, of the first shell. So ``12:n``, an attachment at grid 12 and the arrow
-in a picture agree. At a place within a shell the normal is that of the triangle it lies in.
+order, as Nastran's does. The normal at a grid is the area-weighted mean of the normals of the
+shells around it. A shell more than 135 degrees from the first of them, in the deck's order, is
+reversed first. The mean then does not vanish on a panel with some shells of reversed numbering, or
+on a flange folded flat. The sign follows the larger area; if that is even, the first shell. Thus
+``12:n``, an attachment at grid 12 and the arrow in a picture agree. At a place within a shell the
+normal is that of its triangle.
 
 Cells are rows of points (m, 4); a triangle repeats its third.
 """
 
 import numpy as np
 
-OPPOSITE = -np.sqrt(0.5)  # cosine to the first shell below which one is turned over
-EVEN = 1e-9  # of the area: a sense decided by less is decided by rounding
+OPPOSITE = -np.sqrt(0.5)  # cosine to the first shell below which a shell is reversed
+EVEN = 1e-9  # of the area: a smaller difference is rounding
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    """v / |v| along the last axis (..., 3); zero stays zero."""
+    """v / |v| along the last axis (..., 3); zero remains zero."""
     length: np.ndarray = np.linalg.norm(v, axis=-1, keepdims=True)
     return v / np.where(length == 0, 1.0, length)
 
@@ -47,9 +47,9 @@ def cell_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def point_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Unit normals at the points, n = Σ ±a / |Σ ±a| (n, 3), with the sign stated above.
+    """Unit normals at the points, n = Σ ±a / |Σ ±a| (n, 3), with the sign defined above.
 
-    Zero at a point that no cell holds.
+    Zero at a point without cells.
     """
     a, (point, cell) = vector_areas(points, cells), _corners(cells)
     first = np.full(len(points), len(cells))
@@ -64,7 +64,7 @@ def point_normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def _corners(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point and cell of every corner; a triangle's repeated one counts once."""
+    """Point and cell of every corner; the repeated corner of a triangle counts once."""
     real = np.ones(cells.shape, bool)
     real[:, 3] = cells[:, 3] != cells[:, 2]
     return cells[real], np.nonzero(real)[0]
@@ -78,7 +78,7 @@ def _at_points(point: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors (..., 3) with u x v = n, u as near as can be to the axis farthest from n."""
+    """Two unit vectors (..., 3) with u x v = n, u nearest to the axis with the least part of n."""
     e = np.eye(3)[np.abs(normal).argmin(axis=-1)]
     u = unit(e - (e * normal).sum(axis=-1, keepdims=True) * normal)
     return u, np.cross(normal, u)

@@ -1,17 +1,17 @@
-"""Where the facets of a mesh bend: folds, beads, flanges and what is drawn too coarsely."""
+"""Folds of a mesh: edges, beads, flanges and coarsely meshed curves."""
 
 import numpy as np
 import scipy.sparse as sp
 
 from .facets import cell_normals
 
-FOLDED = np.cos(np.radians(20.0))  # normals of shells at one grid that differ by more make a fold
+FOLDED = np.cos(np.radians(20.0))  # a fold is where normals of shells at one grid differ by more
 
 
 def share_at_folds(points: np.ndarray, cells: np.ndarray, folded: float = FOLDED) -> np.ndarray:
-    """Share of the corners of each shell where it meets a shell that faces elsewhere (m,), 0 to 1.
+    """Share of the corners of each shell at a fold, with a shell of another direction (m,).
 
-    Which of its sides a shell shows makes no difference.
+    The share is from 0 to 1. The orientation of a shell makes no difference.
 
     Parameters
     ----------

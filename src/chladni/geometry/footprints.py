@@ -1,8 +1,8 @@
-"""Where a refined mesh would hang its joints: on shells half as large.
+"""Footprints of joints on a refined mesh, whose shells are half as large.
 
-Spiders (RBE2) and weighted means (RBE3) carry a screw, a weld or a bead on whole shells of the
-mesh. How wide that is the mesh decides, not the nugget or the head of the screw; and how far a
-sheet gives where it is held hangs on it: halving the shells under the welds of a box moves its
+Spiders (RBE2) and weighted means (RBE3) attach a screw, a weld or a bead to whole shells of the
+mesh. The mesh sets the width of this footprint, not the nugget or the head of the screw. The local
+compliance of the sheet depends on it. Halving the shells under the welds of a box changes its
 frequencies by 1 to 7 %, splitting all other shells by 0.2 to 2 %.
 """
 
@@ -17,21 +17,22 @@ from .cells import components, edges_of
 from .refine import parents
 from .sampling import farthest_point_sample
 
-FEWEST = 3  # grids that carry a joint: fewer hold a point, not an area
+FEWEST = 3  # grids of a footprint; fewer hold a point, not an area
 
 Rigid = RigidBody | Average | Equation
 
 
 def on_smaller_shells(coarse: Assembly, fine: Assembly) -> tuple[Rigid, ...]:
-    """The rigid elements of a refined structure, joints on footprints half as wide.
+    """The rigid elements of a refined structure, with footprints of joints half as wide.
 
-    A joint on the grids of one shell moves to that quarter of it that lies nearest to what hangs on
-    it; one on more shells to the grids nearest to half the way to their middle (the rim of a hole
-    stays as it is). What holds fewer than three grids of shells is as it was, the same object.
+    A joint on the grids of one shell moves to the quarter of it nearest to the attached point. A
+    joint on several shells moves to the grids nearest to the middle between its grids and their
+    centre; the rim of a hole is unchanged. A joint on fewer than three grids of shells remains the
+    same object.
 
     Parameters
     ----------
-    coarse : Assembly   as the deck has it
+    coarse : Assembly   of the deck
     fine : Assembly     ``refined(coarse)``
     """
     shrunk = _Footprints(coarse, fine)
@@ -48,10 +49,10 @@ def on_smaller_shells(coarse: Assembly, fine: Assembly) -> tuple[Rigid, ...]:
 def regions_of_joints(
     assembly: Assembly, bodies: Sequence[int], most: int
 ) -> list[tuple[np.ndarray, int]]:
-    """Rigid elements (rows of ``assembly.rigid``) by region, and how many joints each region has.
+    """Rigid elements (rows of ``assembly.rigid``) of each region, and its number of joints.
 
-    Elements that bars, bushes, springs or solids connect are one joint. There are at most ``most``
-    regions, about joints that lie far from each other.
+    Elements connected by bars, bushes, springs or solids are one joint. There are at most ``most``
+    regions, centred on joints that lie far from each other.
     """
     hung = np.array([_hung_on(assembly.rigid[k]) for k in bodies], dtype=int)
     pairs = [assembly.beams.nodes, assembly.bushes.nodes, assembly.springs.nodes]
@@ -68,22 +69,22 @@ def regions_of_joints(
 
 
 def _hung_on(body: Rigid) -> int:
-    """Row of what hangs on a spider or a mean, the dependent one of an equation."""
+    """Row of the point attached by a spider or a mean, or of the dependent point of an equation."""
     if isinstance(body, Equation):
         return body.nodes[0]
     return body.independent if isinstance(body, RigidBody) else body.reference
 
 
 def _held(body: Rigid) -> tuple[int, ...]:
-    """Rows whose dofs follow others."""
+    """Rows with dependent dofs."""
     return body.dependent if isinstance(body, RigidBody) else ()
 
 
 class _Footprints:
-    """Shells about every grid, and their quarters on the refined mesh."""
+    """Shells round every grid, and their quarters on the refined mesh."""
 
     def __init__(self, coarse: Assembly, fine: Assembly) -> None:
-        """Look both meshes over once."""
+        """Index both meshes."""
         self.points, self.cells, self.pieces = fine.points, coarse.shells.nodes, fine.shells.nodes
         order = np.argsort(self.cells, axis=None, kind="stable")
         self._shell = order // 4
@@ -92,7 +93,7 @@ class _Footprints:
         self._piece = by_parent.reshape(len(self.cells), 4)  # every shell has four
 
     def of(self, body: Rigid) -> Rigid:
-        """A rigid element on half its footprint."""
+        """A rigid element with half its footprint."""
         if isinstance(body, RigidBody) and self._is_area(body.dependent, body.independent):
             if len(set(body.components)) == 1:
                 rows = self._smaller(body.dependent, body.independent)
@@ -107,7 +108,7 @@ class _Footprints:
         return body
 
     def _hung(self, body: Average) -> np.ndarray:
-        """Place of what hangs on a mean (3,): by its weights, its own where they are alike."""
+        """Place (3,) attached to a mean: by its weights, or its reference if they are equal."""
         weight = np.array([w for _, _, w in body.terms])
         if np.ptp(weight) <= 1e-9 * np.abs(weight).max():
             return np.asarray(self.points[body.reference])
@@ -119,7 +120,7 @@ class _Footprints:
         return len(set(rows)) >= FEWEST and all(on_shells) and other not in rows
 
     def _shells_of(self, rows: Sequence[int]) -> np.ndarray:
-        """Shells that hold any of the grids."""
+        """Shells with any of the grids."""
         found = [self._shell[self._first[r] : self._first[r + 1]] for r in rows]
         return np.unique(np.concatenate(found))
 
@@ -142,5 +143,5 @@ class _Footprints:
         return tuple(found.tolist()) if len(found) >= FEWEST else tuple(rows)
 
     def _holds(self, shells: np.ndarray, rows: Sequence[int]) -> np.ndarray:
-        """Which shells have all these grids (k,)."""
+        """Mask of the shells with all these grids (k,)."""
         return np.array([set(rows) <= set(self.cells[s].tolist()) for s in shells], bool)

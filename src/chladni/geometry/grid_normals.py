@@ -1,4 +1,4 @@
-"""The surface normal at grids of an assembly: what ``12:n`` means."""
+"""The surface normal at grids of an assembly, as used in labels such as ``12:n``."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from .solid_faces import skin
 
 
 def grid_normals(assembly: Assembly, rows: np.ndarray) -> np.ndarray:
-    """Unit normals of the surface at rows of the points (k,): (k, 3), zero where there is none.
+    """Unit normals of the surface at rows of the points (k,): (k, 3), zero without a surface.
 
-    That of the shells around the grid, with the sign :mod:`.facets` states; where there are none,
-    outwards from the solids.
+    The normal is that of the shells around the grid, with the sign of :mod:`.facets`. Without
+    shells it is the outward normal of the solids.
     """
     kinds = [assembly.shells.nodes, *(skin(s.nodes, s.part)[0] for s in assembly.solids)]
     out = np.zeros((len(rows), 3))
@@ -29,7 +29,7 @@ def normals_at(assembly: Assembly, ids: np.ndarray) -> np.ndarray:
     Raises
     ------
     LabelError
-        Where a grid is on no surface.
+        If a grid is not on a surface.
     """
     normals = grid_normals(assembly, assembly.rows(ids))
     if np.any(bare := ~normals.any(axis=1)):

@@ -19,10 +19,10 @@ class ElementQuality:
 
     Attributes
     ----------
-    sine : least sine of a corner angle, 1 best, negative where folded
-    aspect : longest side by shortest
-    warp : distance of the corners from the mean plane by the mean side length
-    skew : 1 - |cos| of the mid-lines' angle; 1 is square
+    sine : least sine of a corner angle; 1 is best, a folded shell is negative
+    aspect : longest side over shortest
+    warp : distance of the corners from the mean plane over the mean side length
+    skew : 1 - |cos| of the angle between the mid-lines; 1 is square
     """
 
     sine: np.ndarray
@@ -53,7 +53,7 @@ def element_quality(assembly: Assembly) -> ElementQuality:
 
 @dataclass(frozen=True)
 class PartCheck:
-    """One part's mesh.
+    """The mesh of one part.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class PartCheck:
 
 @dataclass(frozen=True, eq=False)
 class MeshCheck:
-    """All parts, and which parts hang on nothing.
+    """The checks of all parts, and the parts that are not connected.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class MeshCheck:
 
     @property
     def fit(self) -> bool:
-        """Nothing loose, no folded shell, no normals turned."""
+        """True if no part is loose, no shell is folded and all normals agree."""
         return not self.loose and all(p.worst_sine > 0 and not p.turned for p in self.parts)
 
 
@@ -107,7 +107,7 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
 
 
 def edge_faults(nodes: np.ndarray) -> tuple[int, int]:
-    """Edges whose two cells run the same way (normals disagree), edges of more than two cells."""
+    """Number of edges whose two cells have opposite normals, and of edges with more cells."""
     sides = directed_edges(nodes)[0]
     key, at, count = np.unique(
         np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True

@@ -1,8 +1,9 @@
-"""The nearest point of a set of shells: its shell, its triangle, the weights of its grids.
+"""The nearest point of a set of shells: its shell, its triangle and the weights of its grids.
 
-A quadrilateral is taken as the two triangles at its diagonal 1-3. The shells are tried in the order
-of the distance to points spread over them; every point of a shell is within ``cover`` of one of its
-own, so that all shells that can be nearer than the best of those are tried too.
+A quadrilateral is treated as the two triangles at its diagonal 1-3. Sample points cover every
+shell: each point of a shell is within ``cover`` of one of its sample points. The shells with the
+nearest sample points are tried first. All other shells that can be nearer than the best of these
+are tried next.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from .facets import tangents, unit
 
 NEAR = 12  # quads around a place whose triangles are tried first
 AT_ONCE = 20_000  # places whose nearest shells are in memory at a time, a third of a gigabyte
-BLOCK = 256  # far places looked at together: each may need thousands of shells
+BLOCK = 256  # far places processed together: each may need thousands of shells
 IN_LINE = 0.02  # nodes whose second extent is below this fraction of the first lie in a line
 
 ShellChoice = str | int | np.ndarray | Sequence[int]  # part (name, id) or rows of shells
@@ -48,7 +49,7 @@ class Feet:
 
 @dataclass(frozen=True, eq=False)
 class ShellSurface:
-    """Shells whose nearest points are asked for.
+    """Shells that are searched for nearest points.
 
     Attributes
     ----------
@@ -56,8 +57,8 @@ class ShellSurface:
     points : (n, 3)     all points of the assembly [m]
     nodes : (m, 4)      rows of points
     rows : (m,)         rows of ``assembly.shells``
-    tree, owner :       places along the shells' longer middle lines (k,), and whose they are
-    cover :             farthest that a point of the shell is from that place [m]
+    tree, owner :       sample points on the longer mid-lines of shells (k,), and their shells
+    cover :             largest distance of a point of the shell from its sample point [m]
     """
 
     name: str
@@ -70,7 +71,7 @@ class ShellSurface:
 
     @classmethod
     def over(cls, name: str, points: np.ndarray, nodes: np.ndarray) -> Self:
-        """A surface of its own, not of an assembly."""
+        """A surface from points and cells, without an assembly."""
         return cls(name, points, nodes, np.arange(len(nodes)), *_spread(points[nodes]))
 
     @classmethod
@@ -102,8 +103,8 @@ class ShellSurface:
     ) -> Feet:
         """The nearest point of the surface to each place (k, 3) [m].
 
-        With a `normal` (k, 3) at each place, triangles turned away from it (|cos| below `cosine`)
-        do not count, and only the `near` nearest shells are tried; where none of these is left the
+        With a `normal` (k, 3) at each place, triangles of another direction (|cos| below `cosine`)
+        do not count, and only the `near` nearest shells are tried. If no triangle remains, the
         distance is infinite.
         """
         places = np.atleast_2d(np.asarray(places, dtype=float))
@@ -128,7 +129,7 @@ class ShellSurface:
         return feet
 
     def _improve(self, feet: Feet, places: np.ndarray, rows: np.ndarray) -> None:
-        """Try every shell that may be nearer to some of the places than what was found."""
+        """Try every shell that may be nearer to some of the places than the shell found."""
         x, reach = places[rows], feet.distance[rows] + 1e-12
         near = self.tree.query_ball_point(x, reach + self.cover.max())
         of = np.repeat(np.arange(len(rows)), [len(n) for n in near])
@@ -147,9 +148,9 @@ class ShellSurface:
         normal: np.ndarray | None = None,
         cosine: float = 0.0,
     ) -> Feet:
-        """The nearest point to each place on the shells tried for it: place ``of``, rising, each.
+        """The nearest point to each place on its trial shells; ``of`` is their place, increasing.
 
-        Of equally near ones, to 1e-12 m, the first.
+        If points are equally near to 1e-12 m, the first counts.
         """
         triangles = self.nodes[shell][:, _HALVES].reshape(-1, 3)
         of, x = np.repeat(of, 2), self.points[triangles]
@@ -173,7 +174,7 @@ class ShellSurface:
         Raises
         ------
         ModelError
-            Naming the worst place and its distance.
+            If a place is farther; the message names the worst place and its distance.
         """
         worst = int(feet.distance.argmax())
         if feet.distance[worst] > reach:
@@ -184,7 +185,7 @@ class ShellSurface:
             )
 
     def cells(self, feet: Feet) -> list[np.ndarray]:
-        """Nodes of each foot's shell; of its neighbours too where its own lie in a line."""
+        """Nodes of each foot's shell; also of its neighbours if its own nodes lie in a line."""
         own = [np.unique(nodes) for nodes in self.nodes[feet.shell]]
         return [self._with_ring(n) if _in_line(self.points[n]) else n for n in own]
 
@@ -194,8 +195,9 @@ class ShellSurface:
     def patch(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
         """Nodes and weights ∫ N_i dA / πR² of a disc about the surface's nearest point.
 
-        The disc is sampled at points of equal area; its nodes and weights tend to the disc's own
-        as the mesh is refined, and on a mesh coarser than the disc they are the shell's nodes.
+        The disc is sampled at points of equal area. As the mesh is refined, nodes and weights
+        converge to the integral over the disc. On a mesh coarser than the disc they are the shell's
+        nodes.
         """
         centre = self.feet(place[None])
         u, v = tangents(centre.normal[0])
@@ -210,11 +212,11 @@ class ShellSurface:
 
 
 def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, np.ndarray]:
-    """Places along the longer middle line of each cell (m, 4, 3), closer than the usual size.
+    """Sample points along the longer mid-line of each cell (m, 4, 3), closer than the usual size.
 
-    A long cell's centre may be far from a point that the cell itself is near. With them goes whose
-    they are, and the farthest that any point of a cell is from a place of its own: a part of a
-    cell cut across its line lies in the hull of its corners, of which one is the farthest.
+    The centre of a long cell may be far from a place near the cell. Returns a tree of the points,
+    the cell of each, and the largest distance of any point of a cell from its sample point. A slice
+    of a cell lies in the convex hull of its corners, so that a corner is the farthest point.
     """
     side = (x + np.roll(x, -1, axis=1)) / 2
     ends = [(side[:, 0], side[:, 2]), (side[:, 1], side[:, 3])]
@@ -235,10 +237,10 @@ def _spread(x: np.ndarray) -> tuple[cKDTree, np.ndarray, np.ndarray]:
 def _reach(
     x: np.ndarray, places: np.ndarray, owner: np.ndarray, t: np.ndarray, h: np.ndarray
 ) -> np.ndarray:
-    """Farthest corner (k,) of the slices t ± h/2 into which the cells x (m, 4, 3) are cut [m].
+    """Distance of the farthest corner (k,) of the slices t ± h/2 of the cells x (m, 4, 3) [m].
 
-    Sides 0-3 and 1-2, which the middle line does not cross, are cut in proportion. The triangles of
-    a cell lie up to |x0 - x1 + x2 - x3| / 4 off the surface that these cuts follow.
+    Sides 0-3 and 1-2, which the mid-line does not cross, are cut in proportion. The triangles of a
+    cell deviate by up to |x0 - x1 + x2 - x3| / 4 from the bilinear surface of these cuts.
     """
     X = x[owner]
     far = np.zeros(len(owner))
@@ -254,7 +256,7 @@ _HALVES = np.array([(0, 1, 2), (0, 2, 3)])
 
 
 def _disc() -> np.ndarray:
-    """Points of equal area in the unit disc: the middle and three rings of 6, 12 and 18."""
+    """Points of equal area in the unit disc: the centre and three rings of 6, 12 and 18."""
     rings = [np.zeros((1, 2))]
     inner = 1.0
     for count in (6, 12, 18):
@@ -272,8 +274,8 @@ _DISC = _disc()
 def barycentric_foot(p: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Weights (..., 3) of the point of triangles x (..., 3, 3) nearest to p (..., 3).
 
-    Inside, the projection; outside, the nearest point of the three sides (Ericson, Real-Time
-    Collision Detection, 5.1.5).
+    It is the projection inside the triangle, else the nearest point of the three sides (Ericson,
+    Real-Time Collision Detection, 5.1.5).
     """
     a, b, c = (x[..., k, :] for k in range(3))
     n = np.cross(b - a, c - a)
@@ -310,7 +312,7 @@ def nearest_parts(assembly: Assembly, places: np.ndarray, reach: float) -> list[
     Raises
     ------
     ModelError
-        Where fewer than two parts are within reach, naming the place.
+        If fewer than two parts are within reach; the message names the place.
     """
     present = np.unique(assembly.shells.part)
     surfaces = [

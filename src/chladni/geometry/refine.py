@@ -1,7 +1,7 @@
-"""The same structure with every shell split in four, every beam in two: what the mesh hides shows.
+"""Refinement of a structure, every shell split in four and every beam in two, to find mesh error.
 
-New nodes lie on the smooth surface through the old ones where the sheet is smooth (cubic edges
-from vertex normals, Vlachos et al. 2001, Curved PN triangles), on the chord at folds.
+On a smooth sheet new nodes lie on the smooth surface through the old ones: cubic edges from vertex
+normals (Vlachos et al. 2001, Curved PN triangles). At folds they lie on the chord.
 """
 
 from dataclasses import replace
@@ -13,22 +13,22 @@ from ..model.assembly import Assembly, Beams, Shells, picked
 from .beam_lines import member_beams
 from .facets import cell_normals, point_normals
 
-SAME_AXES = 1e-6  # of unit vectors: frames of neighbours in which they are held alike
-SMOOTH = np.cos(np.radians(35.0))  # facets that differ by more make a fold
+SAME_AXES = 1e-6  # of unit vectors: frames of neighbours that count as equal for supports
+SMOOTH = np.cos(np.radians(35.0))  # facets whose normals differ by more form a fold
 
 
 def refined(assembly: Assembly) -> Assembly:
-    """The assembly with every shell halved along both directions and every member beam in two.
+    """Halve every shell of the assembly in both directions, and every member beam.
 
-    All else is as it was; what is held at both ends of a side is held between them. Old points keep
-    their rows and ids; new ones follow with new ids. A beam along a side of a shell gets the point
-    that this side got.
+    Everything else is unchanged. A component held at both ends of a side is held between them. Old
+    points keep their rows and ids; new ones follow with new ids. A beam along a side of a shell
+    uses the new point of that side.
     """
     halved, middle = _finer_shells(assembly)
     return _finer_beams(halved, middle)
 
 
-Middles = tuple[np.ndarray, int]  # sides of shells (k, 2) that got a point, the first of these
+Middles = tuple[np.ndarray, int]  # sides of shells (k, 2) with a new point, row of the first point
 
 
 def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
@@ -53,7 +53,7 @@ def _finer_shells(assembly: Assembly) -> tuple[Assembly, Middles]:
 
 
 def _held_between(assembly: Assembly, new: np.ndarray, ends: np.ndarray) -> Assembly:
-    """Points ``new`` (k,) held in what supports hold at all of their ends (k, m), along its axes.
+    """Hold points ``new`` (k,) in the components held at all of their ends (k, m), in that frame.
 
     A clamped edge stays clamped between its old points.
     """
@@ -74,7 +74,7 @@ def _held_between(assembly: Assembly, new: np.ndarray, ends: np.ndarray) -> Asse
 
 
 def _finer_beams(assembly: Assembly, sides: Middles) -> Assembly:
-    """Two beams in place of each member; ``sides`` are those of the shells that were halved."""
+    """Replace each member by two beams; ``sides`` are those of the halved shells."""
     beams, members = assembly.beams, member_beams(assembly)
     if not len(members):
         return assembly
@@ -115,7 +115,7 @@ def _edges(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def smooth_normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex normals (n, 3) and whether all facets of one part agree there (n,)."""
+    """Vertex normals (n, 3), and a mask of the points where all facets of one part agree (n,)."""
     nodes = assembly.shells.nodes
     face, total = (of(assembly.points, nodes) for of in (cell_normals, point_normals))
     least, low, high = (np.full(len(total), v) for v in (1.0, 1e9, -1e9))
@@ -129,7 +129,7 @@ def smooth_normals(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
 def _bent(
     points: np.ndarray, edges: np.ndarray, normal: np.ndarray, smooth: np.ndarray
 ) -> np.ndarray:
-    """Middle of each edge on the cubic through both ends square to both normals."""
+    """Middle of each edge on the cubic through both ends, normal to both normals."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     n_a, n_b = normal[edges[:, 0]], normal[edges[:, 1]]
     d = b - a
@@ -141,13 +141,13 @@ def _bent(
 
 
 def parents(shells: Shells) -> np.ndarray:
-    """The shell every one of the refined mesh is a quarter of (4 m,)."""
+    """Parent shell of every shell of the refined mesh (4 m,)."""
     quad, tri = np.flatnonzero(~shells.triangle), np.flatnonzero(shells.triangle)
     return np.concatenate([np.tile(quad, 4), np.tile(tri, 4)])
 
 
 def _split(shells: Shells, side: np.ndarray, centre: int) -> Shells:
-    """Four shells in place of each: corners, sides and centres as rows of the new points."""
+    """Replace each shell by four; ``side`` and ``centre`` are rows of the new points."""
     c, t = shells.nodes, shells.thickness
     tri = np.flatnonzero(shells.triangle)
     quad = np.flatnonzero(~shells.triangle)

@@ -1,4 +1,4 @@
-"""A scan brought onto the shells it was taken of."""
+"""Alignment of a scan with the shells of the scanned parts."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from .thickness_alignment import Alignment, align
 
 
 def align_scan(assembly: Assembly, scan: FormedMesh, allow_mirror: bool = False) -> Alignment:
-    """The best of three: the scan lies on one face of the sheets, on the other, or on both."""
+    """The best of three alignments: to the mid-surface, and to either face of the sheets."""
     shells, n = assembly.shells, len(assembly.points)
     t = np.nan_to_num(point_means(shells.nodes, shells.thickness, n))[:, None]
     face = t / 2 * point_normals(assembly.points, shells.nodes)
@@ -22,7 +22,7 @@ def align_scan(assembly: Assembly, scan: FormedMesh, allow_mirror: bool = False)
 
 
 def as_sheet(points: np.ndarray, cells: np.ndarray) -> FormedMesh:
-    """A scan (n, 3), (m, 4) as the mesh of a sheet whose thickness is not known."""
+    """A scan (n, 3), (m, 4) as the mesh of a sheet of unknown thickness."""
     n, m = len(points), len(cells)
     unknown = np.full((m, 4), np.nan)
     return FormedMesh(np.arange(1, n + 1), points, cells, np.ones(m, int), unknown)

@@ -1,9 +1,9 @@
 """Rigid alignment of a forming mesh in press position with the structure in car position.
 
-Starts from where it lies, from the principal axes (four turns) and from three point pairs where
-they are given; each start is improved by trimmed point-to-plane ICP (Chen and Medioni, Image Vis.
-Comput. 10 (1992) 145-155; Chetverikov et al. 2005 for the trimming). Sheets symmetric to a plane
-have a mirrored optimum: reflected starts are tried as well and a mirror image is named.
+The starts are the given position, the principal axes (four rotations) and, if given, three point
+pairs. Each start is improved by trimmed point-to-plane ICP (Chen and Medioni, Image Vis. Comput. 10
+(1992) 145-155; Chetverikov et al. 2005 for the trimming). Sheets symmetric to a plane have a
+mirrored optimum. Therefore reflected starts are tried too, and a mirror image is reported.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from .formed_mesh import FormedMesh
 from .nearest import ShellSurface
 from .thickness_mapping import samples, shell_area
 
-TRIM = 0.8  # share of the points that counts: the rest may have no partner
+TRIM = 0.8  # share of the points that counts; the rest may have no partner
 _ROUGH, _FINE = 400, 2500  # points in the search and in the last improvement
-_NEAR = 5  # shells tried a point; a neighbour's face does as well here
+_NEAR = 5  # shells tried for each point; the face of a neighbour is accurate enough here
 _GATE = 0.5  # least |cos| between the normals of partners
 _REFLECTION = np.diag([1.0, -1.0, 1.0])
 
@@ -34,7 +34,7 @@ class Alignment:
     shift : (3,)          [m]
     residual : float      trimmed rms distance from the structure [m]
     mirrored : bool       R is a reflection: the formed mesh is of the other side
-    start : str           the start that won
+    start : str           name of the best start
     """
 
     rotation: np.ndarray
@@ -45,7 +45,7 @@ class Alignment:
 
 
 def moved(formed: FormedMesh, by: Alignment) -> FormedMesh:
-    """The formed mesh in the structure's place."""
+    """Move the formed mesh to the position of the structure."""
     return replace(formed, points=formed.points @ by.rotation.T + by.shift, nodal=formed.nodal)
 
 
@@ -57,13 +57,13 @@ def align(
     points: tuple[np.ndarray, np.ndarray] | None = None,
     allow_mirror: bool = False,
 ) -> Alignment:
-    """The rigid motion that brings the formed mesh onto the shells of these parts.
+    """The rigid motion that aligns the formed mesh with the shells of these parts.
 
     Parameters
     ----------
-    parts : names of the parts the formed mesh holds; default all with shells
-    points : three or more places on the formed mesh and where they belong, (k, 3) each [m]
-    allow_mirror : accept a reflection where it fits far better than any motion
+    parts : names of the parts in the formed mesh; default all with shells
+    points : three or more places on the formed mesh and on the structure, (k, 3) each [m]
+    allow_mirror : accept a reflection if it fits far better than any motion
 
     Raises
     ------
@@ -113,7 +113,7 @@ def _rows(assembly: Assembly, parts: Sequence[str]) -> np.ndarray:
 
 
 def _sampled(formed: FormedMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places and normals (n, 3) evenly over the area."""
+    """Places and normals (n, 3), evenly distributed over the area."""
     share = np.cumsum(formed.area) / formed.area.sum()
     pick = np.unique(np.searchsorted(share, (np.arange(count) + 0.5) / count))
     at, normal = samples(formed.points, formed.cells[pick])
@@ -132,7 +132,7 @@ def _axes(x: np.ndarray, weight: np.ndarray) -> Motion:
 
 
 def _starts(source: Motion, goal: Motion) -> dict[str, Motion]:
-    """As it lies, and principal axes on principal axes, turned and reflected."""
+    """Starts: the given position and the aligned principal axes, rotated and reflected."""
     out = {"as it lies": (np.eye(3), np.zeros(3))}
     out["as it lies, mirrored"] = (_REFLECTION, goal[1] - _REFLECTION @ source[1])
     for a in (1, -1):

@@ -1,9 +1,9 @@
 """Thickness from a forming mesh to a finite element mesh, part by part.
 
-Each shell is sampled at its Gauss points, so that the integral of the thickness survives sharp
-folds; a sample takes the value of the nearest place of the formed sheet that faces the same way
-and is not too far. What finds no partner (the folded flange of a hem, which is flat in the blank)
-keeps its thickness and is reported as uncovered.
+Each shell is sampled at its Gauss points, so that the integral of the thickness is preserved at
+sharp folds. A sample takes the value of the nearest place of the formed sheet with a similar
+normal, within a reach. Shells without such a place keep their thickness and are reported as
+uncovered (the folded flange of a hem, which is flat in the blank).
 """
 
 from collections.abc import Mapping
@@ -26,17 +26,17 @@ _GAUSS = np.array([_NEAR**2, _NEAR * _FAR, _FAR**2, _NEAR * _FAR])  # weights of
 
 @dataclass(frozen=True)
 class PartMapping:
-    """How one part fared.
+    """The result of the mapping for one part.
 
     Attributes
     ----------
     part : str
-    source : str             name or number of the formed part it was taken from
-    coverage : float         share of the area that found a partner
+    source : str             name or number of the formed part
+    coverage : float         share of the area with a partner
     distance_95 : float      95th percentile of the distance to it [m]
     mean : float             area mean of the mapped thickness [m]
     mass_before, mass_after : float  [kg]
-    round_trip : float       rms of formed -> mesh -> formed, relative to t; nan of points, scans
+    round_trip : float       rms of formed -> mesh -> formed, relative to t; nan for points, scans
     """
 
     part: str
@@ -51,19 +51,19 @@ class PartMapping:
 
 @dataclass(frozen=True, eq=False)
 class Mapped:
-    """The assembly with mapped thickness and what happened on the way."""
+    """The assembly with mapped thickness, and the results for its parts."""
 
     assembly: Assembly
     parts: tuple[PartMapping, ...]
 
     @property
     def mass_before(self) -> float:
-        """Of the mapped parts [kg]."""
+        """Mass of the mapped parts before the mapping [kg]."""
         return sum(p.mass_before for p in self.parts)
 
     @property
     def mass_after(self) -> float:
-        """Of the mapped parts [kg]."""
+        """Mass of the mapped parts after the mapping [kg]."""
         return sum(p.mass_after for p in self.parts)
 
 
@@ -93,13 +93,13 @@ def area_mean(assembly: Assembly, rows: np.ndarray) -> float:
 
 
 def _cell_mean(nodes: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Mean over the corners; a triangle's repeated one counts once."""
+    """Mean over the corners; the repeated corner of a triangle counts once."""
     triangle = nodes[:, 2] == nodes[:, 3]
     return np.where(triangle, t[:, :3].mean(axis=1), t.mean(axis=1))
 
 
 def samples(points: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points (n, 4, 3) of the cells, one beside each corner, and cell normals (n, 3)."""
+    """Gauss points (n, 4, 3) of the cells, one near each corner, and cell normals (n, 3)."""
     x = points[nodes]
     at = np.stack([np.einsum("c,nci->ni", np.roll(_GAUSS, k), x) for k in range(4)], axis=1)
     return at, cell_normals(points, nodes)
@@ -113,17 +113,16 @@ def map_thickness(
     reach: float | None = None,
     facing: float = FACING,
 ) -> Mapped:
-    """The assembly with the formed mesh's thickness at its shells' corners.
+    """Map the thickness of a formed mesh to the corners of the shells.
 
     Parameters
     ----------
     pairs : dict, optional
-        Part of the assembly -> part id of the formed mesh. Without it parts of the same name or
-        id belong together; where there are none, each connected sheet goes to the part it lies
-        on, so that two sheets a millimetre apart are never mixed.
+        Part of the assembly -> part id of the formed mesh. By default parts of the same name belong
+        together. Without such parts, each connected sheet is assigned to the part on which it lies,
+        so that two sheets a millimetre apart are never mixed.
     reach : float, optional
-        Partners farther away do not count [m]; default a third of the median shell size, at most
-        6 mm.
+        Largest distance of a partner [m]; default a third of the median shell size, 1.5 to 6 mm.
     facing : float
         Least |cos| between the normals of partners.
 
@@ -186,7 +185,7 @@ def _same_name(assembly: Assembly, formed: FormedMesh, present: list[int]) -> di
 def _by_place(
     assembly: Assembly, formed: FormedMesh, present: list[int], reach: float, facing: float
 ) -> dict[int, tuple[str, FormedMesh]]:
-    """Connected sheets of the formed mesh, each given to the part whose shells lie on it."""
+    """Connected sheets of the formed mesh, each assigned to the part whose shells lie on it."""
     piece = components(formed.cells, len(formed.points))[formed.cells[:, 0]]
     surfaces = {
         p: ShellSurface.of(assembly, np.flatnonzero(assembly.shells.part == p)) for p in present
@@ -219,7 +218,7 @@ def _cells_of(formed: FormedMesh, mine: np.ndarray) -> FormedMesh:
 def values_at(
     formed: FormedMesh, places: np.ndarray, normal: np.ndarray, reach: float, facing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Thickness and distance (n,) of the nearest facing place; NaN and inf where there is none."""
+    """Thickness and distance (n,) of the nearest facing place; NaN and inf without a partner."""
     if not len(formed.cells):
         return _from_points(formed, places, reach)
     surface = ShellSurface.over("the formed mesh", formed.points, formed.cells)
@@ -245,7 +244,7 @@ def _from_points(
 def _sampled(
     assembly: Assembly, rows: np.ndarray, formed: FormedMesh, reach: float, facing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Thickness at the corners (n, 4), NaN where nothing was found, and distances (n, 4)."""
+    """Thickness at the corners (n, 4), NaN without a partner, and distances (n, 4)."""
     at, normal = samples(assembly.points, assembly.shells.nodes[rows])
     t, far = values_at(formed, at.reshape(-1, 3), np.repeat(normal, 4, axis=0), reach, facing)
     t, far = t.reshape(-1, 4), far.reshape(-1, 4)
@@ -253,7 +252,7 @@ def _sampled(
 
 
 def completed(t: np.ndarray) -> np.ndarray:
-    """Shells of which some samples found a partner take the mean of these for the others."""
+    """Fill missing samples of a shell with the mean of its others; NaN if fewer than two exist."""
     known = np.isfinite(t)
     count = known.sum(axis=1)
     mean = np.where(known, t, 0).sum(axis=1) / np.maximum(count, 1)

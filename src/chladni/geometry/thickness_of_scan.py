@@ -1,8 +1,9 @@
 """Thickness of sheets from a scan of both their faces.
 
-For a place x of the shells the upper face is looked for from x + t₀ n and the lower from x - t₀ n
-(t₀ the gauge, n the shell's normal): the thickness is the distance of the two feet along n. Where
-the shells lie between the faces does not matter as long as they are less than t₀ off the middle.
+Let x be a place of the shells, n its normal and t₀ the gauge. The upper face is the nearest point
+to x + t₀ n, the lower face that to x - t₀ n. The thickness is the distance of these two points
+along n. The position of the shells between the faces does not matter, as long as they are
+less than t₀ off the middle.
 """
 
 from dataclasses import replace
@@ -23,20 +24,20 @@ from .thickness_mapping import (
     shell_mass,
 )
 
-THINNEST, THICKEST = 0.3, 1.7  # of the gauge: what lies outside is another face, or none
-LEAST_COVERED = 0.05  # of the area: an open scan finds hardly two faces
+THINNEST, THICKEST = 0.3, 1.7  # of the gauge: limits of an accepted thickness
+LEAST_COVERED = 0.05  # of the area: a scan of one face has less with two faces
 
 
 def thickness_of_scan(assembly: Assembly, points: np.ndarray, cells: np.ndarray) -> Mapped:
-    """The assembly with the thickness of a scan (n, 3), (m, 4) at its shells' corners [m].
+    """Map the thickness of a scan (n, 3), (m, 4) to the corners of the shells [m].
 
-    A part's ``distance_95`` is how far its shells are from the middle of the sheet. What has no
-    two faces keeps its thickness.
+    ``distance_95`` of a part is the distance of its shells from the middle of the sheet. Shells
+    without two faces keep their thickness.
 
     Raises
     ------
     ModelError
-        If hardly any shell lies between two faces of the scan.
+        If less than ``LEAST_COVERED`` of the area lies between two faces of the scan.
     """
     shells = assembly.shells
     at, normal = samples(assembly.points, shells.nodes)
@@ -62,7 +63,7 @@ def thickness_of_scan(assembly: Assembly, points: np.ndarray, cells: np.ndarray)
 def _between(
     surface: ShellSurface, at: np.ndarray, normal: np.ndarray, gauge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Thickness at each place, NaN where there are no two faces, and the middle's distance."""
+    """Thickness at each place, NaN without two faces, and the distance from the middle."""
     height = []
     for side in (1.0, -1.0):
         start = at + side * gauge[:, None] * normal

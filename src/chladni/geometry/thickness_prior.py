@@ -1,9 +1,9 @@
-"""Thickness guessed from curvature where no forming data exist, with the spread to expect.
+"""Thickness predicted from curvature for parts without forming data, with its uncertainty.
 
-Thinning 1 - t/t₀ is a linear function of how bent the sheet is at a place and around it; it is
-learned from parts whose thickness was mapped. Pressing tools differ, so parts differ more than
-places: each part draws its own strength from a distribution whose spread is learned too, and
-leave-one-part-out errors say what the guess is worth on a part never seen.
+Thinning 1 - t/t₀ is a linear function of the curvature at a place and around it. It is learned from
+parts with mapped thickness. Pressing tools differ, so that parts differ more than places. Each part
+has its own strength from a distribution whose standard deviation is learned too. Leave-one-part-out
+errors give the accuracy on an unseen part.
 """
 
 from dataclasses import dataclass, replace
@@ -31,8 +31,8 @@ class ThinningModel:
     beta : (3,)            of FEATURES
     part_spread : float    standard deviation of a part's strength, relative
     place_spread : float   of a place within a part [-]
-    left_out : dict        part -> rms error of t/t₀ predicted from all others
-    trivial : dict         part -> rms error of t/t₀ when the gauge is kept
+    left_out : dict        part -> rms error of t/t₀ predicted from all other parts
+    trivial : dict         part -> rms error of t/t₀ for the gauge thickness
     """
 
     beta: np.ndarray
@@ -43,7 +43,7 @@ class ThinningModel:
 
 
 def gauge(assembly: Assembly) -> np.ndarray:
-    """Thickness of the blank of every shell (n,): its section's [m]."""
+    """Thickness of the blank of every shell (n,), that of its section [m]."""
     out = []
     for part in assembly.parts:
         known = isinstance(part.section, ShellSection)
@@ -52,7 +52,7 @@ def gauge(assembly: Assembly) -> np.ndarray:
 
 
 def features(assembly: Assembly) -> np.ndarray:
-    """One, κ/(κ + 25) of each shell and its mean within 20 mm on the same part (n, 3)."""
+    """1, κ/(κ + 25) of each shell, and its mean within 20 mm on the same part (n, 3)."""
     kappa = part_curvature(assembly).mean(axis=1)
     bent = kappa / (kappa + HALF)
     middle, area = assembly.points[assembly.shells.nodes].mean(axis=1), shell_area(assembly)
@@ -65,12 +65,12 @@ def features(assembly: Assembly) -> np.ndarray:
 
 
 def learn(assembly: Assembly, parts: tuple[str, ...] = ()) -> ThinningModel:
-    """The model from the parts of an assembly with mapped thickness.
+    """Fit the model to the parts of an assembly with mapped thickness.
 
     Raises
     ------
     ModelError
-        If fewer than three parts have a thickness other than their gauge's.
+        If fewer than three parts have a thickness other than their gauge.
     """
     X, y = features(assembly), 1 - assembly.thickness() / gauge(assembly)
     weight = shell_area(assembly)
@@ -103,7 +103,7 @@ def _rms(error: np.ndarray, weight: np.ndarray) -> float:
 
 
 def _fit(X: np.ndarray, y: np.ndarray, weight: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
-    """Weighted least squares with every part of the same total weight."""
+    """Weighted least squares with the same total weight for every part."""
     r = np.concatenate(rows)
     w = np.concatenate([weight[k] / weight[k].sum() for k in rows])
     root = np.sqrt(w)[:, None]
@@ -111,7 +111,7 @@ def _fit(X: np.ndarray, y: np.ndarray, weight: np.ndarray, rows: list[np.ndarray
 
 
 def _strength(guess: np.ndarray, y: np.ndarray, weight: np.ndarray) -> float:
-    """Scale of the guess that fits a part best."""
+    """Scale of the prediction that fits a part best."""
     return float((weight * guess * y).sum() / np.maximum((weight * guess**2).sum(), 1e-30))
 
 
@@ -124,7 +124,7 @@ def predict(assembly: Assembly, model: ThinningModel) -> tuple[np.ndarray, np.nd
 
 
 def with_predicted(assembly: Assembly, model: ThinningModel) -> Assembly:
-    """The assembly with the predicted thickness on every shell."""
+    """Set the predicted thickness on every shell."""
     t, _ = predict(assembly, model)
     shells = replace(assembly.shells, thickness=np.repeat(t[:, None], 4, axis=1))
     return replace(assembly, shells=shells)
