@@ -1,4 +1,4 @@
-"""Receptance of modes that damping couples: dashpots, loss factors, modal damping, all at once."""
+"""Receptance of modes coupled by damping: dashpots, loss factors and modal damping together."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from .frf import Residual
 from .modes import ModalModel
 
-_ENTRIES = 2_000_000  # of the matrices that are held at a time
+_ENTRIES = 2_000_000  # of the matrices in memory at a time
 
 
 def coupled_receptance(
@@ -29,7 +29,7 @@ def coupled_receptance(
     phi_out, phi_in : (n_out, r), (n_in, r)   rows of Φ or combinations [1/√kg]
     frequency : (n_f,)                        [Hz]
     V, loss : (n, n) sparse, optional         [N s/m], imaginary stiffness [N/m]
-    structural :                              2 i ζ Λ in place of the viscous modal term
+    structural :                              2 i ζ Λ instead of the viscous modal term
 
     Returns
     -------

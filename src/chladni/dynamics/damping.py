@@ -1,4 +1,4 @@
-"""Where damping ratios come from, and matrices that carry them."""
+"""Sources of damping ratios, and damping matrices."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -19,7 +19,7 @@ class DampingTable:
 
     Attributes
     ----------
-    frequency : (k,)  Hz, not decreasing; a doubled frequency is a jump, its mean counts there
+    frequency : (k,)  Hz, not decreasing; a repeated frequency is a jump, with the mean value there
     value : (k,)      structural damping g (``kind`` "g", Nastran's default when TYPE is absent),
                       fraction of critical ("crit") or quality factor ("q")
     """
@@ -43,7 +43,7 @@ class DampingTable:
 
 
 def _piecewise(x: np.ndarray, knots: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Linear interpolation; beyond the ends along the last segment of some length."""
+    """Linear interpolation; beyond the ends along the last segment of nonzero length."""
     u = np.unique(knots)
     if len(u) == 1:
         return np.full(x.shape, float(np.mean(value)))
@@ -58,17 +58,17 @@ def _piecewise(x: np.ndarray, knots: np.ndarray, value: np.ndarray) -> np.ndarra
 
 
 def with_table(modal: ModalModel, table: DampingTable) -> ModalModel:
-    """The modes with damping ratios read from a table at their frequencies."""
+    """Set damping ratios of modes from a table at their frequencies."""
     return modal.with_damping(table.ratio(modal.frequency))
 
 
 def hysteretic(system: System, g: float) -> System:
-    """K (1 + i g): structural damping of the whole (PARAM,G)."""
+    """K (1 + i g): structural damping of the whole structure (PARAM,G)."""
     return replace(system, K=sp.csr_array(system.K * (1 + 1j * g)))
 
 
 def modal_damping(system: System, modal: ModalModel) -> tuple[np.ndarray, np.ndarray]:
-    """V = U diag(d) Uᵀ with U = M Φ (n, r) and d = 2 ζ_r ω_r: damps mode r by ζ_r, no other.
+    """V = U diag(d) Uᵀ with U = M Φ (n, r) and d = 2 ζ_r ω_r: damps only mode r by ζ_r.
 
     With unit modal masses this is M X diag(2 ζ ω m) Xᵀ M (Abrahamsson and Kammer 2015, 26.14).
     """

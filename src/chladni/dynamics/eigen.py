@@ -19,17 +19,17 @@ from .modes import ModalModel
 from .system import System
 
 _DENSE = 300  # dofs; below, LAPACK is as fast
-_GUESS = 1e-8  # of the median K_ii/M_ii: where a shift lies well for 10³ to 10⁶ dofs
-_FAR, _NEAR = 1.0, 1e-7  # σ/λ_k between which a shift serves
-_SHARP = 1e-4  # error of a Ritz value good enough to tell a gap
+_GUESS = 1e-8  # of the median K_ii/M_ii: a good shift for 10³ to 10⁶ dofs
+_FAR, _NEAR = 1.0, 1e-7  # limits of σ/λ_k for a usable shift
+_SHARP = 1e-4  # error of a Ritz value that is small enough to identify a gap
 _ORTHONORMAL = 1e-8
 _RESIDUAL = 1e-5
-_LOOSE = 1e-6  # Ritz error of a mode handed out (frequencies are as good as its square)
-_SHARP_SHARE = 1e-6  # of -1/σ: θ that one shift tells to ten digits
+_LOOSE = 1e-6  # largest Ritz error of a returned mode (the error of frequencies is its square)
+_SHARP_SHARE = 1e-6  # of -1/σ: θ that one shift gives to ten digits
 _TOLD = 1e-13  # of it: θ below this are rounding
 _FIRM = 1e-6  # of the median K_ii/M_ii: first shift of small systems
-_ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ that rounding of K makes of a rigid motion
-_EXTREME = 1e-2  # of the median K_ii/M_ii: a motion so light that rounding exceeds it is massless
+_ROUNDING = 1e-12  # of the largest K_ii/M_ii: λ of a rigid motion due to rounding of K
+_EXTREME = 1e-2  # of the median K_ii/M_ii: upper limit of λ that counts as rounding
 Modes = tuple[np.ndarray, np.ndarray]  # λ (k,), Φ (n, k)
 _JUST_ABOVE = 1 + 1e-6  # a band that ends at a mode includes it, whatever the rounding
 
@@ -47,23 +47,23 @@ def normal_modes(
     """The lowest modes, K φ_r = ω_r² M φ_r with Φᵀ M Φ = I, undamped.
 
     Block Lanczos on (K - σM)⁻¹M with σ < 0, so that free structures and rigid modes need no special
-    care; the number of eigenvalues below a value just above the last mode, by the inertia of
-    K - s M (Sylvester), proves that none is missing.
+    treatment. The inertia of K - s M (Sylvester) gives the number of eigenvalues below s, a value
+    just above the last mode. It proves that no mode is missing.
 
     Parameters
     ----------
-    count : int, optional       how many; default all of a small system (or one with little that
-                                has mass), else 20
-    band : float, optional      or all up to this frequency [Hz] (both: the fewer)
+    count : int, optional       number of modes; default all of a small system (or of one with few
+                                dofs with mass), else 20
+    band : float, optional      all modes up to this frequency [Hz] (with ``count``: the fewer)
     shift : float, optional     σ [rad²/s²], negative; default from the scale of the problem
     points : (n, 3), optional   place of each row's node [m]: a better elimination order
     backend : str               of :func:`factorise`
-    proof : bool                False leaves the Sturm count out (a quarter of the time)
+    proof : bool                False omits the Sturm count (a quarter of the time)
 
     Raises
     ------
     ModelError
-        If the shifted stiffness is not positive definite; the sentence names a dof.
+        If the shifted stiffness is not positive definite; the message names a dof.
     AccuracyError
         If modes are missing, not mass-orthonormal, or no eigenvectors.
     """
@@ -91,7 +91,7 @@ def normal_modes(
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """K and M, real, and the elimination order that serves every K - σM; M in that order too."""
+    """Real K and M, the elimination order for every K - σM, and M in that order."""
 
     K: sp.csr_array
     M: sp.csr_array
@@ -107,7 +107,7 @@ class _Problem:
         return A[:, self.fronts.order]
 
     def factor(self, sigma: float) -> Factor:
-        """Positive definite factorisation of K - σM in that order; who is at fault is named."""
+        """Positive definite factorisation of K - σM in that order; an error names the dof."""
         A = self.shifted(self.K, sigma)
         try:
             return factorise(A, backend=self.backend, fronts=self.fronts.ordered())
@@ -119,7 +119,7 @@ class _Problem:
             ) from error
 
     def below(self, s: float) -> int:
-        """How many eigenvalues are below s: the negative ones of K - s M (Sylvester)."""
+        """Number of eigenvalues below s: the negative ones of K - s M (Sylvester)."""
         for firm, nudge in product((False, True), (0.0, 1e-7, -1e-7)):
             K = stiffened(self.K) if firm else self.K
             try:
@@ -131,7 +131,7 @@ class _Problem:
 
 @dataclass(frozen=True)
 class _Scale:
-    """What λ are like [rad²/s²]: median K_ii/M_ii of the translations, and λ that is rounding."""
+    """Scale of λ [rad²/s²]: median K_ii/M_ii of the translations, and the λ due to rounding."""
 
     typical: float
     rounding: float
@@ -143,15 +143,15 @@ class _Scale:
 
 
 def _scale(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> _Scale:
-    """Both from K_ii/M_ii of what has mass: in rad²/s² for every dof, whatever the units.
+    """Scale of λ from K_ii/M_ii of dofs with mass: in rad²/s² for every dof, in any units.
 
-    Translations are one kind, so their median is blind to the unit of length. Rounding of K makes
-    λ ~ ε max K_ii/M_ii of a rigid motion, which a node of little inertia drives up.
+    The median of the translations does not depend on the unit of length. Rounding of K gives a
+    rigid motion λ ~ ε max K_ii/M_ii, which is large with a node of small inertia.
 
     Raises
     ------
     ModelError
-        If a degree of freedom has neither stiffness nor mass; the sentence names some.
+        If a degree of freedom has neither stiffness nor mass; the message names some.
     """
     k, m = K.diagonal(), M.diagonal()
     if len(empty := np.flatnonzero((k <= 0) & (m <= 0))):
@@ -170,9 +170,9 @@ def _scale(K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray) -> _Scale:
 def _dense(
     K: sp.csr_array, M: sp.csr_array, dofs: np.ndarray, count: int | None, limit: float
 ) -> Modes:
-    """Modes by LAPACK, as many as asked for or up to the first beyond ``limit``.
+    """Modes by LAPACK: ``count`` of them, or up to the first beyond ``limit``.
 
-    Massless motions have no modes of their own.
+    Massless motions have no modes.
     """
     return _small(K, M, _scale(K, M, dofs), count, limit)
 
@@ -180,7 +180,7 @@ def _dense(
 def _small(
     K: sp.csr_array, M: sp.csr_array, scale: _Scale, count: int | None, limit: float
 ) -> Modes:
-    """The same with the scale known."""
+    """Modes by LAPACK for a known scale of λ."""
     count = K.shape[0] if count is None else count
     for A in (K, stiffened(K)):
         try:
@@ -203,7 +203,7 @@ def _condensed(
     count: int | None,
     limit: float,
 ) -> Modes:
-    """Modes of the few dofs with mass; the others follow them, φ_s = -K_ss⁻¹ K_sm φ_m."""
+    """Modes of the few dofs with mass; the others follow by φ_s = -K_ss⁻¹ K_sm φ_m."""
     K_ss, K_sm = K[~massive][:, ~massive], K[~massive][:, massive]
     try:
         factor = factorise(K_ss, nodes=dofs[~massive, 0])
@@ -219,10 +219,10 @@ def _condensed(
 
 
 def _by_shifts(K: np.ndarray, M: np.ndarray, sigma: float, count: int, limit: float) -> Modes:
-    """Modes from M' φ = θ (K - σM) φ, θ = 1/(λ - σ); M' = M - M Φ Φᵀ M leaves out those found.
+    """Modes from M' φ = θ (K - σM) φ, θ = 1/(λ - σ); M' = M - M Φ Φᵀ M excludes known modes.
 
-    M may be singular: there λ = ∞ is θ = 0. A shift tells λ up to 10⁶ times its own size to ten
-    digits, so it is renewed until ``count`` are found, or one beyond ``limit``, or all finite ones.
+    M may be singular: then λ = ∞ is θ = 0. A shift gives λ up to 10⁶ times its size to ten digits.
+    It is changed until ``count`` modes, one beyond ``limit``, or all finite ones are found.
     """
     lam, phi, n = np.zeros(0), np.zeros((len(K), 0)), len(K)
     k, m = K.diagonal(), M.diagonal()
@@ -239,7 +239,7 @@ def _by_shifts(K: np.ndarray, M: np.ndarray, sigma: float, count: int, limit: fl
 
 
 def _orthonormal(phi: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """Φ L⁻ᵀ with L Lᵀ = Φᵀ M Φ: each mode is made orthogonal to those before it."""
+    """Φ L⁻ᵀ with L Lᵀ = Φᵀ M Φ: each mode is made orthogonal to the previous ones."""
     if not phi.shape[1]:
         return phi
     L = cholesky(phi.T @ M @ phi, lower=True)
@@ -247,7 +247,7 @@ def _orthonormal(phi: np.ndarray, M: np.ndarray) -> np.ndarray:
 
 
 def _held(solved: Callable[[_Problem], Modes], problem: _Problem) -> Modes:
-    """Modes of the problem; where it is singular, of the one whose massless motions are held."""
+    """Modes of the problem; if it is singular, with its massless motions held."""
     try:
         return solved(problem)
     except (ModelError, LinAlgError) as fault:
@@ -262,7 +262,7 @@ def _held(solved: Callable[[_Problem], Modes], problem: _Problem) -> Modes:
 def _sparse(
     problem: _Problem, count: int | None, limit: float, shift: float | None, proof: bool
 ) -> Modes:
-    """The ``count`` lowest modes, or 20, those beyond ``limit`` not cared for."""
+    """The ``count`` lowest modes, default 20; modes beyond ``limit`` may be inaccurate."""
     due = problem.below(limit) if count is None and np.isfinite(limit) else None
     k = count or 20 if due is None else due
     if k == 0:
@@ -285,7 +285,7 @@ def _sparse(
 
 
 def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, Factor, Ritz]:
-    """Lanczos from a shift that suits; a guessed one is renewed when it lies far from the modes."""
+    """Lanczos from a suitable shift; a guessed shift is replaced if it is far from the modes."""
     sigma = shift
     if sigma is None:
         sigma = -_GUESS * _scale(problem.K, problem.M, problem.dofs).typical
@@ -311,7 +311,7 @@ def _converged(problem: _Problem, k: int, shift: float | None) -> tuple[float, F
 
 
 def _heaviest(problem: _Problem) -> str:
-    """Which translation weighs how many times the median one."""
+    """Sentence on the translation with the largest mass relative to the median."""
     d = np.where(problem.dofs[:, 1] <= 3, problem.M.diagonal(), 0.0)
     k, usual = int(np.argmax(d)), np.median(d[d > 0]) if np.any(d > 0) else np.inf
     return (
@@ -321,7 +321,7 @@ def _heaviest(problem: _Problem) -> str:
 
 
 def _gap_above(lam: np.ndarray, error: np.ndarray, k: int) -> tuple[float, int]:
-    """A value in the widest gap above the k-th mode that Ritz values can tell, how many below."""
+    """A value in the widest gap of sharp Ritz values above the k-th mode, number of modes below."""
     sharp = np.flatnonzero(error > _SHARP)
     last = max(int(sharp[0]) if len(sharp) else len(lam), k + 1)
     gaps = np.diff(lam[k - 1 : last]) / np.abs(lam[k:last])
@@ -338,9 +338,10 @@ def _completed(
     s: float,
     due: int,
 ) -> Modes:
-    """All ``due`` modes below s: those missing are looked for beside the found ones.
+    """All ``due`` modes below s: missing modes are searched with the known ones locked.
 
-    A block of eight sees eight of a multiple eigenvalue; the next round sees the next eight.
+    A block finds at most as many copies of a multiple eigenvalue as it has columns; the next round
+    finds the next ones.
     """
     for attempt in range(1, 5):
         if (missing := due - int(np.sum(lam < s))) <= 0:

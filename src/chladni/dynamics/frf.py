@@ -1,4 +1,4 @@
-"""Frequency response functions: the labelled array where test and model meet."""
+"""Frequency response functions: the labelled array common to test and model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,11 +21,11 @@ UNIT = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s²/N", "tra
 _ORDER = {q: k for k, q in enumerate(get_args(Quantity)[:3])}  # displacement, velocity, ...
 
 
-_LOOSELY = 0.01  # beyond 0 and 1: rounding of who wrote a coherence
+_LOOSELY = 0.01  # beyond 0 and 1: rounding in the file of a coherence
 
 
 def _coherence(gamma: np.ndarray) -> np.ndarray:
-    """Within 0 and 1; refused where it is in percent, or no coherence at all."""
+    """Clip a coherence to 0 and 1; raise ``ShapeError`` for percent or other values."""
     low, high = float(np.min(gamma)), float(np.max(gamma))
     if not (low >= -_LOOSELY and high <= 1 + _LOOSELY):
         raise ShapeError(
@@ -92,7 +92,7 @@ class FRF:
         inputs: Sequence[str] | None = None,
         band: tuple[float, float] = (0.0, np.inf),
     ) -> Self:
-        """The part of it with these labels (in this order) and within this band [Hz]."""
+        """Select labels (in this order) and a band [Hz]."""
         outputs = self.outputs if outputs is None else tuple(outputs)
         inputs = self.inputs if inputs is None else tuple(inputs)
         k = np.flatnonzero((band[0] <= self.frequency) & (self.frequency <= band[1]))
@@ -108,15 +108,15 @@ class FRF:
         )
 
     def to(self, quantity: Quantity) -> Self:
-        """The same response as another kinematic quantity: each derivative is a factor iω.
+        """Convert to another kinematic quantity: each derivative is a factor iω.
 
-        Integration knows nothing of the line at 0 Hz and puts NaN there. Transmissibility has no
-        other form. The coherence stays, the variance takes the factor's square.
+        Integration gives NaN at 0 Hz. Transmissibility cannot be converted. The coherence is
+        unchanged; the variance is multiplied by the square of the factor.
 
         Raises
         ------
         LabelError
-            If there is no way from one quantity to the other.
+            If there is no conversion from one quantity to the other.
         """
         if quantity == self.quantity:
             return self
@@ -133,9 +133,9 @@ class FRF:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """What modes above the kept ones contribute, R(s) = R_0 - (s² + σ) R_1 [m/N].
+    """Contribution of the omitted higher modes, R(s) = R_0 - (s² + σ) R_1 [m/N].
 
-    Two terms of the series of Σ φφᵀ/(λ_r + s²) about s² = -σ, over the modes left out.
+    These are two terms of the series of Σ φφᵀ/(λ_r + s²) about s² = -σ, over the omitted modes.
 
     Attributes
     ----------
@@ -168,8 +168,8 @@ def transfer(
     ----------
     phi_out, phi_in : (n_out, r), (n_in, r)  real rows of Φ, or combinations of rows [1/√kg]
     s : (n_f,) complex                       [rad/s]; i ω on the frequency axis
-    structural : bool                        ω_r² (1 + 2 i ζ_r) in place of the viscous term
-    residual : Residual, optional            of the modes left out
+    structural : bool                        ω_r² (1 + 2 i ζ_r) instead of the viscous term
+    residual : Residual, optional            of the omitted modes
 
     Returns
     -------
@@ -206,8 +206,8 @@ def synthesise(
 ) -> FRF:
     """Modal superposition on the frequency axis, H(ω) of :func:`transfer` at s = i ω.
 
-    ``phi_out`` and ``phi_in`` are rows of Φ (``modal.at(labels)``) or any directions. A rigid mode
-    is infinite at 0 Hz in receptance: begin above.
+    ``phi_out`` and ``phi_in`` are rows of Φ (``modal.at(labels)``) or any directions. At 0 Hz the
+    receptance of a rigid mode is infinite: use higher frequencies.
     """
     frequency = np.asarray(frequency, dtype=float)
     s = 2j * np.pi * frequency
@@ -226,7 +226,7 @@ def residual_flexibility(
 ) -> Residual:
     """R_0 = b_oᵀ A⁻¹ b_i - Σ φφᵀ/(λ_r - σ), R_1 = b_oᵀ A⁻¹ M A⁻¹ b_i - ..., A = K - σ M.
 
-    Static attachment modes by one factorisation; σ < 0 lets a free structure be solved
+    The static attachment modes need one factorisation; σ < 0 makes a free structure solvable
     (Craig and Kurdila 2006, §17.5 treats σ = 0).
 
     Parameters
@@ -246,7 +246,7 @@ def residual_flexibility(
 
 
 def residual_shift(modal: ModalModel, f_max: float) -> float:
-    """σ = -λ/100 [rad²/s²], λ the highest kept, or (2π f_max)² where only rigid modes are kept."""
+    """σ = -λ/100 [rad²/s²], λ the highest kept, at least (2π f_max)²."""
     return -1e-2 * (2 * np.pi * max(float(modal.frequency.max(initial=0.0)), f_max)) ** 2
 
 
@@ -266,12 +266,12 @@ def direct_frf(
     structural: float = 0.0,
     points: np.ndarray | None = None,
 ) -> FRF:
-    """Receptance without modes, H(ω) = (K (1 + i g) - ω² M + i ω V)⁻¹: slow, exact, the reference.
+    """Receptance without modes, H(ω) = (K (1 + i g) - ω² M + i ω V)⁻¹: a slow, exact reference.
 
     Parameters
     ----------
     rows_out, rows_in : int  rows of the system
-    structural : float       loss factor g of the whole [-]
+    structural : float       loss factor g of the whole structure [-]
     """
     frequency = np.asarray(frequency, dtype=float)
     load = unit_columns(len(system.dofs), rows_in)

@@ -1,4 +1,4 @@
-"""Static solutions of structures a part of which can move without stiffness and without mass."""
+"""Static solutions of structures with a motion that has neither stiffness nor mass."""
 
 from collections.abc import Callable
 
@@ -11,14 +11,14 @@ from ..sparse.multifrontal import NotDefinite
 from .system import System
 
 _STIFFENED = 1e-13  # of K_ii, added where a motion has neither stiffness nor mass
-_DRIVEN = 1e-3  # of the work of a load, done on that addition: the load drives such a motion
+_DRIVEN = 1e-3  # of the work of a load, done on that addition, from which it drives such a motion
 
 
 def stiffened(K: sp.csr_array) -> sp.csr_array:
-    """K + ε diag K: a motion without stiffness and mass is held, all others keep their digits.
+    """K + ε diag K: holds a motion without stiffness and mass, and keeps the digits of all others.
 
-    Nastran's MECHFIX holds such massless mechanisms as well: a bar that turns about itself
-    between two points without inertia.
+    Nastran's MECHFIX also holds such massless mechanisms: a bar that spins about its axis between
+    two points without inertia.
     """
     return sp.csr_array(K + _STIFFENED * sp.diags_array(K.diagonal()))
 
@@ -31,7 +31,7 @@ def static_solver(
     Raises
     ------
     ModelError
-        If something hangs on nothing, or a column of B drives a motion that nothing resists.
+        If a part is not connected, or a column of B drives a motion without resistance.
     """
     K, M, nodes = sp.csr_array(system.elastic), system.M, system.dofs[:, 0]
     try:

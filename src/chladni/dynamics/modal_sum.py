@@ -1,8 +1,8 @@
-"""Sums over modes between many places: one product of BLAS where Σ over three arrays is asked."""
+"""Sums over modes between many places: the sum over three arrays as one BLAS product."""
 
 import numpy as np
 
-AT_ONCE = 2_000_000  # numbers in memory of what left and right make together
+AT_ONCE = 2_000_000  # numbers in memory of the products of left and right
 
 
 def modal_sum(left: np.ndarray, d: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from ..arrays import readonly
 from ..dofs import parse, rows
 from ..errors import LabelError, ShapeError
 
-_RIGID_GAP = 100.0  # a jump in frequency no structure makes between two flexible modes
+_RIGID_GAP = 100.0  # ratio of frequencies that does not occur between two flexible modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class ModalModel:
         return len(self.frequency)
 
     def with_damping(self, zeta: float | np.ndarray) -> Self:
-        """The same modes with damping ratio zeta (one for all, or one each)."""
+        """Copy of the modes with damping ratio zeta (one for all, or one each)."""
         return replace(self, damping=np.broadcast_to(np.asarray(zeta, float), self.frequency.shape))
 
     def sel(self, modes: np.ndarray | slice) -> Self:
@@ -61,7 +61,7 @@ class ModalModel:
         Raises
         ------
         LabelError
-            If a label has no row; the sentence names it and some there are.
+            If a label has no row; the message names it and some existing ones.
         """
         asked = np.array([parse(text) for text in labels], dtype=np.int64).reshape(-1, 3)
         found = rows(asked[:, :2], self.dofs)
@@ -72,12 +72,12 @@ class ModalModel:
 
 
 def rigid_modes(modal: ModalModel) -> np.ndarray:
-    """True for modes without stiffness: a frequency jump of 100 or more follows (r,) bool.
+    """Mask (r,) of the modes below the last frequency jump of 100 or more: modes without stiffness.
 
-    Rounding gives each a frequency of its own near zero, so that the last jump counts. Modes of a
-    soft suspension lie within a factor of 100 of the first flexible mode and are not counted; a
-    model whose modes are all of 0 Hz has no jump and counts none. Residual vectors are no modes:
-    their frequencies jump, too, so that a model is judged before it has them.
+    Rounding gives every rigid mode a different frequency near zero, so that the last jump counts.
+    Modes of a soft suspension lie within a factor of 100 of the first flexible mode and are not
+    counted. A model with all modes at 0 Hz has no jump and no rigid modes in this sense. The
+    frequencies of residual vectors jump too: apply the function before they are added.
     """
     f = modal.frequency
     jumps = np.flatnonzero((f[1:] > 0) & (f[1:] >= _RIGID_GAP * f[:-1]))

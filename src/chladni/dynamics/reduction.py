@@ -1,8 +1,8 @@
-"""Galerkin bases that can carry the operators a search will try.
+"""Galerkin bases that represent the operators tried in a search.
 
-A basis of normal modes alone is blind to point springs, joints and stiff patches; static responses
-to loads at those places (attachment modes) are added and everything is made M-orthonormal with a
-relative cut.
+A basis of normal modes alone does not represent point springs, joints and stiff patches. Static
+responses to loads at these places (attachment modes) are added. The result is made M-orthonormal
+with a relative cut.
 Craig and Kurdila (2006), Fundamentals of Structural Dynamics, ch. 17.
 """
 
@@ -21,18 +21,18 @@ from .massless import stiffened
 from .system import System
 
 CUT = 1e-5  # relative length below which a vector adds nothing to a basis
-MASSLESS = 1e-20  # of the heaviest dof moving as far: what rounding leaves of no mass at all
+MASSLESS = 1e-20  # of the heaviest dof with the largest motion: a smaller mass is rounding
 COLUMNS = 32  # of a block that are multiplied at once
-ROWS = 4096  # of an operator that are multiplied at once, or the product is as large as a basis
+ROWS = 4096  # of an operator that are multiplied at once, to keep the product smaller than a basis
 
 
 def orthonormal(
     M: sp.csr_array, blocks: Sequence[np.ndarray], cut: float = CUT, kept: int = 0
 ) -> np.ndarray:
-    """Φ with ΦᵀMΦ = I that spans the blocks, in their order (n, r).
+    """Φ (n, r) with ΦᵀMΦ = I that spans the blocks, in their order.
 
-    A vector whose M-norm falls below ``cut`` of what it was, once the earlier ones are taken out
-    of it, is dropped.  The first ``kept`` columns are M-orthonormal already and stay as they are.
+    Each vector is made M-orthogonal to the previous ones. It is dropped if its M-norm falls below
+    ``cut`` times the original. The first ``kept`` columns are already M-orthonormal and unchanged.
     """
     out = [blocks[0][:, :kept]]
     for block in (blocks[0][:, kept:], *blocks[1:]):
@@ -43,11 +43,11 @@ def orthonormal(
 def beyond(
     M: sp.csr_array, known: Sequence[np.ndarray], block: np.ndarray, cut: float = CUT
 ) -> np.ndarray:
-    """What a block (n, m) adds to M-orthonormal ones, M-orthonormal itself (n, k).
+    """M-orthonormal vectors (n, k) that a block (n, m) adds to M-orthonormal ones.
 
-    What moves no mass (the spin of a straight row of bars) has no place among them.  The known ones
-    are taken out before and after its own vectors are made unit ones: twice is enough (Giraud et
-    al. 2005, Numerische Mathematik 101, 87-100), once leaves rounding of the large.
+    Motions without mass (the spin of a straight row of bars) are left out. The block is made
+    orthogonal to the known vectors before and after its own normalisation. Two passes are enough
+    (Giraud et al. 2005, Numerische Mathematik 101, 87-100); one pass leaves rounding errors.
     """
     heavy = np.concatenate([(V * (M @ V)).sum(axis=0) for V in _some(block)])
     heaviest = float(M.diagonal().max(initial=0.0)) * (block**2).max(axis=0, initial=0.0)
@@ -64,7 +64,7 @@ def beyond(
 
 
 def _take_out(M: sp.csr_array, known: Sequence[np.ndarray], V: np.ndarray) -> None:
-    """Take from V, in place, what M-orthonormal blocks have of it."""
+    """Make V M-orthogonal to M-orthonormal blocks, in place."""
     for some in _some(V):
         MV = M @ some
         for Q in known:
@@ -72,15 +72,15 @@ def _take_out(M: sp.csr_array, known: Sequence[np.ndarray], V: np.ndarray) -> No
 
 
 def _some(V: np.ndarray) -> Iterator[np.ndarray]:
-    """A few columns at a time: products with all of them are as large as they are."""
+    """Yield a few columns at a time, because products with all of them need much memory."""
     yield from (V[:, k : k + COLUMNS] for k in range(0, max(V.shape[1], 1), COLUMNS))
 
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Φ (n, r) in blocks of columns, which every basis that grows from this one shares with it.
+    """Φ (n, r) in blocks of columns, which all bases grown from this one share.
 
-    Vectors of the structure are what a search has most of; every hypothesis has a few of its own.
+    Most vectors of a search belong to the structure; every hypothesis adds only a few.
     """
 
     blocks: tuple[np.ndarray, ...]
@@ -91,11 +91,11 @@ class Basis:
         return len(self.blocks[0]), sum(block.shape[1] for block in self.blocks)
 
     def grown(self, block: np.ndarray) -> Self:
-        """With more columns (n, k)."""
+        """Add columns (n, k)."""
         return type(self)((*self.blocks, np.ascontiguousarray(block)))
 
     def padded(self, more: int) -> Self:
-        """Over so many more dofs, which no vector moves."""
+        """Add dofs, with zero motion in every vector."""
         return type(self)(tuple(np.pad(block, ((0, more), (0, 0))) for block in self.blocks))
 
     def at(self, dofs: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ class Basis:
         return np.hstack([block[dofs] for block in self.blocks])
 
     def seen(self, rows: sp.csr_array) -> np.ndarray:
-        """B Φ of rows over all dofs or the first of them (k, r)."""
+        """B Φ (k, r) of rows B over all dofs, or over the first of them."""
         return np.hstack([rows @ block[: rows.shape[1]] for block in self.blocks])
 
     def combined(self, q: np.ndarray) -> np.ndarray:
@@ -112,16 +112,16 @@ class Basis:
         return sum(V @ part for V, part in zip(self.blocks, np.split(q, ends), strict=True))
 
     def projected(self, F: np.ndarray) -> np.ndarray:
-        """Φᵀ F of loads on all dofs or the first of them (r, k)."""
+        """Φᵀ F (r, k) of loads F on all dofs, or on the first of them."""
         return np.concatenate([block[: len(F)].T @ F for block in self.blocks])
 
     def reduced(self, A: sp.csr_array) -> np.ndarray:
-        """Φᵀ A Φ of a symmetric operator (r, r), which costs what A has of rows with entries."""
+        """Φᵀ A Φ (r, r) of a symmetric operator; the cost is proportional to its nonempty rows."""
         out = self._times(A, self)
         return (out + out.T) / 2
 
     def bordering(self, A: sp.csr_array) -> np.ndarray:
-        """Φᵀ A V of the block V that came last (r, k)."""
+        """Φᵀ A V (r, k) of the last block V."""
         return self._times(A, type(self)(self.blocks[-1:]))
 
     def _times(self, A: sp.csr_array, right: Self) -> np.ndarray:
@@ -136,13 +136,13 @@ class Basis:
 def shifted(system: System, hertz: float, points: np.ndarray | None = None) -> Factor:
     """Factor of K + (2π f)² M, positive definite for a free structure too.
 
-    The dofs of a node are kept together: to cut between them takes forty times as long to order.
-    What can move without stiffness and without mass is held, as it is where modes are sought.
+    The dofs of a node are kept together, because ordering them separately takes forty times as
+    long. Motions without stiffness and mass are held, as in the computation of modes.
 
     Raises
     ------
     ModelError
-        If something moves without stiffness and mass even so; the sentence says what.
+        If a motion without stiffness and mass remains; the message names its dof.
     """
     mass = (2 * np.pi * hertz) ** 2 * system.M
     try:

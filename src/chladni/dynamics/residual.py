@@ -1,4 +1,4 @@
-"""Residual vectors: what a load moves statically that the modes kept do not span."""
+"""Residual vectors: the static response to a load outside the span of the kept modes."""
 
 from dataclasses import replace
 
@@ -9,9 +9,9 @@ from .massless import static_solver
 from .modes import ModalModel
 from .system import System
 
-_NEAR_STATIC = 1e-6  # of the highest λ kept: the shift that lets a free structure be solved
-_ROUNDING = 1e-18  # of the energy the modes carry: less is rounding, the modes are complete
-_BEYOND = 1e8  # times the highest λ kept: a residual vector above it has no mass to speak of
+_NEAR_STATIC = 1e-6  # of the highest λ kept: the shift that makes a free structure solvable
+_ROUNDING = 1e-18  # of the energy in the modes: less is rounding, and the modes are complete
+_BEYOND = 1e8  # times the highest λ kept: a residual vector above it has practically no mass
 
 
 def with_residual_vectors(
@@ -19,9 +19,9 @@ def with_residual_vectors(
 ) -> ModalModel:
     """The modes and R = (K + ε M)⁻¹ (P - M Φ Φᵀ P) made orthogonal, as modes above them.
 
-    Rayleigh-Ritz in span(R) gives vectors with unit mass that are orthogonal to Φ and to each
-    other in M and K; with them the response to P is exact at low frequencies (Rose, Using residual
-    vectors in MSC/NASTRAN dynamic analysis, 1991; Dickens, Nakagawa and Wittbrodt 1997).
+    Rayleigh-Ritz in span(R) gives vectors with unit mass, orthogonal to Φ and to each other in M
+    and K. With them the response to P is exact at low frequencies (Rose, Using residual vectors in
+    MSC/NASTRAN dynamic analysis, 1991; Dickens, Nakagawa and Wittbrodt 1997).
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def with_residual_vectors(
 
 
 def _ritz(R: np.ndarray, K: np.ndarray, M: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """(λ increasing, vectors of unit mass) of span(R), without those of next to no mass."""
+    """(λ increasing, vectors of unit mass) of span(R), without vectors of negligible mass."""
     if not R.shape[1]:
         return np.zeros(0), R
     R = R / np.sqrt(np.einsum("nk,nk->k", R, K @ R))

@@ -23,7 +23,7 @@ class StateSpace:
     ----------
     A, B, C, D : (n, n), (n, n_in), (n_out, n), (n_out, n_in) real
     outputs, inputs : tuple of str  labels as 412:+Z
-    quantity : str                  what y is: receptance (displacement), mobility, accelerance
+    quantity : str                  of y: receptance (displacement), mobility or accelerance
     """
 
     A: np.ndarray
@@ -42,7 +42,7 @@ class StateSpace:
             object.__setattr__(self, name, readonly(getattr(self, name)))
 
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A [rad/s], by rising modulus, the conjugate with Im < 0 first."""
+        """Eigenvalues of A [rad/s], by increasing modulus, the conjugate with Im < 0 first."""
         p = np.linalg.eigvals(self.A)
         return p[np.lexsort((p.imag, np.round(np.abs(p), 9)))]
 
@@ -66,8 +66,8 @@ def state_space(
 ) -> StateSpace:
     """Blocks [[0, w], [-ω²/w, -2 ζ ω]] over (η, η'/w) of η'' + 2 ζ ω η' + ω² η = φ_iᵀ u; w = ω.
 
-    ``phi_out`` (n_out, r) and ``phi_in`` (n_in, r) are rows of Φ. A rigid mode takes w = 1, and
-    two rigid states make A defective: ``frf`` needs ω > 0 for every mode.
+    ``phi_out`` (n_out, r) and ``phi_in`` (n_in, r) are rows of Φ. A rigid mode has w = 1, and its
+    two states make A defective: ``frf`` needs ω > 0 for every mode.
     """
     omega = 2 * np.pi * modal.frequency
     w, damp = np.where(omega > 0, omega, 1.0), 2 * modal.damping * omega
@@ -88,15 +88,15 @@ def state_space(
 def modal_model(system: StateSpace) -> ModalModel:
     """Normal modes of a state space, φ_o φ_iᵀ = Re 2 i ω_d R_r with R_r the receptance's residue.
 
-    Shapes stand at the outputs, then at those inputs that are no outputs; a point that is both
-    fixes their scale. Real poles carry no mode; complex shapes lose their imaginary part.
+    Shapes are given at the outputs, then at the inputs that are not outputs; a point that is both
+    fixes their scale. Real poles give no mode; the imaginary part of complex shapes is dropped.
 
     Raises
     ------
     LabelError
         If no label is both output and input.
     AccuracyError
-        If a mode has no positive real residue at such a point: not a passive structure.
+        If a mode has no positive real residue at such a point: the structure is not passive.
     """
     drive = [text for text in system.outputs if text in system.inputs]
     if not drive:

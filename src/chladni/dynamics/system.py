@@ -36,5 +36,5 @@ class System:
 
     @property
     def elastic(self) -> sp.csr_array:
-        """The real part of K; K itself where it is real, which SciPy's ``real`` would copy."""
+        """The real part of K; a real K is returned itself, because SciPy's ``real`` copies it."""
         return self.K.real if np.iscomplexobj(self.K.data) else self.K
