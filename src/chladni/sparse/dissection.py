@@ -1,9 +1,9 @@
-"""Nested dissection of a symmetric sparsity pattern, by place where places are known.
+"""Nested dissection of a symmetric sparsity pattern, by the places of its rows if they are known.
 
-George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are gathered into nodes first (six dofs, one
-vertex), vertices are split at medians of their coordinates, and the fewest vertices that touch all
-edges of the cut are the separator. Distances in the graph from a few far vertices serve as further
-coordinates, or as the only ones where nobody knows the places; their planes are level sets (George
+George 1973 (SIAM J. Numer. Anal. 10, 345). Rows are first collected into nodes (six dofs, one
+vertex). Vertices are split at medians of their coordinates. The separator is the smallest set of
+vertices that touches all edges of the cut. Distances in the graph from a few far vertices are
+additional coordinates, or the only ones if places are unknown. Their planes are level sets (George
 and Liu 1978, SIAM J. Numer. Anal. 15).
 """
 
@@ -19,7 +19,7 @@ from ..errors import ShapeError
 
 _LEAF = 24  # vertices eliminated as one dense block
 _HUB = 10  # times the mean degree: such a vertex belongs to the last separator
-_LANDMARKS = 12  # half as many where places are known
+_LANDMARKS = 12  # half as many if places are known
 _TRIES = 12  # coordinates tried for a cut, the widest first
 _CUTS = (0.5, 0.42, 0.58)
 
@@ -30,10 +30,10 @@ class Fronts:
 
     Attributes
     ----------
-    order : (n,)         rows of the matrix as they are eliminated
+    order : (n,)         rows of the matrix in the order of elimination
     start : (f + 1,)     first pivot of each front, in the new numbering
-    boundary : f arrays  rows (new numbers, rising) a front updates beyond its own
-    children : f tuples  fronts whose update a front takes in
+    boundary : f arrays  rows (new numbers, increasing) that a front updates beyond its own
+    children : f tuples  fronts whose updates a front receives
     """
 
     order: np.ndarray
@@ -42,7 +42,7 @@ class Fronts:
     children: tuple[tuple[int, ...], ...]
 
     def ordered(self) -> Self:
-        """The same fronts for a matrix whose rows are in this order already."""
+        """Fronts for a matrix whose rows are already in this order."""
         return replace(self, order=np.arange(len(self.order)))
 
     @property
@@ -54,7 +54,7 @@ class Fronts:
 
 
 def pattern(*matrices: sp.csr_array) -> sp.csr_array:
-    """Where any of the matrices has an entry, as small numbers."""
+    """Joint sparsity pattern of some matrices, as small integers."""
     marks = [
         sp.csr_array((np.ones(A.nnz, np.int8), A.indices, A.indptr), shape=A.shape)
         for A in map(sp.csr_array, matrices)
@@ -70,7 +70,7 @@ def analyse(
     Parameters
     ----------
     points : (n, 3), optional   place of each row
-    nodes : (n,) int, optional  rows of one node carry the same number; default: each its own
+    nodes : (n,) int, optional  number of each row's node; default one node for each row
     """
     n = A.shape[0]
     for name, given in {"points": points, "nodes": nodes}.items():
@@ -85,7 +85,7 @@ def analyse(
 
 
 def quotient(A: sp.csr_array, vertex: np.ndarray) -> sp.csr_array:
-    """Graph of the nodes: an edge where any of their rows are coupled, and the diagonal."""
+    """Graph of the nodes: an edge between nodes with coupled rows, and the diagonal."""
     A = sp.csr_array(A)
     N = int(vertex.max()) + 1
     vertex = vertex.astype(np.int32)
@@ -99,7 +99,7 @@ def quotient(A: sp.csr_array, vertex: np.ndarray) -> sp.csr_array:
 def _principal(points: np.ndarray, vertex: np.ndarray, extent: float) -> np.ndarray:
     """Places of the nodes along their principal axes, scaled to an extent (N, 3).
 
-    A mesh lies along its body rather than along the axes of the deck.
+    A mesh is aligned with its body rather than with the axes of the deck.
     """
     x = np.zeros((int(vertex.max()) + 1, np.shape(points)[1]))
     np.add.at(x, vertex, np.asarray(points, float))
@@ -110,7 +110,7 @@ def _principal(points: np.ndarray, vertex: np.ndarray, extent: float) -> np.ndar
 
 
 def distances(G: sp.csr_array, count: int) -> np.ndarray:
-    """Hops from a few far vertices (N, count): level sets of them are narrow cuts."""
+    """Hops from a few far vertices (N, count), whose level sets are narrow cuts."""
     hops = _hops(G, 0)
     nearest = hops
     columns: list[np.ndarray] = []
@@ -122,7 +122,7 @@ def distances(G: sp.csr_array, count: int) -> np.ndarray:
 
 
 def _hops(G: sp.csr_array, start: int) -> np.ndarray:
-    """Number of edges on the shortest way from a vertex; another component is far away."""
+    """Number of edges on the shortest path from a vertex; a large number in other components."""
     hops = dijkstra(G, unweighted=True, indices=start)
     hops[np.isinf(hops)] = 2 * hops[np.isfinite(hops)].max() + 2
     return hops
@@ -151,7 +151,7 @@ def _dissected(
         return front(ids[side == 2], below[0] + below[1])
 
     def front(ids: np.ndarray, below: tuple[int, ...]) -> tuple[int, ...]:
-        if len(ids) == 0:  # nothing between the halves: both go to whoever is above
+        if len(ids) == 0:  # no separator: both halves become children of the parent front
             return below
         pivots.append(ids)
         children.append(below)
@@ -163,7 +163,7 @@ def _dissected(
 
 
 def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """0 or 1 for the halves and 2 for the separator, the best of a few straight cuts (m,)."""
+    """Best of a few straight cuts (m,): 0 or 1 for the halves and 2 for the separator."""
     m, extent = len(x), np.ptp(x, axis=0)
     axes = [a for a in np.argsort(-extent)[:_TRIES] if extent[a] >= 0.3 * extent.max()]
     best, cost = np.zeros(m, bool), np.inf
@@ -180,10 +180,10 @@ def _split(x: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _cover(u: np.ndarray, v: np.ndarray, m: int) -> np.ndarray:
-    """Fewest vertices that touch every edge u-v of a cut, True in (m,) (König 1931).
+    """Mask (m,) of the smallest set of vertices that touches every edge u-v of a cut (König 1931).
 
-    A largest matching, and from its unmatched lower ends alternately over the edges and back along
-    the matching: the cover is what was not reached below and what was reached above.
+    From the unmatched lower ends of a maximum matching, follow edges up and the matching down. The
+    cover consists of the lower vertices not reached and the upper vertices reached.
     """
     below, i = np.unique(u, return_inverse=True)
     above, j = np.unique(v, return_inverse=True)
@@ -206,7 +206,7 @@ def _cover(u: np.ndarray, v: np.ndarray, m: int) -> np.ndarray:
 
 
 def _halves(x: np.ndarray, rank: np.ndarray) -> list[np.ndarray]:
-    """Candidate lower halves: at planes x < c near the median, where ties allow; else by rank."""
+    """Candidate lower halves: planes x < c near the median if ties permit, else by rank."""
     m = len(x)
     ordered = np.sort(x)
     cuts = [x < ordered[int(q * m)] for q in (_CUTS if m > 8 * _LEAF else _CUTS[:1])]
@@ -217,7 +217,7 @@ def _halves(x: np.ndarray, rank: np.ndarray) -> list[np.ndarray]:
 def _symbolic(
     G: sp.csr_array, vertex: np.ndarray, pivots: list[np.ndarray], children: list[tuple[int, ...]]
 ) -> Fronts:
-    """Boundary of a front: neighbours of its pivots and its children's boundaries, less pivots."""
+    """Boundary of a front: neighbours of its pivots and boundaries of its children, less pivots."""
     order = np.concatenate(pivots)
     new = np.empty_like(order)
     new[order] = np.arange(len(order))

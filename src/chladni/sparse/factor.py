@@ -1,4 +1,4 @@
-"""Sparse symmetric factorisations behind one face: several right sides, several back-ends."""
+"""Sparse symmetric factorisations with one interface, several right sides and back-ends."""
 
 from typing import Literal, Protocol, get_args
 
@@ -11,15 +11,15 @@ from .dissection import Fronts
 from .multifrontal import Multifrontal, NotDefinite, counted
 
 Backend = Literal["multifrontal", "cholmod", "superlu"]
-_BACKWARD = 1e-11  # |A x - b| / (|A| |x| + |b|) a factorisation without global pivoting must keep
+_BACKWARD = 1e-11  # limit of |A x - b| / (|A| |x| + |b|) without global pivoting
 
 
 class Factor(Protocol):
-    """A in factors, ready to solve."""
+    """A factorised matrix A."""
 
     @property
     def nnz(self) -> int:
-        """Entries kept."""
+        """Number of stored entries."""
         ...
 
     def solve(self, B: np.ndarray) -> np.ndarray:
@@ -28,10 +28,10 @@ class Factor(Protocol):
 
 
 class SuperLUFactor:
-    """L U without symmetry: the last resort, real or complex, definite or not.
+    """L U without symmetry, real or complex, definite or not: the last resort.
 
-    Minimum degree on Aᵀ + A and diagonal pivots keep a symmetric pattern sparse; without
-    ``diag_pivot_thresh=0`` pivoting undoes the order
+    Minimum degree on Aᵀ + A and diagonal pivots keep a symmetric pattern sparse. Without
+    ``diag_pivot_thresh=0`` pivoting destroys the order
     (Demmel et al. 1999, SIAM J. Matrix Anal. 20).
     """
 
@@ -53,7 +53,7 @@ class SuperLUFactor:
 
     @property
     def positive(self) -> bool:
-        """No pivot says that A is not positive definite."""
+        """True if all pivots are positive."""
         return bool(np.all(self._lu.U.diagonal() > 0))
 
     def solve(self, B: np.ndarray) -> np.ndarray:
@@ -93,12 +93,12 @@ def factorise(
 ) -> Factor:
     """A factorisation of a symmetric matrix A (n, n) with ``solve`` and ``nnz``.
 
-    Multifrontal Cholesky needs nothing beyond SciPy and is the fastest where CHOLMOD sits on a
-    reference BLAS, as in Debian (benchmarks/README.md); "cholmod" takes scikit-sparse.
+    Multifrontal Cholesky needs only SciPy. It is the fastest if CHOLMOD uses a reference BLAS, as
+    in Debian (benchmarks/README.md); "cholmod" needs scikit-sparse.
 
     Parameters
     ----------
-    points : (n, 3), optional  place of each row, the same for all dofs of a node; orders better
+    points : (n, 3), optional  place of each row, the same for all dofs of a node: a better order
     nodes : (n,) int, optional rows that belong together (``dofs[:, 0]``)
     definite : bool            False: real or complex symmetric, not positive definite
     fronts : Fronts, optional  the order, known from a matrix of the same pattern
@@ -136,7 +136,7 @@ def _superlu(A: sp.sparray) -> SuperLUFactor:
 def _indefinite(
     A: sp.sparray, points: np.ndarray | None, nodes: np.ndarray | None, fronts: Fronts | None
 ) -> Factor:
-    """Fronts with pivoting inside them; where that proves too weak, pivoting over the whole."""
+    """Fronts with pivoting inside them; if that is not accurate enough, global pivoting."""
     factor = Multifrontal(A, points, nodes, definite=False, fronts=fronts)
     return factor if backward_error(A, factor) < _BACKWARD else SuperLUFactor(A, threshold=0.1)
 
@@ -162,7 +162,7 @@ def inertia(
     Raises
     ------
     AccuracyError
-        If A is so near to singular that the signs of its pivots prove nothing.
+        If A is so close to singular that the signs of its pivots are not reliable.
     """
     negative, error = counted(A, points, nodes, fronts)
     if error > _BACKWARD:

@@ -1,8 +1,8 @@
 """Block Lanczos with full orthogonalisation in the mass inner product.
 
 The operator is A⁻¹M with A = K - σM; its largest eigenvalues θ = 1/(λ - σ) belong to the lowest λ.
-Grimes, Lewis and Simon 1994 (SIAM J. Matrix Anal. 15, 228), without their selective reduction: the
-block recurrence takes out all but rounding, one pass over the basis takes out the rest.
+Grimes, Lewis and Simon 1994 (SIAM J. Matrix Anal. 15, 228), without their selective reduction. The
+block recurrence orthogonalises up to rounding; one pass over the basis removes the rest.
 """
 
 from collections.abc import Callable
@@ -12,9 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, cholesky, eigh, solve_triangular
 
-_DROP = 1e-13  # of the operator's norm: a direction this small carries nothing new
-_THIN = 1e-5  # of it: rounding in such a column is large enough to orthogonalise once more
-_UNEVEN = 1e-2  # between columns of a block: their Gram matrix has lost its square in digits
+_DROP = 1e-13  # of the operator's norm, below which a direction is not new
+_THIN = 1e-5  # of it, below which rounding requires a second orthogonalisation of a column
+_UNEVEN = 1e-2  # ratio of columns of a block, whose square is lost in digits of the Gram matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class Ritz:
 
     Attributes
     ----------
-    theta : (m,)      Ritz values of A⁻¹M, falling
-    error : (m,)      |A⁻¹M x - θ x|_M / θ as the recurrence tells it
+    theta : (m,)      Ritz values of A⁻¹M, decreasing
+    error : (m,)      |A⁻¹M x - θ x|_M / θ from the recurrence
     basis : (n, m)    M-orthonormal Q
     weights : (m, m)  S; the vectors are Q S
     """
@@ -50,7 +50,7 @@ def block_lanczos(
     largest_basis: int | None = None,
     seed: int = 0,
 ) -> Ritz:
-    """The k largest θ of A⁻¹M x = θ x and whatever else the basis holds.
+    """The k largest θ of A⁻¹M x = θ x, and the other Ritz values of the basis.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ def block_lanczos(
     M : (n, n)                   positive semidefinite
     locked : (n, l), optional    M-orthonormal vectors already found, kept out of the basis
     tolerance : float            on ``Ritz.error`` of the first k
-    largest_basis : int          where to stop unconverged (the caller looks at ``error``)
+    largest_basis : int          limit without convergence (the caller checks ``error``)
     """
     n = M.shape[0]
     run = _Run(M, locked, min(n, largest_basis or max(6 * k, 200)) + block)
     rng = np.random.default_rng(seed)
     run.start(solve(M @ rng.standard_normal((n, block))))
-    look = 2 * k  # size of the basis at which Ritz values are looked at next
+    look = 2 * k  # size of the basis at which Ritz values are computed next
     while True:
         run.step(solve)
         full = run.size + block > run.capacity or run.size >= n
@@ -81,7 +81,7 @@ def block_lanczos(
 
 
 def _blocks_ahead(excess: float) -> int:
-    """How many blocks until the next look: a block is rarely worth more than two digits."""
+    """Number of blocks until the next check; a block rarely improves by more than two digits."""
     return max(1, int(np.log10(min(excess, 1e8)) / 2))
 
 
@@ -99,11 +99,11 @@ class _Run:
 
     @property
     def exhausted(self) -> bool:
-        """No new direction left: what is in the basis is invariant."""
+        """True if there is no new direction: the basis is invariant."""
         return self.last.stop - self.last.start == 0
 
     def start(self, X: np.ndarray) -> None:
-        """A new block with no coupling to the ones before."""
+        """Start a new block without coupling to the previous ones."""
         X = np.asfortranarray(X)
         X /= np.sqrt(np.maximum(np.einsum("ij,ij->j", X, self.M @ X), 1e-300))
         X, MX = self._swept(*self._swept(X, self.M @ X))
@@ -126,7 +126,7 @@ class _Run:
         self.H[self.last, j], self.H[j, self.last] = self.coupling, self.coupling.T
 
     def _swept(self, W: np.ndarray, MW: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """W - Q Qᵀ M W, with M W renewed unless the correction was rounding."""
+        """W - Q Qᵀ M W, with M W computed again unless the correction was rounding."""
         kept = [self.Q[:, : self.size], *([] if self.locked is None else [self.locked])]
         change = 0.0
         for Q in kept:
@@ -137,7 +137,7 @@ class _Run:
         return W, MW if change < 1e-11 * size else self.M @ W
 
     def _append(self, W: np.ndarray, MW: np.ndarray, norm: float) -> None:
-        """Q R = W with QᵀMQ = I; columns that hold nothing new are left out."""
+        """Append Q with Q R = W and QᵀMQ = I; columns without new directions are left out."""
         w, V = eigh(_symmetric(W.T @ MW))
         keep = w > (_DROP * norm) ** 2
         scale = np.sqrt(w[keep])
@@ -158,7 +158,7 @@ class _Run:
         self.size += Q.shape[1]
 
     def ritz(self) -> Ritz:
-        """Eigenpairs of H over all blocks but the last, whose row gives the error."""
+        """Eigenpairs of H over all blocks except the last, whose row gives the error."""
         m = self.last.start
         theta, S = eigh(self.H[:m, :m])
         theta, S = theta[::-1], S[:, ::-1]

@@ -1,8 +1,8 @@
 """Multifrontal Cholesky in numpy: dense blocks along a nested dissection, BLAS-3 throughout.
 
 Duff and Reid 1983 (ACM TOMS 9, 302); Liu 1992 (SIAM Review 34, 82). Indefinite symmetric matrices
-take the same road: pivots are chosen within a front (Bunch-Kaufman), never across fronts, which
-suits K - ω²M of structures because only few fronts have negative pivots.
+use the same method, with pivoting within a front (Bunch-Kaufman) but never across fronts. This is
+sufficient for K - ω²M of structures, because only few fronts have negative pivots.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from scipy.linalg import blas, lapack, ldl, lu_factor, lu_solve
 from ..errors import ModelError
 from .dissection import Fronts, analyse, runs
 
-_FEW_RUNS = 40  # up to here slices beat index arrays
+_FEW_RUNS = 40  # number of runs up to which slices are faster than index arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class _Cholesky:
     negative: ClassVar[int] = 0  # pivots
 
     def forward(self, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What stays with the pivots and what goes to the boundary."""
+        """Forward substitution: the part at the pivots and the update of the boundary."""
         y = blas.dtrsm(1.0, self.L11, b.T, side=1, lower=1, trans_a=1)
         return y.T, (y @ self.L21.T).T
 
@@ -37,7 +37,7 @@ class _Cholesky:
         return blas.dtrsm(1.0, self.L11, y.T - x2.T @ self.L21, side=1, lower=1).T
 
     def product(self, v1: np.ndarray, v2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What this front has of A v, at its pivots and at its boundary."""
+        """Contribution of this front to A v, at its pivots and at its boundary."""
         y = self.L11.T @ v1 + self.L21.T @ v2
         return self.L11 @ y, self.L21 @ y
 
@@ -53,7 +53,7 @@ class _Ldl:
     Z: np.ndarray
 
     def forward(self, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What stays with the pivots and what goes to the boundary."""
+        """Forward substitution: the part at the pivots and the update of the boundary."""
         y = self.T @ _unit_lower(self.L, b[self.order])
         return y, self.Z.T @ (self.sign * y)
 
@@ -65,9 +65,9 @@ class _Ldl:
         return x
 
     def product(self, v1: np.ndarray, v2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What this front has of A v: [G; Zᵀ S] S [Gᵀ v_1 + S Z v_2], G = Pᵀ L T⁻¹.
+        """Contribution of this front to A v: [G; Zᵀ S] S [Gᵀ v_1 + S Z v_2], G = Pᵀ L T⁻¹.
 
-        T⁻¹ = Tᵀ N⁻¹, for rows of T are orthogonal; N are their squared lengths.
+        T⁻¹ = Tᵀ N⁻¹, because rows of T are orthogonal; N are their squared lengths.
         """
         N = np.asarray((self.T * self.T).sum(axis=1))[:, None]
         y = self.sign * ((self.T @ (self.L.T @ v1[self.order])) / N) + self.Z @ v2
@@ -77,7 +77,7 @@ class _Ldl:
 
     @property
     def negative(self) -> int:
-        """Negative pivots."""
+        """Number of negative pivots."""
         return int(np.sum(self.sign < 0))
 
 
@@ -89,7 +89,7 @@ class _Lu:
     X: np.ndarray
 
     def forward(self, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What stays with the pivots and what goes to the boundary."""
+        """Forward substitution: the part at the pivots and the update of the boundary."""
         return lu_solve(self.lu, b, check_finite=False), self.X.T @ b
 
     def backward(self, y: np.ndarray, x2: np.ndarray) -> np.ndarray:
@@ -102,7 +102,7 @@ _Blocks = tuple[np.ndarray, np.ndarray, np.ndarray]  # F11, F21, F22
 
 
 class NotDefinite(ModelError):
-    """A pivot of what should be positive definite is not positive."""
+    """A pivot is not positive, although the matrix should be positive definite."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"the matrix is not positive definite, seen at row {row}")
@@ -110,7 +110,7 @@ class NotDefinite(ModelError):
 
 
 class Multifrontal:
-    """A = L Lᵀ front by front; ``renewed`` keeps the order when only the values change.
+    """A = L Lᵀ front by front; ``renewed`` keeps the order if only the values change.
 
     Attributes
     ----------
@@ -165,9 +165,9 @@ def counted(
     nodes: np.ndarray | None = None,
     fronts: Fronts | None = None,
 ) -> tuple[int, float]:
-    """Negative pivots of a real symmetric A, and |A v - L D Lᵀ v| / (|A| |v|) of a random v.
+    """Negative pivots of a real symmetric A, and |A v - L D Lᵀ v| / (|A| |v|) for a random v.
 
-    Fronts are let go of as they are eliminated: a count of eigenvalues needs none of them again.
+    Fronts are discarded after their elimination, because a count of eigenvalues does not need them.
     """
     A = sp.csr_array(A)
     fronts = analyse(A, points, nodes) if fronts is None else fronts
@@ -191,7 +191,7 @@ def _in_order(fronts: Fronts) -> bool:
 
 
 def _eliminated(A: sp.csr_array, fronts: Fronts, definite: bool) -> Iterator[_Part]:
-    """One front after another."""
+    """Eliminate one front after another."""
     updates: dict[int, np.ndarray] = {}
     A = A if _in_order(fronts) else A[fronts.order][:, fronts.order]
     where = np.empty(A.shape[0], np.int64)
@@ -221,11 +221,11 @@ def _front(F: _Blocks, definite: bool, pivots: np.ndarray) -> _Part:
 
 
 def _gathered(A: sp.csr_array, begin: int, end: int, where: np.ndarray, b: int) -> _Blocks:
-    """Blocks F11, F21 of the matrix itself (by rows, it is symmetric) and an empty F22."""
+    """Blocks F11, F21 of the matrix (from its rows, by symmetry) and an empty F22."""
     a = end - begin
     F11, F21, F22 = (np.zeros(s, A.dtype, order="F") for s in ((a, a), (b, a), (b, b)))
     part = slice(A.indptr[begin], A.indptr[end])
-    open_ = A.indices[part] >= begin  # the others belong to fronts eliminated before
+    open_ = A.indices[part] >= begin  # the others belong to fronts already eliminated
     i = where[A.indices[part][open_]]
     j = np.repeat(np.arange(a), np.diff(A.indptr[begin : end + 1]))[open_]
     values, own = A.data[part][open_], i < a
@@ -235,7 +235,7 @@ def _gathered(A: sp.csr_array, begin: int, end: int, where: np.ndarray, b: int) 
 
 
 def _extend_add(F: _Blocks, to: np.ndarray, update: np.ndarray) -> None:
-    """Add a child's Schur complement at rows ``to`` (rising); lower triangles only."""
+    """Add a child's Schur complement at rows ``to`` (increasing); lower triangles only."""
     F11, F21, F22 = F
     a = len(F11)
     k = int(np.searchsorted(to, a))
@@ -268,7 +268,7 @@ def _cholesky(L11: np.ndarray, F: _Blocks) -> _Cholesky:
 
 
 def _ldl(F: _Blocks) -> _Ldl:
-    """Bunch-Kaufman within the front; F22 - Zᵀ S Z by one product for each sign."""
+    """Bunch-Kaufman factors of a front; F22 - Zᵀ S Z by one product for each sign."""
     F11, F21, F22 = F
     lu, D, order = ldl(F11, lower=True, check_finite=False)
     L = np.asfortranarray(lu[order])
