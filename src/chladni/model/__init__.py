@@ -1,1 +1,1 @@
-"""What the structure is: geometry, parts, connections, properties; knows nothing of matrices."""
+"""The description of a structure: geometry, parts, connections and properties, no matrices."""

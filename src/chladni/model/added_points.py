@@ -1,4 +1,4 @@
-"""Grids added to a structure, and ids for what hangs on them."""
+"""Grids added to a structure, and ids for the elements on them."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,7 +19,7 @@ def next_id(assembly: Assembly) -> int:
 
 
 def with_points(assembly: Assembly, places: np.ndarray) -> tuple[Assembly, np.ndarray]:
-    """The assembly with grids added at places (k, 3) [m], and their rows."""
+    """Add grids at places (k, 3) [m]; return the assembly and the rows of the grids."""
     start, n = int(assembly.ids.max()) + 1 if len(assembly.ids) else 1, len(assembly.points)
     axes, scalar = assembly.axes, assembly.scalar_points
     if axes is not None:

@@ -1,4 +1,4 @@
-"""What a deck asks of its structure: subcases, loads, frequencies, damping, excitation (SI)."""
+"""The analysis of a deck: subcases, loads, frequencies, damping and excitation (SI)."""
 
 from dataclasses import dataclass, field
 
@@ -9,10 +9,10 @@ from .following_frequencies import Following
 
 @dataclass(frozen=True)
 class Subcase:
-    """One subcase: the sets it selects, 0 where it selects none.
+    """One subcase: the selected sets, 0 for no set.
 
-    ``outputs`` are the points whose motion it asks for, as runs of ids from first to last;
-    ``residual`` says whether residual vectors go beside the modes.
+    ``outputs`` are the points whose motion is requested, as ranges of ids from first to last;
+    ``residual`` requests residual vectors in addition to the modes.
     """
 
     id: int
@@ -57,7 +57,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """A tabulated function, piecewise linear, its end slopes continued (Nastran's TABLED1)."""
+    """A tabulated, piecewise linear function with extrapolated ends (Nastran's TABLED1)."""
 
     x: np.ndarray
     y: np.ndarray
@@ -93,7 +93,7 @@ class Excitation:
     amplitude : (k,)              A [N, N m or m, m/s, m/s² and their rotations]
     delay, phase : (k,)           τ [s], θ [rad]
     first, second : Tabulated or None real and imaginary part of g, or its modulus and phase [deg]
-    polar : bool                  g = first exp(i second), as RLOAD2 has it
+    polar : bool                  g = first exp(i second), as in RLOAD2
     """
 
     kind: str
@@ -119,21 +119,21 @@ class Excitation:
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """All a deck holds beside its structure; dictionaries by set id.
+    """All data of a deck other than its structure; dictionaries by set id.
 
     Attributes
     ----------
-    solution : int              SOL number, 0 where it is not stated
+    solution : int              SOL number, 0 if not given
     subcases : tuple            in order
     loads : dict of Load        static loads, combinations (LOAD) resolved
     prescribed : dict of Motion SPCD, and SPC with a displacement
     frequency : dict            frequencies of response [Hz], increasing
-    following : dict            those that follow the modes, by the same ids
+    following : dict            frequencies that follow the modes, by the same ids
     damping : dict              (f (k,) [Hz], ζ (k,)) modal damping tables
     eigen : dict                (lowest [Hz], highest [Hz], count) of eigenvalue requests, NaN or
-        0 where open
+        0 if not limited
     dynamic : dict              tuples of Excitation by DLOAD id
-    notes : tuple of str        what was approximated or left out, one sentence each
+    notes : tuple of str        approximations and omissions, one sentence each
     """
 
     solution: int = 0

@@ -1,9 +1,9 @@
-"""The structure as words and numbers: points, elements by family, joints, masses, supports (SI).
+"""The structure as data: points, elements by family, joints, masses and supports (SI).
 
-Everything is an array over one family, because a body-in-white has a hundred thousand shells.
-Nodes are *rows* of ``points`` (0-based), never ids; ``ids`` turns rows into the user's numbers.
-All vectors and places are in the basic frame; ``axes`` holds the frame in which the dofs of a
-point are counted (Nastran's CD), as rows of unit vectors, or None where all are basic.
+All data are arrays over one family, because a body-in-white has a hundred thousand shells. Nodes
+are *rows* of ``points`` (0-based), never ids; ``ids`` gives the user's number of each row. All
+vectors and places are in the basic frame. ``axes`` holds the displacement frames of the points
+(Nastran's CD) as rows of unit vectors; None: all are basic.
 """
 
 from dataclasses import dataclass, field, replace
@@ -114,14 +114,14 @@ class Scalars:
 
 @dataclass(frozen=True, eq=False)
 class Bushes:
-    """Six-component springs with dampers (CBUSH) in a frame of their own.
+    """Six-component springs with dampers (CBUSH), each in its own frame.
 
     Attributes
     ----------
     ids : (n,) int
     nodes : (n, 2) int          rows of points; second -1: ground
     frame : (n, 3, 3)           rows are the unit vectors of the element frame
-    place : (n, 3)              where the spring sits (rigid arms lead there from both nodes) [m]
+    place : (n, 3)              of the spring, with rigid arms from both nodes [m]
     stiffness, viscous, loss : (n, 6)   [N/m, N m/rad], [N s/m], [-]
     """
 
@@ -151,7 +151,7 @@ class Masses:
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """RBE2, RBAR and kin: dependent dofs follow the independent point as a rigid body.
+    """RBE2, RBAR and similar: dependent dofs follow the independent point as a rigid body.
 
     ``independent`` is one row with all six dofs; ``components[k]`` are the dofs (1-6) of
     ``dependent[k]`` that follow.
@@ -167,8 +167,8 @@ class RigidBody:
 class Average:
     """RBE3: the reference point moves as the weighted mean of the others.
 
-    ``terms`` are (row, components, weight); ``moved`` optional (row, component) pairs that take the
-    dependency instead of the reference's (Nastran's UM).
+    ``terms`` are (row, components, weight). ``moved`` are optional (row, component) pairs that are
+    dependent instead of the reference (Nastran's UM).
     """
 
     id: int
@@ -190,20 +190,20 @@ class Equation:
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """All of the structure.
+    """The complete structure.
 
     Attributes
     ----------
-    ids : (n,) int            ids of the points as the user numbers them, increasing
+    ids : (n,) int            the user's ids of the points, increasing
     points : (n, 3)           places in the basic frame [m]
     parts : tuple of Part
     axes : (n, 3, 3) or None  displacement frames, rows are unit vectors
     scalar_points : (n,) bool True where a point has one dof only (SPOINT)
     supports : (k, 2) int     (row of points, component 1-6) held at zero
-    coupled_mass : bool       consistent mass (True) or lumped (False), where the element has both
-    structural_damping : float  loss factor of the whole (PARAM,G)
-    k6rot : float or None     Nastran's drilling stiffness (PARAM,K6ROT); None: 0.1 G t of a field
-    label : dict              material ids, coordinate systems: whatever names a file needs back
+    coupled_mass : bool       consistent mass (True) or lumped (False), if the element has both
+    structural_damping : float  loss factor of the whole structure (PARAM,G)
+    auto_spc : bool           hold dofs without stiffness (AUTOSPC)
+    k6rot : float or None     Nastran's drilling stiffness (PARAM,K6ROT); None: 0.1 G t of the field
     """
 
     ids: np.ndarray
@@ -232,7 +232,7 @@ class Assembly:
         Raises
         ------
         LabelError
-            If a grid does not exist; the sentence names it.
+            If a grid does not exist; the message names it.
         """
         ids = np.asarray(ids, dtype=np.int64)
         at = np.minimum(np.searchsorted(self.ids, ids), len(self.ids) - 1)
@@ -249,7 +249,7 @@ class Assembly:
         Raises
         ------
         LabelError
-            If there is none, or more than one.
+            If there is no such part, or more than one.
         """
         found = [k for k, p in enumerate(self.parts) if name in (p.name, p.id, str(p.id))]
         if len(found) != 1:
@@ -258,7 +258,7 @@ class Assembly:
         return found[0]
 
     def with_parts(self, parts: tuple[Part, ...]) -> Self:
-        """The same structure with other properties."""
+        """Replace the properties of all parts; raise ``ModelError`` for another number of parts."""
         if len(parts) != len(self.parts):
             raise ModelError(f"{len(parts)} parts given, the assembly has {len(self.parts)}")
         return replace(self, parts=parts)
@@ -269,5 +269,5 @@ class Assembly:
 
 
 def picked(family: Any, which: np.ndarray) -> Any:
-    """Some members of a family of elements, by their rows or a mask."""
+    """Select members of a family of elements by rows or a mask."""
     return replace(family, **{name: value[which] for name, value in vars(family).items()})

@@ -1,4 +1,4 @@
-"""Supports of a structure that become a rigid clamp on springs."""
+"""Replacement of supports by a rigid clamp on springs."""
 
 from dataclasses import replace
 
@@ -14,12 +14,12 @@ def with_clamp_on_springs(
     assembly: Assembly, grids: np.ndarray, held: np.ndarray, centre: np.ndarray,
     frame: np.ndarray, springs: dict[int, float],
 ) -> Assembly:  # fmt: skip
-    """A grid at the centre leads all that these supports held (RBE2), held but for its springs.
+    """Replace supports by an RBE2 from a grid at the centre, whose other components are held.
 
     Parameters
     ----------
-    grids : (k,) int       ids of the points that were held
-    held : (k, 6) bool     in which components
+    grids : (k,) int       ids of the supported points
+    held : (k, 6) bool     supported components of each
     centre : (3,)          of the clamp [m]
     frame : (3, 3)         rows are unit vectors in the basic frame
     springs : {component 1-6 along or about the axes of the frame: [N/m] or [N m/rad]}

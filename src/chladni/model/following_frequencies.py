@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SAME = 1e-5  # of their range: nearer frequencies are one (PARAM,DFREQ)
+SAME = 1e-5  # of their range: frequencies at a smaller distance are duplicates (PARAM,DFREQ)
 
 
 Following = Callable[[np.ndarray], np.ndarray]  # from modal frequencies to those of response [Hz]
@@ -18,7 +18,8 @@ Following = Callable[[np.ndarray], np.ndarray]  # from modal frequencies to thos
 class Between:
     """f = (a + b)/2 + (b - a)/2 |x|^(1/c) sgn x, x = -1 ... 1: ``count`` from mode to mode.
 
-    a, b are neighbours among low, the modes within, and high [Hz]; c > 1 gathers them at the ends.
+    a, b are neighbours among low, the modes between, and high [Hz]. c > 1 concentrates the
+    frequencies at the ends.
     """
 
     low: float
@@ -48,13 +49,13 @@ class Times:
     factors: tuple[float, ...]
 
     def __call__(self, modes: np.ndarray) -> np.ndarray:
-        """Products that lie in the band."""
+        """Products within the band."""
         f = np.outer(modes, self.factors).ravel()
         return f[(f >= self.low) & (f <= self.high) & (f > 0)]
 
 
 def merged(lists: Sequence[np.ndarray]) -> np.ndarray:
-    """All frequencies once, increasing; those within SAME of the range of another are it."""
+    """Merge lists of frequencies, increasing, without duplicates within ``SAME`` of the range."""
     f = np.unique(np.concatenate([np.zeros(0), *lists]))
     if not len(f):
         return f

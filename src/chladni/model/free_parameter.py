@@ -1,4 +1,4 @@
-"""A number of a structure that a fit may change: which one, of which parts, how far."""
+"""A parameter of a structure that a fit may change: its field, its parts and its bounds."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ class FreeParameter:
 
     Attributes
     ----------
-    name : what the user calls it
+    name : given by the user
     field : E, rho, nu, t, E1, E2, G12, nu12, K, M, or the name of an effect
-    parts : names and cards as the user wrote them; empty: all that have the field
-    sd : standard deviation of the prior of ln(value / deck's value), None: the usual one
-    low, high : bounds of value / deck's value, None: none
+    parts : names and cards as the user wrote them; empty: all with this field
+    sd : standard deviation of the prior of ln(value / deck's value), None: the default
+    low, high : bounds of value / deck's value, None: no bound
     positions : of parts in ``Assembly.parts``
     springs, bushes, masses : rows of these families
     """

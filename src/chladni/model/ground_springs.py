@@ -1,4 +1,4 @@
-"""Springs to ground put onto a structure at its grids."""
+"""Springs to ground at grids of a structure."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,10 +13,10 @@ AN_AXIS = 1 - 1e-6  # cosine from which a direction is an axis of the grid's own
 def with_springs(
     assembly: Assembly, grids: Sequence[int], directions: np.ndarray, k: float
 ) -> Assembly:
-    """Springs k d dᵀ to ground at grids, one along each of ``directions`` (n, 3) of unit length.
+    """Add springs k d dᵀ to ground at grids, one along each of ``directions`` (n, 3), unit length.
 
-    Along an axis of the grid's frame a scalar spring (CELAS2), else a bush in a frame of its own
-    (CBUSH).
+    A direction along an axis of the grid's frame gives a scalar spring (CELAS2), any other a bush
+    in its own frame (CBUSH).
     """
     rows = assembly.rows(list(grids))
     d = np.asarray(directions, float)
@@ -32,10 +32,10 @@ def with_ground_bushes(
     assembly: Assembly, rows: np.ndarray, directions: np.ndarray, k: float | np.ndarray,
     places: np.ndarray | None = None,
 ) -> Assembly:  # fmt: skip
-    """Springs k d dᵀ to ground at rows of points, along ``directions`` (n, 3) of unit length.
+    """Add springs k d dᵀ to ground at rows of points, along ``directions`` (n, 3) of unit length.
 
-    They sit at ``places`` (n, 3) [m], if given, led to by a rigid arm from their point. Where k is
-    (n, 6) it is along, and about, that direction and two square to it.
+    Optional ``places`` (n, 3) [m] are connected to the points by rigid arms. A k of shape (n, 6) is
+    the stiffness along, and about, that direction and two directions normal to it.
     """
     old, n = assembly.bushes, len(rows)
     places = assembly.points[rows] if places is None else places

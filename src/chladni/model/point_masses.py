@@ -1,4 +1,4 @@
-"""Masses put onto a structure at its grids."""
+"""Masses at grids of a structure."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ def with_masses(
     m: float | np.ndarray,
     offset: np.ndarray | None = None,
 ) -> Assembly:
-    """The assembly with m [kg] (one, or one a grid) at each grid, ``offset`` (3,) from it [m]."""
+    """Add m [kg] (one for all, or one for each) at each grid, with an ``offset`` (3,) [m]."""
     old = assembly.masses
     first = int(old.ids.max(initial=0)) + 1
     x, y, z = np.zeros(3) if offset is None else offset

@@ -1,18 +1,18 @@
-"""Materials, sections and parts: the numbers a part of the structure is made of (SI)."""
+"""Materials, sections and parts: the properties of a part of the structure (SI)."""
 
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 
-HOLLOW, CLOSED = 1.5, 0.5  # where a section counts as a tube: see BeamSection.tube
+HOLLOW, CLOSED = 1.5, 0.5  # limits from which a section counts as a tube: see BeamSection.tube
 
 
 @dataclass(frozen=True)
 class Isotropic:
     """E [Pa], nu [-], rho [kg/m³], structural damping (loss factor) [-].
 
-    G is E / 2(1+nu) unless given otherwise.
+    G is E / 2(1+nu) unless given.
     """
 
     E: float
@@ -47,7 +47,7 @@ class Orthotropic:
     E2: float
     nu12: float
     G12: float
-    G1z: float = 0.0  # 0: infinitely stiff in transverse shear, as Nastran has it
+    G1z: float = 0.0  # 0: infinitely stiff in transverse shear, as in Nastran
     G2z: float = 0.0
     rho: float = 0.0
     damping: float = 0.0
@@ -69,7 +69,7 @@ class Orthotropic:
 
 @dataclass(frozen=True, eq=False)
 class Anisotropic:
-    """A sheet given by its plane stiffness itself (MAT2 or a smeared laminate)."""
+    """A sheet given directly by its plane stiffness (MAT2 or a smeared laminate)."""
 
     Q: np.ndarray  # (3, 3) [Pa]
     G: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # (2, 2) [Pa]
@@ -96,21 +96,21 @@ class ShellSection:
     thickness: float
     membrane: Material | None
     bending: Material | None
-    shear: Material | None = None  # None: the bending material's; see rigid_shear
+    shear: Material | None = None  # None: the bending material; see rigid_shear
     coupling: Material | None = None
     bending_ratio: float = 1.0  # 12 I / t³
     shear_ratio: float = 5 / 6  # t_s / t
     nonstructural: float = 0.0  # [kg/m²]
     rigid_shear: bool = False  # MID3 blank: no transverse shear flexibility
-    damping: float = 0.0  # loss factor of the whole section, where the deck gives one
+    damping: float = 0.0  # loss factor of the whole section, if the deck gives one
 
 
 @dataclass(frozen=True)
 class SolidSection:
     """Solid section (PSOLID); ``full`` is plain 2x2x2 integration without internal strains.
 
-    ``modes``: internal strains of a hexahedron, 21 (enhanced, as NX Nastran) or 9 (incompatible
-    modes, as OptiStruct).
+    ``modes`` is the number of internal strains of a hexahedron, 21 (enhanced, as NX Nastran) or 9
+    (incompatible modes, as OptiStruct).
     """
 
     material: Material
@@ -122,10 +122,10 @@ class SolidSection:
 class BeamSection:
     """Uniform beam or bar section (PBAR, PBEAM, PROD): areas and moments in the element frame (SI).
 
-    ``shear`` are the shear area factors (K1, K2); 0 means no shear flexibility.
-    The reference line is the shear centre; ``neutral`` is where the neutral axis passes and
-    ``nonstructural_at`` where the non-structural mass sits, both (y, z) from it (PBEAM's N1, N2
-    and M1, M2). The lumped mass of a ``beam`` carries rho (I1 + I2) L / 2 an end.
+    ``shear`` are the shear area factors (K1, K2); 0 means no shear flexibility. The reference line
+    is the shear centre. Positions (y, z) relative to it are ``neutral`` of the neutral axis (N1, N2
+    of PBEAM) and ``nonstructural_at`` of the non-structural mass (M1, M2). The lumped mass of a
+    ``beam`` includes the inertia rho (I1 + I2) L / 2 at each end.
     """
 
     material: Material
@@ -143,10 +143,10 @@ class BeamSection:
 
     @property
     def tube(self) -> bool:
-        """True of a closed tube, A and all moments of which go with the thickness of its wall.
+        """True for a closed tube, whose A and moments are proportional to its wall thickness.
 
-        4π √(I1 I2) / A² is 1 of a round bar, π/3 of any rectangular one, and R/t of a thin tube; J
-        is 2 I of a round tube, and next to nothing of an open profile.
+        4π √(I1 I2) / A² is 1 for a round bar, π/3 for any rectangular bar, and R/t for a thin tube.
+        J is 2 I for a round tube and very small for an open profile.
         """
         hollow = 4 * np.pi * np.sqrt(self.I1 * self.I2) > HOLLOW * self.area**2
         return bool(hollow and self.J > CLOSED * min(self.I1, self.I2))
@@ -157,12 +157,12 @@ Section = ShellSection | SolidSection | BeamSection
 
 @dataclass(frozen=True)
 class Part:
-    """What an engineer calls a part: one property of the deck, with its name."""
+    """A part in the engineering sense: one property of the deck, with its name."""
 
     id: int
     name: str
     section: Section
 
     def with_section(self, **changes: object) -> Self:
-        """The same part with other section values."""
+        """Change some section values of the part."""
         return replace(self, section=replace(self.section, **changes))  # type: ignore[arg-type]
