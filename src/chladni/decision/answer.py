@@ -58,11 +58,11 @@ def with_numbers(case: JudgedTable, decision: Decision) -> Decision:
     """Choose the numbers of the calibration, where no effect is named.
 
     Plain calibration would distort E, rho and t to compensate for errors of mesh and joints. The
-    candidates, in this order, are the numbers found by the null, the same fitted again, and plain
-    calibration. Each of the first two must fit no worse than the given deck, with and without its
-    mesh error. Plain calibration must have plausible numbers and not fit worse in every respect.
-    Otherwise the given deck stays. Joints beyond their usual scatter count as calibrated, whatever
-    E, rho and t gain.
+    candidates, in this order, are the numbers found by the null, these fitted again without
+    scatter, and plain calibration. Each of the first two must fit no worse than the given deck,
+    with and without its mesh error. Plain calibration must have plausible numbers and not fit worse
+    in every respect. Otherwise the given deck stays. Joints beyond their usual scatter count as
+    calibrated, whatever E, rho and t gain.
     """
     table, rules = case.table, case.rules
     if decision.named:

@@ -83,7 +83,7 @@ def longest_beads(built: Structure) -> list[Connection]:
 
 
 def beads_of(built: Structure) -> list[AdhesiveStiffness]:
-    """One effect for each of the longest beads."""
+    """One effect for each of the longest beads, and for all beads of a part together."""
     found = longest_beads(built)
     families = {text: (K, sd) for text, K, sd in joint_families(built)} if found else {}
     return [_of_one(built, bead, families["adhesive"], len(found)) for bead in found]

@@ -1,6 +1,6 @@
 """A crack: bending stiffness lost along a line of shells, with mass and membrane unchanged.
 
-It may be a crack, a bead ground off, an annealed bend or a score: all act as a hinge with a spring
+It may be a crack, a bead ground off, an annealed bend or a score. All act as a hinge with a spring
 (Adams, Cawley, Pye and Stone 1978, J. Mech. Eng. Sci. 20, 93-100). The loss depends on the width of
 the shells that hold it. Therefore it is reported as their bending ratio 12I/T3.
 """

@@ -22,7 +22,7 @@ ABOVE, ABOVE_LARGE = (1.4, 1.6), (1.1, 1.25)  # times f_max, on the mesh and on 
 LIMIT = 4 / 3  # Richardson: errors fall as h², so the limit lies a third beyond the refined mesh
 MESH = LIMIT - 0.17, 0.3  # prior of the mesh error: mean and standard deviation
 SOFTEST = 0.45  # largest loss of modal stiffness by a finer mesh: twice as much leaves a rest
-FOOTPRINT = 0.5, 0.7  # prior of footprints, same terms: as in the deck, half as wide, or a quarter
+FOOTPRINT = 0.5, 0.7  # prior of the footprint error: as in the deck, half or a quarter as wide
 REGIONS = 4  # regions of joints with their own footprints; each needs one refined solution
 
 

@@ -41,9 +41,9 @@ class Parameter:
     """One unknown x with prior N(mean, sd²).
 
     The physical value is ``scale · exp(x)`` ("log") or ``scale · x`` ("linear"), in ``unit``. With
-    a finite ``reach`` L it is ``scale · exp(L tanh(x/L))``, which is close to exp(x) for small x.
-    ``step`` is the longest step of a fit, ``starts`` are the first values of a search. With all
-    parameters at ``nominal`` an effect does nothing.
+    a finite ``reach`` L, x is replaced by ``L tanh(x/L)``, which equals x for small x. In a fit,
+    ``step`` limits the step; a search begins at ``starts``. With all parameters at ``nominal`` an
+    effect does nothing.
     """
 
     name: str
@@ -154,8 +154,8 @@ class MatrixTerm:
 class Beside:
     """Whitened residuals r (k,) of an effect in addition to the data that are compared.
 
-    Slopes are given with respect to its own parameters (k, n_parameters), and with respect to λ and
-    the damping ratio added by effects for every mode of the state (k, modes).
+    ``gradient`` (k, n_parameters) are the slopes by its own parameters. ``by_lam`` and
+    ``by_dissipated`` (k, modes) are those by λ and by the damping ratio that effects add to a mode.
     """
 
     r: np.ndarray

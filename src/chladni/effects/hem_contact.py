@@ -34,7 +34,7 @@ class HemContact(Effect):
     """K + Σ_i k L_i w_i b_iᵀ b_i, b_i the sliding and L_i the length of solid i along the line.
 
     Along the whole line w = 1 and x = (ln k,). On a stretch of length 2ℓ w = exp(-(d/ℓ)⁴) at the
-    distance d from its middle, and x = (ln k, middle over half the line's length, ln ℓ).
+    distance d from its middle. Then x = (ln k, middle over half the line's length, ln ℓ).
     """
 
     name = "hem-contact"

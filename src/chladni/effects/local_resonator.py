@@ -29,7 +29,7 @@ from .surroundings import ElementGrids, Surroundings
 SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
 TYPICAL = 3.0  # highest spectral line over the prior median of its frequency
 LOWEST = 20.0  # highest spectral line over the lowest frequency tried
-TRIED = 14  # frequencies, evenly spaced in their logarithm; broad peaks cover the gaps
+TRIED = 14  # frequencies, evenly spaced in their logarithm; broadened peaks smooth the gaps
 PLACES = 60  # at which each is tried
 LEAST = 0.05  # of the typical mass: the least mass accepted
 CARRIED = 1e3  # times the spring: stiffness that holds the written mass in the plane of the sheet

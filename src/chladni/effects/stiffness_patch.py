@@ -2,7 +2,7 @@
 
 It covers causes without their own effect: a heat-affected zone, a creased or perforated sheet, a
 delaminated layer. Only softer regions are searched. Coarse and fine elements of two codes differ
-like a slightly stiffer region: a corner 11 % stiffer near the shaker gained 43 in -2 ln evidence
+like a slightly stiffer region. A corner 11 % stiffer near the shaker gained 43 in -2 ln evidence
 where nothing was missing.
 """
 

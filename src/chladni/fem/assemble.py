@@ -102,7 +102,7 @@ def structure(assembly: Assembly, *, residual_bending: bool = True) -> Structure
     Raises
     ------
     ModelError
-        If nothing is left to move.
+        If no degree of freedom is left free.
     """
     M, V, K, loss = over_all_motions(assembly, residual_bending)
     T, dofs = _transformation(assembly)

@@ -3,8 +3,8 @@
 Two rules, each linear in its stiffness s [N/m]; a sheet usually has one of them:
 
     field      s ∫ (ω - rz)² dA              Hughes and Brezzi (1989), Comput. Methods Appl. Mech.
-                                             Eng. 72, 105-121; s = 0.1 G t, what a model has unless
-                                             its deck gives K6ROT
+                                             Eng. 72, 105-121; s = 0.1 G t, the default unless the
+                                             deck gives K6ROT
     corners    s Σ_i |J|_i (ω_i - rz_i)²     Nastran's PARAM,K6ROT: s = 1e-6 K6ROT G t; |J| is the
                                              Jacobian of the unit square at corner i of a CQUAD4
                                              (the area of a rectangle), twice the area of a CTRIA3

@@ -34,7 +34,7 @@ class ShellGeometry:
     offset : (m,)            of the mid-surface along n (Nastran's ZOFFS) [m]
     triangle : (m,) bool
     area : (m,)              of the flattened element [m²]
-    sides : (m, 2)           length along x and y that residual bending flexibility takes [m]
+    sides : (m, 2)           length along x and y for residual bending flexibility [m]
     turn : (m,)              angle from the element's x to material axis 1 [rad]
     """
 
