@@ -1,11 +1,11 @@
-"""How far the reduced model is from the structure it stands for, and the basis that mends it.
+"""Error of the reduced model's frequencies, and the vectors that its basis lacks.
 
-At x the modes q = Φφ leave r = K(x) q - λ M(x) q on the full operators.  One inverse iteration with
-the factor of the nominal P = K + σM turns r into what the basis lacks, z = P⁻¹ r; Rayleigh-Ritz on
-Φ and all z together lowers every frequency towards, never below, the true one.  The fall is the
-error estimate: never more than the error, and where K(x) - λM(x) lies between a and b times P on
-what the basis lacks no less than about 4ab/(a+b)² of it (Kantorovich's inequality; Horn and Johnson
-2013, Matrix Analysis, 7.4.12).
+At x the modes q = Φφ leave the residual r = K(x) q - λ M(x) q on the full operators.  One inverse
+iteration with the factor of the nominal P = K + σM gives z = P⁻¹ r, the missing vectors.
+Rayleigh-Ritz on Φ and all z together lowers every frequency towards the true one, never below it.
+The fall is the error estimate.  It never exceeds the error.  Let K(x) - λM(x) lie between a and b
+times P on the missing vectors: then the estimate is at least about 4ab/(a+b)² of the error
+(Kantorovich's inequality; Horn and Johnson 2013, Matrix Analysis, 7.4.12).
 """
 
 from collections.abc import Sequence
@@ -23,19 +23,19 @@ from .reduced_model import Reduced, State, evaluate, log_fields, slices
 from .reduced_problem import ReducedProblem
 from .rising import UnrisenModes, applied
 
-LIMIT = 5e-4  # relative frequency error of a basis that still serves
+LIMIT = 5e-4  # largest relative frequency error that is accepted of a basis
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid
 
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Frequencies of the reduced model and what is wrong with them.
+    """Frequencies of the reduced model and their estimated errors.
 
     Attributes
     ----------
     frequency : (k,) Hz    flexible modes up to the highest frequency of interest
     error : (k,)           estimated relative error of each, f / f_true - 1 >= 0
-    missing : (n, k)       what the basis lacks of them
+    missing : (n, k)       the part of each mode that the basis lacks
     """
 
     frequency: np.ndarray
@@ -48,11 +48,11 @@ class Accuracy:
         return float(self.error.max(initial=0.0))
 
     def serves(self, limit: float = LIMIT) -> bool:
-        """Whether the basis still serves; else it is to be renewed."""
+        """True where the basis is accurate enough; otherwise it must be renewed."""
         return self.worst <= limit
 
     def renewed(self, model: Reduced) -> Reduced:
-        """The model over a basis that holds what was missing."""
+        """The model over a basis that also holds the missing vectors."""
         return model.extended(self.missing)
 
 
@@ -61,19 +61,19 @@ def accuracy(
 ) -> Accuracy:
     """Error of the reduced model's frequencies at x.
 
-    Costs one solve with the nominal factor and two products with the element matrices.
+    It costs one solve with the nominal factor and two products with the element matrices.
 
     Parameters
     ----------
     reduced : the structure and the factor of its K + σM
-    model : its reduced model, over whatever basis
+    model : its reduced model, over any basis
     f_max : highest frequency of interest [Hz]
     """
     state = evaluate(model, effects, x, gradient=False)
     f = np.sqrt(np.maximum(state.lam, 0)) / (2 * np.pi)
     at = np.flatnonzero((f > RIGID * f_max) & (f <= f_max))
     Kq, Mq = products(model, effects, x, _modes(model, state)[:, at])
-    n = len(reduced.structure.system.dofs)  # what effects bring, and clamps, lack nothing
+    n = len(reduced.structure.system.dofs)  # dofs of effects and clamps are in the model exactly
     missing = np.asarray(reduced.factor.solve((Kq - state.lam[at] * Mq)[:n]))
     better = _improved(model, effects, x, state, missing)[at]
     return Accuracy(f[at], np.maximum(np.sqrt(state.lam[at] / better) - 1, 0.0), missing)
@@ -82,7 +82,7 @@ def accuracy(
 def _improved(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, state: State, missing: np.ndarray
 ) -> np.ndarray:
-    """λ of Rayleigh-Ritz on the basis and what it lacks, in increasing order."""
+    """λ of Rayleigh-Ritz on the basis and the missing vectors, in increasing order."""
     M = model.groups.structure.system.M
     missing = np.pad(missing, ((0, M.shape[0] - len(missing)), (0, 0)))
     Z = np.pad(beyond(M, model.vectors.blocks, missing), ((0, len(state.own)), (0, 0)))
@@ -99,14 +99,14 @@ def _improved(
 
 
 def _modes(model: Reduced, state: State) -> np.ndarray:
-    """Modes at all dofs of the structure, below them those that effects bring (n + n_own, m)."""
+    """Modes (n + n_own, m) at all dofs of the structure, then at the dofs that effects add."""
     return np.concatenate([model.vectors.combined(state.phi), state.own])
 
 
 def products(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, q: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """K(x) q and M(x) q (n + n_own, k) on the full operators, never assembled."""
+    """K(x) q and M(x) q (n + n_own, k) on the full operators, which are never assembled."""
     system, groups = model.groups.structure.system, model.groups
     n = model.vectors.shape[0]
     n_own, u = len(q) - n, q[:n]
@@ -140,21 +140,21 @@ def products(
 
 @dataclass(frozen=True, eq=False)
 class _Level(Effect):
-    """An effect whose stiffness does not rise."""
+    """An effect whose stiffness does not rise with frequency."""
 
     of: Effect = field(default_factory=Effect)
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """As of the effect."""
+        """The fields of the effect."""
         return self.of.fields(x)
 
     def matrices(self, x: np.ndarray) -> tuple[MatrixTerm, ...]:
-        """The same without their rise."""
+        """The matrices of the effect without their rise with frequency."""
         return tuple(replace(part, rise=None) for part in self.of.matrices(x))
 
 
 def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> UnrisenModes:
-    """The modes in which stiffness that rises is multiplied; none where nothing rises."""
+    """Modes that the rising stiffness is a function of; no modes where nothing rises."""
     rising = {
         id(e) for e, at in slices(effects) if any(m.rise is not None for m in e.matrices(x[at]))
     }

@@ -1,7 +1,7 @@
-"""The base as an input of the reduced model: its load follows every change of mass.
+"""Base motion as an input of the reduced model: its load follows every change of mass.
 
-A unit acceleration of the base loads the relative motion by -l(x), l = Φᵀ Tᵀ M(x) R b; groups of
-shells, added masses and operators each bring their share, with their slopes.
+A unit acceleration of the base loads the relative motion by -l(x), l = Φᵀ Tᵀ M(x) R b.  Groups of
+shells, added masses and operators each contribute a share of l and of its slopes.
 """
 
 from dataclasses import dataclass, replace
@@ -18,13 +18,13 @@ from ..fem.base_motion import BaseMotion
 
 @dataclass(frozen=True, eq=False)
 class BaseParticipation:
-    """l of the nominal model, by groups of shells.
+    """Participation l of the nominal model, by groups of shells.
 
     Attributes
     ----------
     motion : BaseMotion
     groups : (g, r, k)    Φᵀ Tᵀ M_g R b [√kg]
-    rest : (r, k)         of all that is in no group
+    rest : (r, k)         share of the mass that is in no group
     """
 
     motion: BaseMotion
@@ -32,31 +32,31 @@ class BaseParticipation:
     rest: np.ndarray
 
     def over(self, built: Structure) -> Self:
-        """The same of a structure with more dofs, which no vector of the basis moves yet."""
+        """The participation on a structure with further dofs, which the basis does not move yet."""
         return replace(self, motion=self.motion.over(built))
 
     def extended(self, shells: ElementGroups, new: np.ndarray) -> Self:
-        """The same over a basis that also holds these vectors (n, m)."""
+        """The participation over a basis that also holds these vectors (n, m)."""
         more = participation(shells, Basis((new,)), self.motion)
         groups = np.concatenate([self.groups, more.groups], axis=1)
         return replace(self, groups=groups, rest=np.concatenate([self.rest, more.rest]))
 
 
 def participation(shells: ElementGroups, basis: Basis, motion: BaseMotion) -> BaseParticipation:
-    """What the base does to each vector of a basis (n, r)."""
+    """Participation of each vector of a basis (n, r) in the motion of the base."""
     groups = shells.carried(basis, motion.whole)
     return BaseParticipation(motion, groups, basis.projected(motion.force) - groups.sum(axis=0))
 
 
 class Participating:
-    """l(x) and ∂l/∂x (n_p, r, k) while the effects of a state are gone through."""
+    """Running sums l(x) (r, k) and ∂l/∂x (n_p, r, k) over the effects of a state."""
 
     def __init__(
         self, base: BaseParticipation, weight: np.ndarray, slopes: np.ndarray, n_own: int
     ) -> None:
-        """Of the shells: factors on the mass of each group (g,) and their gradients (g, n_p).
+        """Start with the shells: mass factors of the groups (g,) and their gradients (g, n_p).
 
-        ``n_own`` degrees of freedom that effects bring stand below those of the basis.
+        ``n_own`` degrees of freedom that effects add follow the coordinates of the basis.
         """
         self.motion, self.n_own = base.motion, n_own
         value = base.rest + np.einsum("g,grk->rk", weight, base.groups)
@@ -67,7 +67,7 @@ class Participating:
     def add_points(
         self, term: PointTerm, b: np.ndarray, moved: dict[int, np.ndarray], at: slice
     ) -> None:
-        """Masses c at rows b (k, r) of the basis, ``moved`` = ∂b/∂x of what moves them."""
+        """Add masses c at rows b (k, r); ``moved`` is ∂b/∂x of parameters that move them."""
         if term.matrix != "M":
             return
         along = self.motion.carried(term.rows if term.carrier is None else term.carrier)
@@ -79,7 +79,7 @@ class Participating:
             self.slope[at.start + p] += (db.T * c) @ along + (b.T * c) @ d_along
 
     def add_operator(self, part: MatrixTerm, basis: Basis, at: slice) -> None:
-        """A part of the mass that scales as a whole."""
+        """Add a part of the mass that scales as a whole."""
         if part.matrix != "M":
             return
         load = basis.projected(self.motion.carried(part.operator))
@@ -88,5 +88,5 @@ class Participating:
         self.slope[at] += part.gradient[:, None, None] * l
 
     def loads(self, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """-lᵀφ on modes (r, r) and its gradient: (k, r), (n_p, k, r)."""
+        """Modal load -lᵀφ of modes φ (r, r) and its gradient: (k, r), (n_p, k, r)."""
         return -self.value.T @ phi, -self.slope.swapaxes(-1, -2) @ phi

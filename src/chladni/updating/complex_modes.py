@@ -1,4 +1,4 @@
-"""Whether modes are complex as damping makes them: what spins makes them more, and otherwise.
+"""Test of whether damping explains the complexity of modes, or gyroscopic forces must act.
 
 Forces B proportional to velocity couple the modes φ of a structure (Woodhouse 1998, J. Sound Vib.
 215, 547-569, to first order):
@@ -6,9 +6,9 @@ Forces B proportional to velocity couple the modes φ of a structure (Woodhouse 
     ψ_j = φ_j + i Σ_k a_jk φ_k,   a_jk = ω_j B_jk / (λ_j - λ_k).
 
 Damping is symmetric and takes energy: a_jk and a_kj have opposite signs, and B_jk² <= B_jj B_kk =
-4 ζ_j ω_j ζ_k ω_k. The forces of something that spins are skew (Meirovitch 1980, Computational
-Methods in Structural Dynamics, 2.10): the signs are equal, and nothing bounds them. No stiffness
-and no mass makes a mode complex at all, so that a name for either is none for what does this.
+4 ζ_j ω_j ζ_k ω_k. Gyroscopic forces of a spinning part are skew (Meirovitch 1980, Computational
+Methods in Structural Dynamics, 2.10): the signs are equal, and no such bound holds. Stiffness and
+mass make no mode complex, so an effect of stiffness or mass alone cannot explain the finding.
 """
 
 from dataclasses import dataclass
@@ -21,26 +21,26 @@ from ..ema.propagation import standard_deviations
 from ..ema.shapes import driven_shapes
 from .result import FitStatistic
 
-FEWEST = 5  # modes or outputs below which nothing is said
+FEWEST = 5  # modes or outputs below which the test is not made
 REACH = 0.05  # prior sd of B_jk over the geometric mean of ω_j and ω_k
-FLOOR = 1e-3  # of a unit shape: no channel is known better
+FLOOR = 1e-3  # of a unit shape: smallest standard deviation of a channel
 SURE = 3.0  # standard deviations
-APART = 3.0  # half-bandwidths between modes that are told apart
+APART = 3.0  # half-bandwidths between modes that are distinguished
 MARGIN = 1.5  # times the bound: unit shapes are not quite mass-normalised ones
-EXCUSED = 0.05  # of the modes may be beyond it where the first order fails
+EXCUSED = 0.05  # of the modes may exceed it, where the first order fails
 
 
 @dataclass(frozen=True, eq=False)
 class ModeCoupling:
-    """How complex identified modes are.
+    """Complexity of identified modes.
 
     Attributes
     ----------
     frequency : (r,) Hz
     complexity : (r,)    norm of the imaginary part of the unit shape that noise does not explain
-    bound : (r,)         what damping, all of it in one place, could make of it
-    alike, coupled : int of the pairs of modes that surely are coupled, both ways, those whose
-        signs are equal, and all
+    bound : (r,)         the largest complexity that damping, all of it in one place, can cause
+    alike, coupled : int numbers of pairs of modes that are significantly coupled both ways: pairs
+        of equal signs, and all pairs
     """
 
     frequency: np.ndarray
@@ -50,11 +50,11 @@ class ModeCoupling:
     coupled: int
 
     def tested(self) -> tuple[float, FitStatistic, str, tuple[float, ...]]:
-        """The chance of it where only damping couples modes; its statistic; what; modes [Hz].
+        """P-value if only damping couples modes, its statistic, a description, the modes [Hz].
 
-        The smaller of two chances, twice: of as many modes beyond the bound, and of as many pairs
-        with equal signs, which are as likely as opposite ones where something else than coupling
-        (poles that lie close) makes shapes complex, and less likely where damping does.
+        The p-value is twice the smaller of two: of as many modes beyond the bound, and of as many
+        pairs with equal signs.  Equal signs are as likely as opposite ones where close poles make
+        shapes complex without coupling.  They are less likely where damping couples the modes.
         """
         n = len(self.frequency)
         ratio = self.complexity / self.bound
@@ -77,9 +77,9 @@ class ModeCoupling:
 
 
 def mode_coupling(identified: Identified, low: float, high: float) -> ModeCoupling | None:
-    """How complex the modes between two frequencies [Hz] are; None where too few are known.
+    """Complexity of the modes between two frequencies [Hz]; None where too few are known.
 
-    The modes beside the band take part in what they may be coupled with.
+    Modes outside the band count as partners that a mode may be coupled with.
     """
     inside = (identified.frequency >= low) & (identified.frequency <= high)
     known = identified.covariance is not None and len(identified.outputs) >= FEWEST
@@ -105,7 +105,7 @@ def mode_coupling(identified: Identified, low: float, high: float) -> ModeCoupli
 
 
 def _turned(identified: Identified) -> np.ndarray:
-    """Unit shapes (n_out, r), each turned so that its real part is as large as it can be."""
+    """Unit shapes (n_out, r), each turned in phase so that its real part is largest."""
     psi = driven_shapes(identified)
     psi = psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300)
     return psi * np.exp(-0.5j * np.angle((psi**2).sum(axis=0)))
@@ -114,7 +114,7 @@ def _turned(identified: Identified) -> np.ndarray:
 def _significance(
     psi: np.ndarray, noise: np.ndarray, omega: np.ndarray, away: np.ndarray
 ) -> np.ndarray:
-    """a_jk over its standard deviation (r, r): the imaginary parts as sums of the real shapes."""
+    """a_jk over its standard deviation (r, r), from imaginary parts as sums of real shapes."""
     r = len(omega)
     t = np.zeros((r, r))
     for j in range(r):

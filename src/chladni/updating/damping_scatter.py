@@ -1,10 +1,10 @@
-"""How evenly the modes are damped: what no change of stiffness or mass can explain.
+"""Scatter of modal damping: a test that changes of stiffness and mass cannot pass by fitting.
 
-Modal damping of one structure scatters about its median: by 0.31 to 0.37 in ln for the three
-tailgates of Echaniz Granado (2015, "Model calibration of a vehicle tailgate using frequency
-response functions", table 6), by 0.22 to 0.41 for three plates of spruce. Foam, a joint that slips
-or another rubbing part damps some modes many times as much. A test on that scatter sees them where
-frequencies and shapes are met.
+Modal damping of one structure scatters about its median.  The standard deviation of ln ζ is 0.31 to
+0.37 for the three tailgates of Echaniz Granado (2015, "Model calibration of a vehicle tailgate
+using frequency response functions", table 6) and 0.22 to 0.41 for three plates of spruce. Foam, a
+joint that slips or another rubbing part damps some modes many times as much. A test on that scatter
+detects them even where the model fits frequencies and shapes.
 """
 
 from dataclasses import dataclass, replace
@@ -18,19 +18,19 @@ from .reduced_model import State
 from .result import FitStatistic
 
 LOG_SD = 0.3  # prior sd of ln of the standard deviation of ln ζ, about its median SCATTER
-FEWEST = 5  # modes below which a scatter says nothing
-UNSURE = 0.3  # sd of ln ζ from the identification above which a mode has no say
-STRONG = 0.02  # of the median share of χ²: a weaker pole may be the identification's own clutter
+FEWEST = 5  # modes below which the scatter is not tested
+UNSURE = 0.3  # sd of ln ζ from the identification above which a mode is left out
+STRONG = 0.02  # of the median share of χ²: a weaker pole may be spurious
 DRAWS = 4000
-LEAST_LEFT = 0.1  # of a damping ratio is left at least, whatever a named effect takes of it
+LEAST_LEFT = 0.1  # of a damping ratio remains at least when an effect's dissipation is removed
 
 
 @dataclass(frozen=True, eq=False)
 class ModalDamping(IdentifiedDamping):
-    """Identified damping of the modes that are compared, and whether it is uneven."""
+    """Identified damping of the modes that are compared, and tests of its scatter."""
 
     def beyond(self, state: State) -> Self:
-        """What is left of it beside what the effects of a state dissipate: ζ ζ_0 / (ζ_0 + ζ_e).
+        """Damping without the dissipation ζ_e of the effects of a state: ζ ζ_0 / (ζ_0 + ζ_e).
 
         ζ_0 is the median of ζ - ζ_e.
         """
@@ -42,10 +42,10 @@ class ModalDamping(IdentifiedDamping):
         return replace(self, ratio=self.ratio * usual / (usual + more))
 
     def tested(self) -> tuple[float, FitStatistic]:
-        """Chance that one structure is damped as unevenly upwards as this, and its statistic.
+        """P-value of damping so uneven above its median, and its statistic.
 
-        The smaller of two chances: of the rms of what lies above the median of ln ζ, and of the
-        largest of it.
+        The smaller of two p-values: of the rms of the excess of ln ζ over its median, and of the
+        largest excess.
         """
         rng = np.random.default_rng(20250104)
         scatter = SCATTER * np.exp(LOG_SD * rng.normal(size=(DRAWS, 1)))
@@ -57,10 +57,10 @@ class ModalDamping(IdentifiedDamping):
         return float(p.min()), row
 
     def following(self, share: np.ndarray) -> tuple[float, FitStatistic]:
-        """Chance that damping follows a share (n,) of the modes by scatter alone; its statistic.
+        """P-value that damping follows a share (n,) of the modes by scatter alone; its statistic.
 
-        exp of the component of ln ζ along the share, which is of unit norm and mean zero: by what
-        factor those modes are damped more that have more of it.
+        The statistic is exp of the component of ln ζ along the share, scaled to unit norm and mean
+        zero.  It is the factor by which modes with more of the share are damped more.
         """
         along = share - share.mean()
         along = along / max(float(np.linalg.norm(along)), 1e-300)
@@ -73,7 +73,7 @@ class ModalDamping(IdentifiedDamping):
         return float((1 + (own >= seen).sum()) / (1 + DRAWS)), row
 
     def said(self) -> tuple[str, str, tuple[float, ...]]:
-        """What stands out, where, and at which frequencies [Hz]."""
+        """Sentence on the modes that stand out, their place, and their frequencies [Hz]."""
         excess = np.log(self.ratio) - np.median(np.log(self.ratio))
         out = np.flatnonzero(excess > 3 * SCATTER)
         out = out if len(out) else np.array([int(np.argmax(excess))])
@@ -89,13 +89,13 @@ class ModalDamping(IdentifiedDamping):
 
 
 def _statistics(log_ratio: np.ndarray) -> np.ndarray:
-    """Rms of what lies above the median, and the largest of it, of each row (k, 2)."""
+    """Rms and largest excess over the median of each row (k, 2)."""
     excess = np.maximum(log_ratio - np.median(log_ratio, axis=1, keepdims=True), 0)
     return np.stack([np.sqrt((excess**2).mean(axis=1)), excess.max(axis=1)], axis=1)
 
 
 def modal_damping(identified: Identified, low: float, high: float) -> ModalDamping:
-    """Damping of the modes between two frequencies [Hz] that stand out and are surely known."""
+    """Damping of the strong, well-identified modes between two frequencies [Hz]."""
     f, share = identified.frequency, identified.relative_delta_chi2
     keep = (f >= low) & (f <= high) & (identified.damping > 0)
     if keep.any():

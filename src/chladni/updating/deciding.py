@@ -1,4 +1,4 @@
-"""The fits and numbers that a decision asks for, until it is made."""
+"""Fits and numbers that a decision requests, made until it is reached."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -42,7 +42,7 @@ Renew = Callable[[HypothesisFit], Renewal]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What was measured for a decision so far.
+    """Fits and numbers that were made for a decision so far.
 
     Attributes
     ----------
@@ -51,8 +51,8 @@ class Measured:
     written : rows as a deck can hold them
     sets : several effects, by key
     decks : of a calibration
-    failed : why a row could not be fitted again
-    whole : whether rows that were decided on keep their models, 10 to 300 MB each on a tailgate
+    failed : reason why a row could not be fitted again
+    whole : True where rows that were decided on keep their models, 10 to 300 MB each on a tailgate
     """
 
     table: HypothesisTable
@@ -66,20 +66,20 @@ class Measured:
     whole: bool = False
 
     def row(self, row: Row) -> "Measured":
-        """With a row put in or replaced."""
+        """Return a copy with a row added or replaced."""
         return replace(self, table=self.table.having(row))
 
     def with_Q(self, deck: CalibratedDeck, Q: tuple[float, ...]) -> "Measured":
-        """With Q of a calibration."""
+        """Return a copy with the Q of a calibration added."""
         return replace(self, table=replace(self.table, decks={**self.table.decks, deck: Q}))
 
 
 def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decision, Measured]:
-    """The decision on a diagnosis, every fit it asks for made, and all that was measured.
+    """Make every fit that a decision requests; return the decision and all the fits.
 
     Parameters
     ----------
-    renew : a hypothesis on a reduced model that bears it
+    renew : fits a hypothesis again on a reduced model that is accurate enough for it
     """
     known = begun(prepared, found)
     noise = getattr(prepared.problem.data, "identified", None)
@@ -90,7 +90,7 @@ def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decisio
 
 
 def begun(prepared: Prepared, found: Diagnosis) -> Measured:
-    """The rows of a diagnosis before data that no fit saw are asked."""
+    """The rows of a diagnosis before its held-out data are evaluated."""
     sets = {f"set {k}": s for k, s in enumerate(found.sets)}
     fits = {t.effect.name: t for t in found.hypotheses} | {k: s.hypothesis for k, s in sets.items()}
     table = replace(
@@ -112,7 +112,7 @@ def _set_row(key: str, s: Several) -> SetRow:
 def measured(
     prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, wanted: Wanted
 ) -> Measured:
-    """What was known and what is wanted."""
+    """Return the known fits and numbers with the wanted one added."""
     key, problem = wanted.key, prepared.problem
     if wanted.ask is Ask.RENEWAL:
         return _renewed(prepared, found, renew, known, key)
@@ -136,7 +136,7 @@ def measured(
 
 
 def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> Votes:
-    """What data that no fit saw say of a row, or of a member of a set beside the others."""
+    """Held-out evidence on a row, or on a member of a set with the other members in place."""
     problem, unseen = prepared.problem, prepared.unseen
     if key in known.fits:
         asked = held_out_evidence(problem, unseen, found.null, known.fits[key])
@@ -150,9 +150,9 @@ def _votes(prepared: Prepared, found: Diagnosis, known: Measured, key: str) -> V
 def _renewed(
     prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured, key: str
 ) -> Measured:
-    """A row fitted again on a model that bears it; of a rival, on a basis of its own first.
+    """Fit a row again on an accurate enough model; an alternative first gets its own basis.
 
-    Of what was renewed before, only the leader keeps its model: the others are decided on.
+    Among earlier renewals only the leader keeps its model, because the others are decided on.
     """
     lead, rival = known.table.singles[:1], known.fits[key]
     try:
@@ -175,7 +175,7 @@ def _renewed(
 
 
 def on_its_own_basis(prepared: Prepared, found: Diagnosis, rival: HypothesisFit) -> HypothesisFit:
-    """A rival fitted again from where it was: a diagnosis keeps the model of its leader alone."""
+    """Fit an alternative again from its result: a diagnosis keeps only its leader's model."""
     null, problem = found.null.data, prepared.problem
     assert isinstance(null, (Responses, Poles))
     problem = replace(problem, data=null.over(problem.reduced.model))
@@ -184,7 +184,7 @@ def on_its_own_basis(prepared: Prepared, found: Diagnosis, rival: HypothesisFit)
 
 
 def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measured:
-    """Whether damping that a row leaves follows what the leader changes."""
+    """Test whether the damping that a row does not explain follows the leader's changes."""
     key, test, damping = after(row.key, leader), known.tests.get(row.key), prepared.problem.damping
     asked = Row(key, row.names, row.neg2_log_evidence, p_damping=1.0)
     if test is None or damping is None:
@@ -198,7 +198,7 @@ def _after(prepared: Prepared, known: Measured, row: Row, leader: str) -> Measur
 def _calibrated(
     prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
 ) -> Measured:
-    """Q of a calibration on what was fitted, with what the mesh hides and without, as a deck is."""
+    """Q of a calibration on the fitted data, with the mesh error and without it, as in a deck."""
     null, problem = found.null, prepared.problem
     data = prepared.score.over(null.model)
 
@@ -206,7 +206,7 @@ def _calibrated(
         try:
             idle = np.where(of_mesh(effects), 0.0, x)
             each = [evaluate(null.model, effects, at, False) for at in (x, idle)]
-        except ModelError:  # no structure at all: nothing speaks for it
+        except ModelError:  # no physical structure: this calibration is no candidate
             return (np.inf, np.inf)
         return tuple(data.Q(state, data.use) for state in each)
 
@@ -214,7 +214,7 @@ def _calibrated(
         return known.with_Q(deck, Q(problem.base, given(problem, null)))
     try:
         made = numbers(prepared, found, known, deck)
-    except ModelError:  # without scatter its numbers are no structure's
+    except ModelError:  # without scatter its numbers belong to no physical structure
         return known.with_Q(deck, ())
     known = replace(known, decks={**known.decks, deck: made})
     return known.with_Q(deck, Q(made.fit.effects, made.fit.x))
@@ -223,7 +223,7 @@ def _calibrated(
 def numbers(
     prepared: Prepared, found: Diagnosis, known: Measured, deck: CalibratedDeck
 ) -> HypothesisFit:
-    """The calibration that is answered with where nothing is named."""
+    """The calibration that is reported where no effect is named."""
     mass = prepared.problem.mass_measurement
     if deck in known.decks:
         return known.decks[deck]

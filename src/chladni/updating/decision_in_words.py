@@ -1,4 +1,4 @@
-"""A decision as sentences: the one place where its reasons become English."""
+"""Sentences of a decision: the only module that puts its reasons into English."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ DATA = {Reason.ALL_DATA: "all data", Reason.WHAT_WAS_FITTED: "what was fitted"}
 def concluded(
     prepared: Prepared, found: Diagnosis, decision: Decision, known: Measured
 ) -> tuple[Diagnosis, tuple[str, ...]]:
-    """The diagnosis that a decision makes, and reasons not to trust it."""
+    """The diagnosis that follows from a decision, and reasons not to trust it."""
     words = DecisionWords(prepared, decision, known)
     first = decision.order[0] if decision.order else ""
     whole, notes = decision.whole, (*found.notes, *words.sentences())
@@ -49,14 +49,14 @@ def concluded(
 
 @dataclass(frozen=True, eq=False)
 class DecisionWords:
-    """The sentences of a decision and of what was measured for it."""
+    """The sentences of a decision and of the fits that were made for it."""
 
     prepared: Prepared
     decision: Decision
     known: Measured
 
     def sentences(self) -> tuple[str, ...]:
-        """One for every step that has something to say."""
+        """One sentence for every step that has something to report."""
         every = (_SENTENCES[s.reason](self, s) for s in self.decision.steps)
         return tuple(text for text in every if text)
 
@@ -65,7 +65,7 @@ class DecisionWords:
         return self.known.table.rows[key]
 
     def gain(self, key: str) -> float:
-        """Of a row over calibration alone, in -2 ln evidence."""
+        """Gain of a row over calibration alone, in -2 ln evidence."""
         return self.known.table.gain(self.row(key))
 
     def whole(self, step: Step) -> SetRow:
@@ -73,14 +73,14 @@ class DecisionWords:
         return next(s for s in self.known.table.sets if s.key == step.key)
 
     def test(self) -> FitTest | None:
-        """The absolute test: that of a row, or what refutes calibration."""
+        """The absolute test: that of the tested row, or the evidence that refutes calibration."""
         if self.decision.refuting is None:
             return self.known.tests.get(self.decision.tested or "")
         step = next(s for s in self.decision.steps if s.reason is self.decision.refuting[0])
         return FitTest(False, self.decision.refuting[1], self._refuting(step), self._text(step.key))
 
     def refusal(self, name: str, why: Reason) -> str:
-        """Why a hypothesis is not named."""
+        """Reason why a hypothesis is not named."""
         tests = self.known.tests
         if why is Reason.TOO_FEW:
             return self.prepared.too_little
@@ -94,7 +94,7 @@ class DecisionWords:
         return REFUSED[why]
 
     def settled(self) -> str:
-        """Measurements that would separate what the data do not."""
+        """Measurements that would separate the explanations that these data cannot separate."""
         return settled_by(self.decision.one_of)
 
     def _text(self, key: str) -> str:
@@ -269,7 +269,7 @@ _SENTENCES: Mapping[Reason, Callable[[DecisionWords, Step], str]] = {
 
 
 def votes_in_words(votes: Votes) -> str:
-    """The gains of data that were not fitted."""
+    """Sentence on the gains of held-out data."""
     every = {
         "the data held out": votes.held_out,
         "sensors predicted from the others": votes.sensors,
@@ -280,12 +280,12 @@ def votes_in_words(votes: Votes) -> str:
 
 
 def needs_impossible(name: str, why: str) -> str:
-    """That an explanation is told apart by physics, where data do not."""
+    """Sentence on an explanation that physics excludes, although the data do not."""
     return f"{name} would need a value it cannot have: {why}"
 
 
 def settled_by(names: Sequence[str]) -> str:
-    """Measurements that would separate some families."""
+    """Measurements that would separate these families."""
     return "; or ".join(c for c in (family(name).settled_by for name in names) if c)
 
 

@@ -1,11 +1,11 @@
 """The smallest mass, softening and thinning a layout would find, before anything is measured.
 
 The recording is taken to be the model's own responses. A change is found when it lowers -2 ln p by
-more than naming asks of a finding: the threshold of a diagnosis and, because its place is unknown,
-2 ln of the places tried. -2 ln p is that of a diagnosis, with E, rho and t of the parts, scatter
-within them, the joints, the errors of the mesh and of the model's form and the weighing in the
-covariance (``scan``), so that what calibration could take up is not counted. Held-out data are
-counted with the rest.
+more than an effect needs to be named. That is the threshold of a diagnosis plus 2 ln of the number
+of places tried, because the place is unknown. -2 ln p is that of a diagnosis (``scan``). Its
+covariance holds E, rho and t of the parts, scatter within them, the joints and the weighing. It
+also holds the errors of the mesh and of the model's form. A change that calibration could explain
+is therefore not counted. Held-out data count like the other data.
 """
 
 from dataclasses import dataclass, replace
@@ -31,12 +31,12 @@ from .sensor_errors import sensor_errors
 
 NOISE = 0.01  # of |H|, at every line that is compared
 MASSES = np.geomspace(1e-5, 0.3, 40)  # tried, of the structure's mass
-MOST = 0.9  # of stiffness or thickness: what takes more is not found
+MOST = 0.9  # of stiffness or thickness: a change that would have to be larger is not found
 
 
 @dataclass(frozen=True, eq=False)
 class Detectable:
-    """Smallest findings, place by place; NaN where nothing of a sensible size would be found.
+    """Smallest detectable changes, place by place; NaN where none of a sensible size exists.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Detectable:
 
 
 def detectable(asked: Question, noise: float = NOISE) -> Detectable:
-    """What a test of these sensors, shakers and this band would find of the structure itself.
+    """Smallest changes of the structure that a test with these sensors and shakers would find.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def detectable(asked: Question, noise: float = NOISE) -> Detectable:
 
 
 def _smallest(gained: np.ndarray, due: float) -> np.ndarray:
-    """Smallest of ``MASSES`` whose gain (n_places, n_masses) is due, interpolated; NaN: none."""
+    """Smallest mass whose gain (n_places, n_masses) reaches ``due``, interpolated; NaN: none."""
     out = np.full(len(gained), np.nan)
     for k, gain in enumerate(gained):
         enough = np.flatnonzero(gain >= due)

@@ -1,7 +1,7 @@
-"""Degrees of freedom that effects bring along: they stand below those of the structure's basis.
+"""Degrees of freedom that effects add: they follow the coordinates of the structure's basis.
 
-A lump on a spring swings by itself, so that it cannot be condensed onto the place it sits at: it is
-a row and a column more of the reduced K and M, exact at every frequency.
+A mass on a spring has a resonance of its own, so it cannot be condensed onto its attachment point.
+It adds a row and a column to the reduced K and M, which is exact at every frequency.
 """
 
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from ..effects.effect import Effect, PointTerm
 
 
 def own_positions(effects: Sequence[Effect]) -> list[int]:
-    """Of each effect the position of the first degree of freedom it brings, among all brought."""
+    """Position of the first degree of freedom of each effect among all that effects add."""
     ends = np.cumsum([e.own_dofs for e in effects])
     return [int(end) - e.own_dofs for e, end in zip(effects, ends, strict=True)]
 
 
 def own_part(term: PointTerm, first: int, n_own: int) -> np.ndarray:
-    """What a term's rows are at the degrees of freedom that effects bring (k, n_own)."""
+    """The columns of a term's rows at the degrees of freedom that effects add (k, n_own)."""
     out = np.zeros((term.rows.shape[0], n_own))
     if term.own is not None:
         out[:, first : first + term.own.shape[1]] = term.own
@@ -26,11 +26,11 @@ def own_part(term: PointTerm, first: int, n_own: int) -> np.ndarray:
 
 
 def row(b: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Rows over a basis and what effects bring (k, r + n_own)."""
+    """Rows over a basis and the degrees of freedom that effects add (k, r + n_own)."""
     return np.concatenate([b, own], axis=1) if own.shape[1] else b
 
 
 def with_own(A: np.ndarray, n_own: int) -> np.ndarray:
-    """Matrices (..., r, r) with empty rows and columns for what effects bring."""
+    """Matrices (..., r, r) with zero rows and columns for the dofs that effects add."""
     wide = ((0, n_own), (0, n_own))
     return np.pad(A, (*[(0, 0)] * (A.ndim - 2), *wide)) if n_own else A

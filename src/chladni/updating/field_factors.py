@@ -1,12 +1,13 @@
-"""What the log fields of shells and beams make of their stiffness and their mass."""
+"""Factors on stiffness and mass of shells and beams, from their log fields."""
 
 import numpy as np
 
 
 def stiffness_log(fields: dict[str, np.ndarray], component: str, power: int) -> np.ndarray:
-    """E + p t + Q: the logarithm of what multiplies stiffness that grows with t^p; of bending more.
+    """E + p t + Q: logarithm of the factor on stiffness that grows with t^p.
 
-    It is linear in the fields, so it stands for their gradients as well; (g, ...) as they are.
+    Bending stiffness, p = 3, has the field ``bending`` in addition.  The sum is linear in the
+    fields, so it serves their gradients as well; shape (g, ...) of the fields.
     """
     plain = fields["E"] + power * fields["t"]
     if power == 3:
@@ -15,5 +16,5 @@ def stiffness_log(fields: dict[str, np.ndarray], component: str, power: int) -> 
 
 
 def mass_log(fields: dict[str, np.ndarray]) -> np.ndarray:
-    """ρ + t: the logarithm of what multiplies the shells' mass, or its gradient."""
+    """ρ + t: logarithm of the factor on the shells' mass, or its gradient."""
     return fields["rho"] + fields["t"]

@@ -1,16 +1,16 @@
-"""What data that a fit did not see say of an effect: log predictive densities.
+"""Held-out evidence on an effect: log predictive densities of data that a fit did not see.
 
-An effect is asked twice, each time beside calibration alone and with the learned error of the
-model in both:
+Two tests compare an effect with calibration alone.  Both sides include the learned model error:
 
 - the data held out: p(held | fitted) = p(held, fitted) / p(fitted), a ratio of evidences about the
-  fit that is there;
+  existing fit;
 - folds of the fitted data, one sensor or one block of lines at a time, predicted from the rest. For
   residuals r of covariance C, r_b given all others has the precision P = (C⁻¹)_bb and the mean
-  r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12), here with the
-  parameters linear about their fit.
+  r_b - P⁻¹ (C⁻¹ r)_b (Rasmussen and Williams 2006, Gaussian Processes, eq. 5.12).  The parameters
+  are linear about their fit.
 
-Data that cannot feel the effect are predicted alike with and without it and have no vote.
+Data that are insensitive to the effect have equal predictions with and without it, so they do not
+count.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class HeldOutEvidence:
 
     @property
     def votes(self) -> dict[str, float]:
-        """What was asked, in words, and its answer."""
+        """Gain of each test that was made, by its name in words."""
         every = {
             "the data held out": self.held_out,
             "sensors predicted from the others": self.sensors,
@@ -56,12 +56,12 @@ def held_out_evidence(
     problem: UpdatingProblem, unseen: np.ndarray, null: HypothesisFit, hypothesis: HypothesisFit,
     about: Reduced | None = None,
 ) -> HeldOutEvidence:  # fmt: skip
-    """Ask data that the fits did not see.
+    """Evidence of held-out data for a hypothesis over the null.
 
     Parameters
     ----------
     unseen : samples held out, in the shape of ``problem.data.use``
-    null : without the effects that are asked about
+    null : without the effects that are tested
     about : the model whose state errors of form spread from; that of ``null`` unless it is given
     """
     asked = [e for e in hypothesis.effects if e not in null.effects]
@@ -79,7 +79,7 @@ def held_out_evidence(
         predictive(problem, hypothesis, folds) - predictive(problem, null, folds)
         for folds in (by_sensor, by_line)
     ]
-    faults = all(e.channels for e in asked)  # they concern no other channel
+    faults = all(e.channels for e in asked)  # they change no other channel
     sensors = None if asked and faults else gains[0]
     return HeldOutEvidence(held, sensors, gains[1])
 
@@ -98,7 +98,7 @@ def _news(problem: UpdatingProblem, hypothesis: HypothesisFit, both: Responses |
 def _evidence(
     problem: UpdatingProblem, hypothesis: HypothesisFit, data: Responses | Poles
 ) -> float:
-    """-2 ln evidence of some data, the parameters linear about the fit that is there."""
+    """-2 ln evidence of some data, the parameters linear about the existing fit."""
     fit = hypothesis.fit
     state = evaluate(hypothesis.model, fit.effects, fit.x)
     r, J = data.scaled(state, True)
@@ -114,7 +114,7 @@ def _evidence(
 
 
 def _folds_of_lines(data: Responses) -> np.ndarray:
-    """Which block each sample belongs to (n,), real and imaginary part together."""
+    """Block of neighbouring lines of each sample (n,), real and imaginary part together."""
     lines = np.flatnonzero(data.use.any(axis=1))
     block = np.full(len(data.use), -1)
     for k, part in enumerate(np.array_split(lines, min(BLOCKS, len(lines)))):
@@ -123,7 +123,7 @@ def _folds_of_lines(data: Responses) -> np.ndarray:
 
 
 def _folds_of_sensors(data: Responses) -> np.ndarray:
-    """Which output each sample belongs to (n,)."""
+    """Output of each sample (n,)."""
     return _of_samples(data, np.broadcast_to(np.arange(data.use.shape[1]), data.use.shape))
 
 

@@ -1,8 +1,8 @@
-"""Several states of one object fitted together: what is common is shared, what moves is each one's.
+"""Joint fit of several states of one object with shared parameters.
 
-The residuals of all states are stacked; E, rho, t of a part, mesh error and the like are one
-unknown for all of them, with their prior counted once, and an effect or a gain is of its state:
--2 ln posterior = Σ_states |r_s(x_shared, x_s)|² + priors.
+-2 ln posterior = Σ_states |r_s(x_shared, x_s)|² + priors.  The residuals of all states are stacked.
+E, rho, t of a part, mesh error and the like are one unknown for all states, and their prior counts
+once. An effect or a gain belongs to its state.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class JointFit:
     ----------
     x, covariance : (n,), (n, n)   of every unknown
     where : for each state, positions of its parameters in x
-    shared : {(effect, text, number): position in x} of what all states that have it share
+    shared : {(effect, text, number): position in x} of parameters that the states share
     fits : the states one by one, with their part of x and of the covariance
     """
 
@@ -38,7 +38,7 @@ class JointFit:
     fits: tuple[HypothesisFit, ...]
 
     def posterior(self) -> Posterior:
-        """Mean and standard deviation of what is shared."""
+        """Mean and standard deviation of the shared parameters."""
         sd = np.sqrt(np.diag(self.covariance))
         return {key: (float(self.x[k]), float(sd[k])) for key, k in self.shared.items()}
 
@@ -47,12 +47,12 @@ def joint_fit(
     states: Sequence[HypothesisFit], masses: Sequence[MassMeasurement | None],
     *, max_steps: int = 30, tol: float = 0.05,
 ) -> JointFit:  # fmt: skip
-    """Fit all states at once from where each stands.
+    """Fit all states at once, starting from the fit of each.
 
     Parameters
     ----------
-    states : one fit each; the first that has a shared parameter says its prior
-    masses : what each was weighed
+    states : one fit each; the first that has a shared parameter sets its prior
+    masses : weighed mass of each state
     """
     where, shared, first = _positions(states)
     n = 1 + max(int(at.max(initial=-1)) for at in where)
@@ -86,13 +86,13 @@ def joint_fit(
 def _weighed(
     one: HypothesisFit, mass: MassMeasurement | None, x: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The row of the scales alone."""
+    """The residual and slope of the weighing alone."""
     r, J = beside(one.fit.effects, mass, x, state)
     return r[len(x) :], J[len(x) :]
 
 
 def _spread(J: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
-    """Columns of one state among those of all."""
+    """The columns of one state placed among the columns of all states."""
     out = np.zeros((len(J), n))
     out[:, at] = J
     return out
@@ -101,7 +101,7 @@ def _spread(J: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
 def _positions(
     states: Sequence[HypothesisFit],
 ) -> tuple[list[np.ndarray], dict[SharedKey, int], list]:
-    """Positions of every state's parameters, of what is shared, and (prior, position) of all."""
+    """Positions of every state's and of the shared parameters, and (prior, position) of all."""
     shared: dict[SharedKey, int] = {}
     where, first, n = [], [], 0
     for one in states:
@@ -122,7 +122,7 @@ def _positions(
 
 
 def of_the_object(effect: Effect) -> bool:
-    """Whether an effect belongs to the object in all its states, and not to one test of it."""
+    """True where an effect belongs to the object in all its states, not to one test of it."""
     idle = effect.outputs(np.zeros(len(effect.parameters)))
     return effect.kind in ("ordinary", "nuisance") and idle is None
 
@@ -135,9 +135,10 @@ def _of_state(
 
 
 def informed(effects: Sequence[Effect], posterior: Posterior) -> list[Effect]:
-    """The effects with what other states say of them as their prior.
+    """The effects with the posterior of other states as their prior.
 
-    Laplace's deviations are too narrow and are widened; no prior becomes wider than it was.
+    Laplace's standard deviations are too narrow, so they are widened.  No prior becomes wider than
+    it was.
     """
     return [_informed(e, posterior) if of_the_object(e) else e for e in effects]
 
@@ -156,7 +157,7 @@ def _informed(effect: Effect, posterior: Posterior) -> Effect:
 
 
 def with_priors(effects: Sequence[Effect], known: Sequence[Effect]) -> list[Effect]:
-    """The effects with the priors that their ordinary namesakes have elsewhere."""
+    """The effects with the priors of the calibration parameters of the same name in ``known``."""
     priors = {(e.name, e.text): e.parameters for e in known if e.kind == "ordinary"}
     return [
         replace(e, parameters=priors.get((e.name, e.text), e.parameters))

@@ -1,4 +1,4 @@
-"""Numbers that ended where no such number is: they stand for something else."""
+"""Calibrated numbers with implausible values: they may stand for something else."""
 
 from collections.abc import Sequence
 from typing import TypeGuard
@@ -13,7 +13,7 @@ from .map_fit import Fit
 
 
 def leaning(fit: Fit) -> list[str]:
-    """A sentence for every ordinary number on a bound or far from the deck's value."""
+    """Sentences, one for every calibrated number on a bound or far from the deck's value."""
     return [
         said
         for effect in fit.effects
@@ -22,11 +22,12 @@ def leaning(fit: Fit) -> list[str]:
 
 
 def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
-    """Why a calibration that explains everything is not to be trusted, if it is not.
+    """Reasons why a calibration that explains the whole recording is not to be trusted.
 
-    That no physics is missing is a claim: a number no structure of this deck has, in the deck that
-    is answered with or beside it in the null, may hold what is. So may numbers none of which is far
-    by itself: one direction of E, rho and t is all that the frequencies of a strip tell.
+    "Nothing is missing" is a claim too.  A number that no structure of this deck has may stand for
+    missing physics, in the reported deck or in the null.  Several numbers may do so together,
+    although each alone is plausible.  For example, the frequencies of a strip determine only one
+    combination of E, rho and t.
     """
     own = leaning(plain) or _far_together(plain)
     far = list(dict.fromkeys((*own, *strained(null))))
@@ -40,12 +41,12 @@ def in_doubt(plain: Fit, null: Fit) -> tuple[str, ...]:
 
 
 def strained(fit: Fit) -> list[str]:
-    """A sentence for every family of joints that took more than joints of its kind scatter."""
+    """Sentences, one for every family of joints whose change exceeds the scatter of its kind."""
     return [_more(e, x) for e in fit.effects if is_strained(e, x := fit.of(e))]
 
 
 def is_strained(effect: Effect, x: np.ndarray) -> TypeGuard[ModelFamily]:
-    """Whether an effect is a family of joints that took more than joints of its kind scatter."""
+    """True for a family of joints whose change exceeds the scatter of joints of its kind."""
     known = isinstance(effect, ModelFamily) and effect.text in JOINTS
     return known and _away(effect, x) > FAR
 
@@ -60,10 +61,10 @@ def _more(family: Effect, x: np.ndarray) -> str:
 
 
 def _far_together(fit: Fit) -> list[str]:
-    """A sentence where all ordinary numbers together are as far off as one beyond ``FAR`` is.
+    """Sentence where all calibrated numbers together are as improbable as one beyond ``FAR``.
 
-    Of z = (x - μ)/σ data tell as many directions as their covariance lost of the prior's trace;
-    |z|² over these is χ² where the deck is right.
+    With z = (x - μ)/σ, |z|² is χ² where the deck is right.  Its degrees of freedom are the number
+    of directions that the data determine: the prior's trace less that of the covariance of z.
     """
     own = [e for e in fit.effects if e.kind == "ordinary" and e.parameters]
     if not own:
@@ -81,7 +82,7 @@ def _far_together(fit: Fit) -> list[str]:
 
 
 def _each(effect: Effect, name: str) -> np.ndarray:
-    """A property of each of its parameters."""
+    """An attribute of each parameter of an effect."""
     return np.array([getattr(p, name) for p in effect.parameters])
 
 
@@ -100,7 +101,7 @@ def _said(effect: Effect, x: np.ndarray) -> str:
 
 
 def _away(effect: Effect, x: np.ndarray) -> float:
-    """The largest distance from the prior's mean, in its standard deviations."""
+    """Largest distance from the prior mean, in standard deviations of the prior."""
     each: Sequence[float] = [
         abs(v - p.mean) / p.sd for v, p in zip(x, effect.parameters, strict=True)
     ]

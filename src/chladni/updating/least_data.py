@@ -1,18 +1,18 @@
-"""How much data a name needs: below it the answer is a list of what cannot be told apart.
+"""Least data to name an effect; with less, the answer lists effects that are indistinguishable.
 
-E, rho and t are three unknowns; an effect brings up to three (strength and place); two numbers more
-must be able to contradict it. A mode gives its frequency and, with responses in absolute scale, one
-number more for every channel.
+E, rho and t are three unknowns, and an effect adds up to three (strength and place).  Two further
+numbers must be able to contradict it. A mode gives its frequency and, with responses in absolute
+scale, one further number for every channel.
 """
 
 import numpy as np
 
 NUMBERS = 8  # 3 + 3 + 2, see above
-MODES = 3  # of one mode a shift can be mass or stiffness; of two any place can be made to fit
+MODES = 3  # the shift of one mode can be mass or stiffness; with two modes any place fits
 
 
 def too_little(modes: int, channels: int) -> str:
-    """Why nothing can be named from so many modes, each seen by so many fitted channels; or "".
+    """Reason why so many modes and fitted channels are too few to name an effect; or "".
 
     Channels are 0 where natural frequencies alone are compared.
     """

@@ -1,10 +1,10 @@
-"""Where on a structure lies what an explanation leaves, and where the test could not tell.
+"""Places on a structure where the residual of a fit lies, and places where the test is blind.
 
 Round every group of shells, or beams, stiffness and density are changed a little, smoothly over a
-tenth of the sheet. To first order the best amount a of such a change lowers -2 ln p by
-(cᵀC⁻¹r)² / cᵀC⁻¹c with r the residual of the fit, c its slope along the change and C the covariance
-under all that the fit has free (Rao's score test, 1948). cᵀC⁻¹c is what the sensors know of it:
-where 1/√(cᵀC⁻¹c) is large, a place is blind.
+tenth of the sheet. To first order the best amount of such a change lowers -2 ln p by
+(cᵀC⁻¹r)² / cᵀC⁻¹c (Rao's score test, 1948). Here r is the residual of the fit, c its slope along
+the change and C the covariance with all free parameters of the fit marginalised. cᵀC⁻¹c is the
+information of the sensors on the change: where 1/√(cᵀC⁻¹c) is large, a place is blind.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ from .map_fit import MassMeasurement
 from .scan import baseline, direction_scores, field_slopes
 
 RADIUS = 0.1  # of a sheet's size, the square root of its area
-BLIND = 0.5  # relative change of stiffness and of mass that the data would not notice
+BLIND = 0.5  # relative change of stiffness and of mass that the data would not detect
 NEAR = 0.5  # of the best gain: parts that reach it are named too
 
 
 @dataclass(frozen=True, eq=False)
 class LeftWhere:
-    """What a small local change of stiffness or mass would still gain.
+    """Gain of a small local change of stiffness or mass, by place.
 
     Attributes
     ----------
@@ -44,14 +44,14 @@ class LeftWhere:
 
     @property
     def blind(self) -> float:
-        """Share of the elements where the test would not notice half the stiffness or mass."""
+        """Share of elements where the test would not detect half the stiffness or mass."""
         return float(np.isnan(np.concatenate([self.gain, self.on_beams])).mean())
 
 
 def left_where(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
 ) -> LeftWhere | None:
-    """The map of one explanation; None where frequencies were compared, or all is blind."""
+    """The map of one hypothesis; None where frequencies were compared or all places are blind."""
     data, fit, groups = hypothesis.data, hypothesis.fit, hypothesis.model.groups
     if not isinstance(data, Responses) or data.error is None or not len(groups):
         return None
@@ -70,7 +70,7 @@ def left_where(
 
 
 def bumps(groups: ElementGroups) -> np.ndarray:
-    """A smooth change round each group, on its own sheet (g, g): one column each."""
+    """Smooth changes (g, g), one column each: round one group, on its own sheet."""
     sheet = groups.connected
     area = np.bincount(sheet, groups.area)[sheet]
     d2 = ((groups.centre[:, None] - groups.centre[None]) ** 2).sum(axis=2)

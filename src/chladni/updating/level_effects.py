@@ -1,4 +1,4 @@
-"""What levels of excitation name: friction and clearance, and what the deck says of the place."""
+"""Friction and clearance named from levels of excitation, and their likely place in the deck."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]
 
     Parameters
     ----------
-    model : the deck, calibrated: its modes say what bends where
+    model : the calibrated deck, whose modes give the strain energy of each part
     """
     out = []
     for name in dict.fromkeys(EFFECT.get(m.signature, "") for m in study.moving):
@@ -38,7 +38,7 @@ def level_effects(study: LevelStudy, model: Modelled) -> tuple[NamedEffect, ...]
 
 
 def _numbers(modes: Sequence[ModeStudy]) -> tuple[Estimate, ...]:
-    """The numbers of the element that explains each mode."""
+    """The parameters of the nonlinear element that explains each mode."""
     told = level_tables(LevelStudy(tuple(modes)))
     return tuple(
         Estimate(f"{n.name}, {t.rows[0].frequency_hz:.4g} Hz", n.value, n.unit, n.low, n.high)
@@ -49,7 +49,7 @@ def _numbers(modes: Sequence[ModeStudy]) -> tuple[Estimate, ...]:
 
 
 def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
-    """Parts and joints that hold the strain energy of these modes, in the deck's own."""
+    """Parts and joints that hold the strain energy of these modes, from the deck's own modes."""
     f = [float(m.mode.frequency[0]) for m in modes]
     said, parts = [], []
     for hertz, shares in zip(f, energy_shares(model, f), strict=True):
@@ -66,14 +66,14 @@ def _where(modes: Sequence[ModeStudy], model: Modelled) -> Location:
 
 @dataclass(frozen=True)
 class LinearJoint:
-    """What springs and bushes alike would be given to have a mode as it is at one level.
+    """K and GE, common to all springs and bushes, that reproduce a mode at one level.
 
     Attributes
     ----------
-    mode_hz, level : of the mode at its lowest level [Hz], [N] or [m/s²]
+    mode_hz, level : frequency at the lowest level [Hz], and the level [N] or [m/s²]
     stiffness : factor on K of the deck, which is that of the level that was fitted
-    loss : GE, with what the mode loses otherwise left in the damping of the mode
-    share : of the strain energy of the mode that they hold
+    loss : GE of the joints; other losses stay in the damping of the mode
+    share : share of the mode's strain energy in springs and bushes
     """
 
     mode_hz: float
@@ -88,12 +88,13 @@ def linear_joints(
 ) -> tuple[LinearJoint, ...]:
     """K and GE of springs and bushes at each level, where friction or clearance may sit in them.
 
-    The element's κ is a share of the mode's stiffness; joints that hold the share e of its strain
-    energy make it by K (1 + κ'/e), GE = κ''/(e + κ') (modal strain energy, to first order).
+    The element's κ is a share of the mode's stiffness.  Joints that hold the share e of the mode's
+    strain energy produce κ with K (1 + κ'/e) and GE = κ''/(e + κ') (modal strain energy, to first
+    order).
 
     Parameters
     ----------
-    fitted : the level the deck was compared with
+    fitted : the level at which the deck was fitted
     """
     told = [
         t for one, t in zip(study.modes, level_tables(study), strict=True)
@@ -113,7 +114,7 @@ def linear_joints(
 
 
 def joint_comment(joints: Sequence[LinearJoint]) -> str:
-    """The same as comments of a deck."""
+    """The linear joints as comments of a deck."""
     lines = ["Joints over levels of excitation: what a linear deck has in every spring and bush."]
     for j in joints:
         lines.append(

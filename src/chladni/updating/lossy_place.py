@@ -1,11 +1,11 @@
-"""Whether what was named only gives or holds, or dissipates as well.
+"""Test of whether a named elastic effect also dissipates.
 
 A crack, a missing weld, a soft patch or a spring to ground changes stiffness alone.  A joint that
-slips or a viscous layer gives at the same place, foam or rubber holds there, and it dissipates: the
-damping ratio of a mode grows by half the loss factor times its share of the strain energy there,
-the very share by which its eigenvalue moves (Ungar and Kerwin 1962, J. Acoust. Soc. Am. 34,
-954-957).  So where the modes that the named effect changes most are also damped most, beyond how
-damping scatters, it is not the whole truth.
+slips or a viscous layer is compliant at the same place, foam or rubber is stiff there, and all of
+these dissipate.  The damping ratio of a mode grows by half the loss factor times its share of the
+strain energy there.  Its eigenvalue moves by the same share (Ungar and Kerwin 1962, J. Acoust. Soc.
+Am. 34, 954-957).  So the modes that the named effect changes most may also be damped most, beyond
+the scatter of damping.  An elastic effect is then not the full explanation.
 """
 
 from dataclasses import replace
@@ -17,13 +17,13 @@ from .damping_scatter import FEWEST, ModalDamping
 from .hypothesis_fit import HypothesisFit
 from .reduced_model import evaluate
 
-NEAR = 0.05  # relative distance of natural frequencies beyond which a pole is none of the model's
+NEAR = 0.05  # largest relative distance of natural frequencies between a pole and its model mode
 
 
 def heard_of_damping(
     test: FitTest, hypothesis: HypothesisFit, damping: ModalDamping | None
 ) -> FitTest:
-    """The test, or that of damping following the effect where it is the less likely of the two."""
+    """The given test, or the test of damping along the effect where its p-value is smaller."""
     elastic = [e.name for e in hypothesis.effects if e.elastic]
     if damping is None or not elastic:
         return test
@@ -50,10 +50,10 @@ def heard_of_damping(
 
 
 def shifted(hypothesis: HypothesisFit, above: float) -> tuple[np.ndarray, np.ndarray]:
-    """Natural frequencies [Hz] above one (m,), and how far λ of each mode lies without the effect.
+    """Natural frequencies [Hz] above a limit (m,), and the relative change of λ without the effect.
 
-    φᵀK₀φ / φᵀM₀φ / λ - 1 of the modes φ as they are, K₀ and M₀ without the effect: above zero where
-    it gives, below where it holds.
+    The change is φᵀK₀φ / φᵀM₀φ / λ - 1 with the modes φ as fitted, K₀ and M₀ without the effect. It
+    is positive where the effect softens the mode, negative where it stiffens it.
     """
     fit = hypothesis.fit
     kept = [(e, fit.of(e)) for e in fit.effects if e not in hypothesis.effects or not e.elastic]

@@ -19,7 +19,7 @@ from .reduced_model import Reduced, State, evaluate, slices
 
 
 class Status(Enum):
-    """How a fit ended."""
+    """Outcome of a fit."""
 
     CONVERGED = "converged"
     OUT_OF_STEPS = "ran out of steps; raise max_steps or start nearer"
@@ -28,7 +28,7 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class MassMeasurement:
-    """The weighed mass and its standard deviation [kg]; a datum like any other."""
+    """Weighed mass and its standard deviation [kg]; it counts as a datum like any other."""
 
     mass: float
     sd: float
@@ -63,7 +63,7 @@ class Fit:
         return self.x[self.slice(effect)]
 
     def slice(self, effect: Effect) -> slice:
-        """Where an effect's parameters stand in x."""
+        """Positions of an effect's parameters in x."""
         at = 0
         for other in self.effects:
             if other is effect:
@@ -72,7 +72,7 @@ class Fit:
         raise ModelError(f"{effect.name} is not part of this fit")
 
     def kept(self) -> Self:
-        """The fit as a search keeps many of them: its state has let go of ∂K and ∂M."""
+        """The fit without ∂K and ∂M of its state, so that a search can keep many fits."""
         return replace(self, state=self.state.without_slopes())
 
     def sd(self, effect: Effect) -> np.ndarray:
@@ -88,7 +88,7 @@ def unknowns(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
 def beside(
     effects: Sequence[Effect], mass_measurement: MassMeasurement | None, x: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened residuals and slopes of what is known beside the data: priors and the scales."""
+    """Whitened residuals and slopes of information besides the data: priors and the weighing."""
     priors = unknowns(effects)
     mean, sd = np.array([p.mean for p in priors]), np.array([p.sd for p in priors])
     r, J = [(x - mean) / sd], [np.diag(1 / sd)]
@@ -104,7 +104,7 @@ def beside(
 def _by_effects(
     effects: Sequence[Effect], x: np.ndarray, state: State
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Residuals and slopes of what effects know beside the data."""
+    """Residuals and slopes of the information that effects add to the data."""
     lost = state.dissipated
     if lost is None:
         return
@@ -121,10 +121,10 @@ def _by_effects(
 
 
 def constants(effects: Sequence[Effect]) -> float:
-    """Of -2 ln evidence, from the effects: widths of priors, places tried, what is told without.
+    """Terms of -2 ln evidence from the effects: prior widths, number of places, extra data.
 
-    What an effect is held against beside the data counts for it by how much likelier it is with
-    the effect than without: all hypotheses are compared on the same.
+    An effect may be compared with extra data, such as measured damping.  Only the likelihood ratio
+    with and without the effect counts there, so all hypotheses are compared on the same data.
     """
     widths = sum(2 * np.log(p.sd) for p in unknowns(effects))
     return float(widths + sum(2 * np.log(e.trials_factor) - e.neg2_log_without for e in effects))
@@ -144,7 +144,7 @@ def fit(
 
     Parameters
     ----------
-    start : (n_p,)      where to begin
+    start : (n_p,)      initial x
     tol : float        stop when a step improves -2 ln posterior by less
     """
     limit = np.array([p.step for p in unknowns(effects)])
@@ -169,11 +169,11 @@ Objective = Callable[[np.ndarray, bool], tuple[np.ndarray, np.ndarray, Any]]
 def descend(
     objective: Objective, start: np.ndarray, limit: np.ndarray, max_steps: int, tol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any, Status]:
-    """Levenberg-Marquardt: x, residuals, slopes and whatever the objective hands along, there.
+    """Levenberg-Marquardt: final x, its residuals, slopes, third value of the objective, status.
 
     Parameters
     ----------
-    objective : x, whether slopes are asked for -> residuals (n,), slopes (n, n_p), anything
+    objective : x, True for slopes -> residuals (n,), slopes (n, n_p), any third value
     limit : (n_p,)     longest step
     tol : stop when a step improves the sum of squares by less
     """
@@ -187,7 +187,7 @@ def descend(
             status = Status.STALLED if np.abs(J.T @ r).max() > 1e-2 * cost else Status.CONVERGED
             break
         improved, x, damping = found
-        del state  # its slopes weigh as much as those to come
+        del state  # its slopes take as much memory as the next ones
         r, J, state = objective(x, True)
         cost = float(r @ r)
         if improved < tol:

@@ -1,7 +1,7 @@
 """Symmetric matrices of many groups over one basis, and over bases that grow from it.
 
-Every hypothesis has a basis of its own: the common one and a few vectors more. Of its matrices only
-the border is its own; what they have in common is held once, however many hypotheses there are.
+Every hypothesis has a basis of its own: the common one and a few further vectors. Only the border
+of its matrices is its own.  The common block is held once for all hypotheses.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ class MatrixStack(Protocol):
     def add_to(
         self, targets: Sequence[np.ndarray], weights: np.ndarray, among: slice = EVERY
     ) -> None:
-        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r), weights (p, n) of it."""
+        """Add Σ_g w_g A_g over the groups ``among`` to each target (r, r), weights (p, n)."""
 
 
 def weighted(stack: MatrixStack, weights: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def add_slopes(stack: MatrixStack, change: np.ndarray, slopes: np.ndarray) -> No
 
 
 def felt_alike(change: np.ndarray) -> Iterator[tuple[slice, list[int]]]:
-    """Groups, one after another, that the same parameters move (g, n_p), and these."""
+    """Slices of consecutive groups with the parameters that move them, from change (g, n_p)."""
     felt = change != 0
     ends = np.stack([felt.argmax(axis=0), len(felt) - felt[::-1].argmax(axis=0)], axis=1)
     for first, stop in np.unique(ends[felt.any(axis=0)], axis=0):
@@ -74,7 +74,7 @@ def _summed(weights: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def bordered(inner: MatrixStack, border: np.ndarray) -> "Bordered":
-    """Of matrices (g, r + k, k) that are what further vectors of a basis add."""
+    """Extend a stack by the columns (g, r + k, k) of further basis vectors."""
     r = inner.shape[1]
     corner = border[:, r:]
     return Bordered(inner, border[:, :r], (corner + corner.transpose(0, 2, 1)) / 2)

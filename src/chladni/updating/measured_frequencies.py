@@ -1,4 +1,4 @@
-"""Natural frequencies of a test: which identified poles are modes, and how far they are known."""
+"""Natural frequencies of a test: identified poles that are modes, and their uncertainty."""
 
 from collections.abc import Sequence
 
@@ -50,20 +50,20 @@ def frequencies(
     return f[keep], sd, peak / peak.max(), found, (note,)
 
 
-LEAST_DELTA_CHI2 = 3.0  # of χ² a pole must bring, over what it pays, to count as a mode
+LEAST_DELTA_CHI2 = 3.0  # least drop of χ² over the penalty of a pole for it to count as a mode
 TWIN = 0.012  # ln f within which a weaker pole belongs to the stronger one's resonance
-SHADOW = 0.04, 5.0  # ... or a much weaker one, this many times, to a pole this near
+SHADOW = 0.04, 5.0  # ln f and ratio of heights: the same for a much weaker pole
 
 
 def _peaks(found: Identified) -> np.ndarray:
-    """Height of each resonance in the accelerance, |R| ω / ζ ... up to a constant (r,)."""
+    """Height of each resonance in the accelerance, |R| ω / ζ up to a constant (r,)."""
     return (
         np.abs(found.residues).max(axis=(1, 2)) * found.frequency / np.maximum(found.damping, 1e-4)
     )
 
 
 def _prominent(found: Identified, band: tuple[float, float]) -> np.ndarray:
-    """Poles of the band that matter: a clear share of χ², usual damping, strongest of its peak."""
+    """Poles of the band with a clear share of χ² and usual damping, the strongest of each peak."""
     f, peak = found.frequency, _peaks(found)
     keep = (f >= band[0]) & (f <= band[1]) & (found.damping < 0.05)
     keep &= found.relative_delta_chi2 > LEAST_DELTA_CHI2
@@ -95,9 +95,9 @@ def band_of(question: Question, frf: FRF) -> tuple[float, float]:
 
 
 def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
-    """A little more than the band, so that modes at its ends are whole.
+    """The band [Hz], widened a little so that resonances at its ends are complete.
 
-    A fifth at most of the lower end, for a wide band says nothing of the modes below it.
+    The lower end moves by a fifth of itself at most, whatever the width of the band.
     """
     width = 0.04 * (band[1] - band[0])
     low = max(float(frf.frequency[0]), band[0] - min(width, 0.2 * band[0]))
@@ -105,12 +105,12 @@ def widened(frf: FRF, band: tuple[float, float]) -> tuple[float, float]:
 
 
 def counted(frf: FRF, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Lines of the recording that are in no gap (n_f,) bool."""
+    """Lines of the recording outside the excluded intervals (n_f,) bool."""
     return _kept(frf.frequency, exclude)
 
 
 def _kept(f: np.ndarray, exclude: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Frequencies in no gap (n,) bool."""
+    """Frequencies outside the excluded intervals (n,) bool."""
     use = np.ones(len(f), bool)
     for a, b in exclude:
         use &= (f < a) | (f > b)

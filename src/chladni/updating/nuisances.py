@@ -1,4 +1,4 @@
-"""What no calibration removes and every fit allows for: scatter, mesh, joints, shear, folds."""
+"""Nuisances that every fit allows for: scatter, mesh error, joints, shear and folds."""
 
 import scipy.sparse as sp
 
@@ -26,11 +26,13 @@ def measured_on(question: Question) -> Places:
 
 
 def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -> list[MeshError]:
-    """What the mesh hides: asked first, for a mesh twice as fine takes more memory than all else.
+    """Errors of the mesh, from a mesh twice as fine.
+
+    Call it first, because the finer mesh takes more memory than everything else.
 
     Parameters
     ----------
-    measured : where responses were measured; frequencies alone have no place
+    measured : places where responses were measured; None where only frequencies were
     """
     give_back_freed_memory()
     errors = mesh_errors(model, f_max, measured)
@@ -41,11 +43,11 @@ def mesh_hidden(model: Modelled, f_max: float, measured: Places | None = None) -
 def nuisances(
     reduced: ReducedProblem, model: Modelled, mesh: list[MeshError], poles_to: float | None = None
 ) -> list[Effect]:
-    """Scatter within parts, mesh error, joints, shear and folds: what calibration cannot remove.
+    """Scatter within parts, mesh error, joints, shear and folds: errors calibration cannot remove.
 
     Responses need no modal discrepancy: their likelihood allows any small error of modal stiffness
-    and mass. What is structured in that error stands beside it: joints and the shells' shear by
-    families, their bending at folds by parts.
+    and mass. Structured errors have effects of their own: joints and the shells' shear by families,
+    bending at folds by parts.
 
     Parameters
     ----------

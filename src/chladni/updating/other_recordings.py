@@ -1,7 +1,7 @@
-"""Recordings of the same test that no fit is made to: what they say of the one that is fitted.
+"""Further recordings of the same test, which are not fitted.
 
-Repeats and articles give the spread below which no fit is asked to go; levels tell whether natural
-frequencies move with the excitation; all of them score the decks.
+Repeats and articles give the measured spread, below which a fit need not go. Levels show whether
+natural frequencies move with the excitation. All of them score the decks.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ from .question import OtherTest, Prepared, Question
 from .result import RecordingScore
 from .written_scores import gain_offset, seen
 
-ALIKE = ("repeat", "article")  # whose differences are the spread of one test
+ALIKE = ("repeat", "article")  # relations whose differences are the spread of one test
 WINDOW = 9  # lines over which a spread is averaged: a few half-bandwidths of the equalised lines
 
 
 def others_identified(
     question: Question, band: tuple[float, float]
 ) -> tuple[list[OtherTest], list[str]]:
-    """Modes of the recordings that are not fitted, and a sentence on each that has none."""
+    """Modes of the recordings that are not fitted, and a sentence on each without modes."""
     found, notes = [], []
     for other in question.others:
         frf = other.frf
@@ -40,7 +40,7 @@ def others_identified(
 
 
 def levels(others: Sequence[OtherTest]) -> list[AtLevel]:
-    """Those that were measured at another level, or again at their own."""
+    """Recordings at another level of excitation, or repeats at the same level."""
     alike = [o for o in others if o.recording.relation in ("level", "repeat")]
     return [
         AtLevel(o.recording.level, o.recording.frf, o.identified, o.recording.control)
@@ -53,8 +53,9 @@ def measured_spread(
 ) -> np.ndarray | None:
     """Standard deviation of log10 H between repeats and articles (n_s, n_out, n_in).
 
-    Around the mean of all, K - 1 in the denominator, averaged over neighbouring lines; of so few
-    recordings half of each channel's own and half of what all channels have. None without any.
+    The variance is taken about the mean of all K recordings, with K - 1 in the denominator, and
+    averaged over neighbouring lines. Recordings are few, so it is half each channel's own and half
+    the mean of all channels. None without repeats or articles.
     """
     alike = [equalised(o.identified, s) for o in others if o.recording.relation in ALIKE]
     if not alike:
@@ -81,7 +82,7 @@ def _averaged(x: np.ndarray) -> np.ndarray:
 def spread_note(
     spread: np.ndarray | None, use: np.ndarray, others: Sequence[OtherTest]
 ) -> list[str]:
-    """A sentence on the spread that was measured, on the samples in use."""
+    """Sentence on the measured spread over the samples in use; empty without a spread."""
     names = [o.recording.name for o in others if o.recording.relation in ALIKE]
     if spread is None:
         return []

@@ -25,7 +25,7 @@ class Models:
 
 
 def models(question: Question, diagnosis: Diagnosis) -> Models:
-    """Every stage written into the assembly."""
+    """The assemblies of all stages of a diagnosis."""
     found = diagnosis.found
     nothing = diagnosis.verdict == "nothing missing"
     calibrated = question.assembly if nothing else applied(question.assembly, diagnosis.plain)
@@ -37,9 +37,9 @@ def models(question: Question, diagnosis: Diagnosis) -> Models:
 
 
 def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
-    """The assembly with the ordinary parameters and the effects of a hypothesis in it.
+    """The assembly with the calibrated parameters and the effects of a hypothesis in it.
 
-    What makes another material of a part comes before what divides the part.
+    Effects that change the material of a part come before effects that divide the part.
     """
 
     def turn(effect: Effect) -> int:
@@ -52,7 +52,7 @@ def applied(assembly: Assembly, hypothesis: HypothesisFit) -> Assembly:
 
 @dataclass(frozen=True, eq=False)
 class FittedScores:
-    """Q of the fits: mesh error and an unknown gain are in all of them, scatter in the last."""
+    """Q of the fits: all include mesh error and an unknown gain, the last also scatter."""
 
     calibrated: float
     effect: float
@@ -60,7 +60,7 @@ class FittedScores:
 
 
 def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScores, FittedScores]:
-    """Q on the data that were fitted, and on those held out."""
+    """Q on the fitted data and on the held-out data."""
     winner = diagnosis.found or diagnosis.null
     stages = _states(prepared.problem, diagnosis, winner)
     first, second = (FittedScores(*Q) for Q in scores_of(prepared, winner, stages))
@@ -70,7 +70,7 @@ def fitted_scores(prepared: Prepared, diagnosis: Diagnosis) -> tuple[FittedScore
 def scores_of(
     prepared: Prepared, winner: HypothesisFit, stages: Sequence[tuple[HypothesisFit, State]]
 ) -> list[list[float]]:
-    """Q of some states on the data that were fitted, and on those held out."""
+    """Q of some states, one list for the fitted data and one for the held-out data."""
     real = real_poles(prepared, winner)
     return [
         [prepared.score.over(fit.model).Q(state, use, real) for fit, state in stages]
@@ -79,7 +79,7 @@ def scores_of(
 
 
 def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
-    """Samples the fit never saw; of a fault of one channel, that channel's alone."""
+    """Samples held out; for a fault of one channel, the samples of that channel alone."""
     held = prepared.held
     if not winner.channels or held.ndim < 2:
         return held
@@ -89,7 +89,7 @@ def held_out(prepared: Prepared, winner: HypothesisFit) -> np.ndarray:
 
 
 def with_deck(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis with the numbers of the updated deck, where an effect of its own is named."""
+    """The diagnosis with the values of the updated deck, where it names an effect of its own."""
     found = diagnosis.found
     if found is None or diagnosis.shared:
         return diagnosis
@@ -98,7 +98,7 @@ def with_deck(prepared: Prepared, diagnosis: Diagnosis) -> Diagnosis:
 
 
 def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
-    """Poles of the test that have a partner in the winning model; the rest are spurious."""
+    """Poles of the test with a partner in the winning model (n,) bool; the rest are spurious."""
     if not isinstance(prepared.score, Poles):
         return None
     data = prepared.score.over(winner.model)
@@ -110,12 +110,12 @@ def real_poles(prepared: Prepared, winner: HypothesisFit) -> np.ndarray | None:
 
 
 def _as_given(problem: UpdatingProblem, null: HypothesisFit) -> State:
-    """The deck's own values, mesh error and gain as the fit found them, no scatter."""
+    """The state with the deck's own values, mesh error and gain as fitted, and no scatter."""
     return evaluate(null.model, problem.base, given(problem, null), False)
 
 
 def given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
-    """The same as parameters of the base."""
+    """Base parameters x with the deck's own values, mesh error and gain as fitted, no scatter."""
     x, at = problem.mean(), 0
     for e in problem.base:
         n = len(e.parameters)
@@ -130,7 +130,7 @@ def given(problem: UpdatingProblem, null: HypothesisFit) -> np.ndarray:
 def _states(
     problem: UpdatingProblem, diagnosis: Diagnosis, winner: HypothesisFit
 ) -> list[tuple[HypothesisFit, State]]:
-    """The calibrated and the updated deck, and all that the last fit had beside them."""
+    """The calibrated deck, the updated deck, and the last fit with all its nuisances."""
     null, plain = diagnosis.null, diagnosis.plain
     if diagnosis.verdict == "nothing missing":
         nominal = _as_given(problem, null)

@@ -1,22 +1,22 @@
-"""Which model mode belongs to which test pole, where no shapes were measured.
+"""Pairing of model modes with test poles where no shapes were measured.
 
-Both lists are in order of frequency, so an assignment is a monotone path; a pole or a mode may stay
+Both lists are in order of frequency, so an assignment is a monotone path. A pole or a mode may stay
 unpaired at a price.  The model is a mixture: a pole is a mode of the structure, ln f = ln f_m + ε
-with ε ~ N(0, σ²), or a spurious one, its ln f anywhere in the range.  Prices are -2 ln of those
-probabilities: of a spurious pole whatever its height, of a missed mode by how well it shows.
+with ε ~ N(0, σ²), or it is spurious and its ln f lies anywhere in the range.  Prices are -2 ln of
+these probabilities.  The price of a missed mode depends on its visibility.
 Needleman and Wunsch (1970), J. Mol. Biol. 48, 443-453 (the alignment).
 """
 
 import numpy as np
 
-SPURIOUS = 0.4  # share of poles of a recording that may be the rig's, the room's, the noise's
-FAINTEST = 0.02  # of the highest peak; less is the identification's own clutter
-CERTAIN = 5.0  # odds by which the height of a peak alone speaks for one or the other at most
-SPURIOUS_LISTED = 0.05  # the same of poles somebody has listed as modes
+SPURIOUS = 0.4  # share of a recording's poles that may come from the rig, the room or noise
+FAINTEST = 0.02  # of the highest peak; weaker poles are taken as spurious
+CERTAIN = 5.0  # largest odds from the height of a peak alone, for a mode or a spurious pole
+SPURIOUS_LISTED = 0.05  # share of spurious poles where the user lists modes
 RANGE = 3.0  # ln f over which a spurious pole may lie anywhere: 20 to 400 Hz
-MISSED = 5.0  # -2 ln p of overlooking a mode that should show as strongly as the strongest
-HARDLY = 0.3  # the same of a mode that hardly shows
-SEEN = 1.5  # decades of visibility over which the one price falls to the other
+MISSED = 5.0  # -2 ln p of missing a mode as visible as the strongest
+HARDLY = 0.3  # -2 ln p of missing a mode that is hardly visible
+SEEN = 1.5  # decades of visibility over which the price falls from MISSED to HARDLY
 
 
 def price_spurious(share: np.ndarray | float) -> np.ndarray:
@@ -30,11 +30,11 @@ def price_spurious(share: np.ndarray | float) -> np.ndarray:
 
 
 def share_spurious(strength: np.ndarray) -> np.ndarray:
-    """Chance of each pole of a recording to be spurious, by its height over the highest (n,).
+    """Probability of each pole of a recording to be spurious, by its height over the highest (n,).
 
-    What the rig or the room rings with shows faintly, and the highest peaks are the structure's:
-    over the decades from ``FAINTEST`` to 1 the density of log heights is taken to fall to nothing
-    for spurious poles and to rise from nothing for modes, both linearly.
+    Resonances of the rig or the room have low peaks, and the highest peaks are the structure's.
+    The density of log heights is linear over the decades from ``FAINTEST`` to 1.  It falls to zero
+    for spurious poles and rises from zero for modes.
 
     >>> low, high = share_spurious(np.array([0.03, 1.0]))
     >>> bool(low > SPURIOUS > high)
@@ -54,7 +54,7 @@ def price_missed(visibility: np.ndarray) -> np.ndarray:
 def paired(
     test: np.ndarray, model: np.ndarray, sd: np.ndarray, alone: np.ndarray, missed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Positions (in test, in model) of the cheapest monotone pairing, and the modes' share of it.
+    """Positions (in test, in model) of the cheapest monotone pairing; price of unpaired modes.
 
     Σ_pairs (ln f_m/f_t)²/σ² + Σ (alone of unpaired poles) + Σ (missed of unpaired modes)
 

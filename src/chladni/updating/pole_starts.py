@@ -1,7 +1,7 @@
-"""Where to begin a fit of poles: the assignment makes many valleys, so all are looked into.
+"""Starting points of a fit of poles, whose assignment makes many local optima.
 
-Sobol points of the effect's prior, the best distinct ones walked downhill by a simplex (Nelder and
-Mead 1965, Comput. J. 7, 308-313): the assignment jumps, so no slope is used.
+The effect's prior is sampled at Sobol points, and the best distinct ones start a simplex search
+(Nelder and Mead 1965, Comput. J. 7, 308-313).  It uses no slope, because the assignment jumps.
 """
 
 from collections.abc import Callable
@@ -18,10 +18,10 @@ from .likelihood import Poles
 from .reduced_model import evaluate
 
 DRAWS = 4096
-WALKED = 16  # distinct points that are walked downhill
+WALKED = 16  # distinct points from which a simplex search starts
 APART = 0.25  # of the prior sd, in one parameter at least: points that count as distinct
-WIDE = 0.03  # spread of ln f at which the points are compared before they are walked
-STEPS = 250  # evaluations of one walk
+WIDE = 0.03  # standard deviation of ln f in the comparison of the Sobol points
+STEPS = 250  # evaluations of one simplex search
 
 
 def draws(effect: Effect, count: int) -> np.ndarray:
@@ -32,10 +32,10 @@ def draws(effect: Effect, count: int) -> np.ndarray:
 
 
 def global_starts(problem: UpdatingProblem, effect: Effect, most: int = 4) -> list[np.ndarray]:
-    """The lowest distinct valleys of -2 ln posterior over the effect's own parameters.
+    """The lowest distinct minima of -2 ln posterior over the effect's own parameters.
 
-    What the case may calibrate anyway stands at its prior mean; what the effect makes superfluous
-    is left out.
+    Calibration parameters stay at their prior mean.  Base effects that this effect makes
+    superfluous are left out.
     """
     data = problem.data
     assert isinstance(data, Poles)
@@ -74,7 +74,7 @@ def _distinct(points: np.ndarray, cost: np.ndarray, most: int) -> list[int]:
 def _valleys(
     cost: Callable[[np.ndarray], float], starts: np.ndarray, sd: np.ndarray, most: int
 ) -> list[np.ndarray]:
-    """Ends of the walks, cheapest first, those that meet counted once."""
+    """Distinct ends of the simplex searches, lowest cost first."""
     options = {"maxfev": STEPS, "xatol": 1e-3, "fatol": 1e-2}
     ends = [minimize(cost, x, method="Nelder-Mead", options=options) for x in starts]
     where = np.array([end.x for end in ends]).reshape(len(ends), -1)

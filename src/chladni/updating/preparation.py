@@ -1,8 +1,8 @@
-"""From a structure and a recording to an updating problem: how the recording is read, and why.
+"""Preparation of an updating problem from a structure and a recording.
 
-With known gain and places the damping-equalised FRFs are compared; where the gain is unknown *and*
-places are uncertain, or where no FRF exists, the natural frequencies.  What is held out is chosen
-here, before anything is fitted.
+With known gain and places the damping-equalised FRFs are compared.  Natural frequencies are
+compared where the gain is unknown *and* places are uncertain, or where no FRF exists.  The held-out
+data are chosen here, before anything is fitted.
 """
 
 from collections.abc import Sequence
@@ -41,16 +41,16 @@ from .question import Prepared, Question
 from .reduced_problem import ReducedProblem, reduced_problem
 from .sensor_errors import sensor_errors
 
-ZETA = 0.08  # of the line on which hypotheses are compared: basins wide enough to walk
-ZETA_Q = 0.02  # of the line on which Q is reported
+ZETA = 0.08  # equalised damping for comparing hypotheses: it widens the basins of convergence
+ZETA_Q = 0.02  # equalised damping for the reported Q
 POSITION_UNCERTAIN = 5e-3  # [m]
-SAME_PLACE = 1e-6  # [m]: a sensor at the shaker
+SAME_PLACE = 1e-6  # [m]: a sensor nearer to a shaker counts as at its place
 SOLVED = 3.0  # times the highest frequency: modes of the deck, for the basis and for its responses
 FAR = 6.0  # reach of the basis for poles: material may be several times softer than the deck's
 
 
 def prepare(question: Question, progress: Progress = silent) -> Prepared:
-    """Identify, decide how to compare, choose what is held out, build the reduced problem."""
+    """Identify, decide how to compare, choose the held-out data, build the reduced problem."""
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
         return _by_poles(question, uncertain)
@@ -58,7 +58,7 @@ def prepare(question: Question, progress: Progress = silent) -> Prepared:
 
 
 def _place_sd(question: Question) -> float:
-    """Of the least known place of a sensor or shaker [m]."""
+    """Largest standard deviation of the place of a sensor or shaker [m]."""
     places = (question.outputs, question.inputs)
     return max(float(p.sd.max(initial=0.0)) for p in places)
 
@@ -73,7 +73,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
     f_max = reach[1]
     if question.held_band is None and not _modes_seen(found, low, fit_max):
-        held_band, fit_max = (high, high), high  # all modes lie where the band was to be held out
+        held_band, fit_max = (high, high), high  # all modes lie in the band that was to be held out
     seen = _modes_seen(found, low, fit_max)
     if not seen:
         raise FileError(
@@ -154,7 +154,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     floor = equalised_noise(found, frf, data[1].s, counted(frf, question.exclude))
     if spreads[1] is not None:
         floor = np.maximum(floor, spreads[1] ** 2)
-    borne = min(seen, _own_modes(nominal, low, fit_max))  # what a rig rings with bears no name
+    borne = min(seen, _own_modes(nominal, low, fit_max))  # poles of the rig support no effect
     few = too_little(borne, int(data[0].use.any(axis=0).sum()))
     return Prepared(
         problem, data[1], held, what, tuple(notes), nominal, floor, found, few, unseen=unseen,
@@ -163,22 +163,22 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
 
 
 def _modes_seen(found: Identified, low: float, high: float) -> int:
-    """How many poles that stand out lie between two frequencies."""
+    """Number of significant poles between two frequencies [Hz]."""
     inside = (found.frequency >= low) & (found.frequency <= high)
     return int((inside & (found.relative_delta_chi2 > LEAST_DELTA_CHI2)).sum())
 
 
-NEAR = 1.3  # factor on the band within which a mode of the deck may be one that was seen in it
+NEAR = 1.3  # factor on the band within which a mode of the deck may be a measured one
 
 
 def _own_modes(nominal: Modelled, low: float, high: float) -> int:
-    """How many flexible modes of the deck may have been seen between two frequencies."""
+    """Number of flexible modes of the deck that may have been measured between two frequencies."""
     f = nominal.modes.frequency
     return int(((f > max(low / NEAR, 1e-3 * high)) & (f < NEAR * high)).sum())
 
 
 def _held_in_words(names: Sequence[str], band: tuple[float, float]) -> str:
-    """What no fit saw: sensors, a band, or nothing."""
+    """The held-out data in words: sensors, a band, or nothing."""
     said = [f"{len(names)} sensors ({', '.join(names[:8])})"] if names else []
     said += [f"band {band[0]:g}-{band[1]:g} Hz"] if band[1] > band[0] else []
     return ", ".join(said) or "nothing"
@@ -200,7 +200,7 @@ def equalised_lines(
 
 
 def _held_sensors(question: Question) -> np.ndarray:
-    """Which outputs are held out: the named ones, or a fixed spread of a fifth of them."""
+    """Outputs that are held out: the named ones, or a fixed selection of a fifth of them."""
     labels = question.outputs.labels
     wanted = question.held_sensors
     if isinstance(wanted, tuple):
@@ -229,10 +229,10 @@ def _left_out(
 
 
 def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
-    """Held-out sensors, but for those whose level stands out: a fault must be fitted to be found.
+    """Held-out sensors, less those whose level is an outlier: a fault must be fitted to be found.
 
-    Only the choice of what is held out looks at them, by the median level against a model with
-    ordinary parameters alone.
+    Outliers are judged by their median level against a calibrated model without effects.  Nothing
+    else of the held-out data enters the choice.
     """
     data = problem.data
     assert isinstance(data, Responses)
@@ -281,7 +281,7 @@ def _by_poles(question: Question, uncertain: bool) -> Prepared:
 
 
 def _unscored(question: Question) -> list[str]:
-    """A sentence on other recordings, where natural frequencies alone are compared."""
+    """Sentence on other recordings that are not used, as natural frequencies alone are compared."""
     if not question.others:
         return []
     names = ", ".join(f"{other.name} ({other.relation})" for other in question.others)
@@ -295,7 +295,7 @@ def updating_problem(
     nuisance: list[Effect],
     f_max: float,
 ) -> UpdatingProblem:
-    """What a diagnosis works with: ordinary parameters and nuisances free, the test known."""
+    """The updating problem of a diagnosis: calibration parameters and nuisances are free."""
     base = [*freed_by(question, reduced, f_max), *nuisance]
     return UpdatingProblem(
         reduced, data, question.weighed_with_sensors, tuple(base), tuple(nuisance),
@@ -304,7 +304,7 @@ def updating_problem(
 
 
 def setup_of(question: Question, f_max: float) -> Setup:
-    """What the effects may know of the test."""
+    """The description of the test that effects may use."""
     weight = mass_properties(question.assembly)[0]
     sensors = question.outputs.shares(question.assembly)
     forces = question.inputs.shares(question.assembly)
@@ -314,9 +314,10 @@ def setup_of(question: Question, f_max: float) -> Setup:
 
 
 def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[Effect]:
-    """What the user frees; else E and t (wall) of every part, rho of every material.
+    """Parameters that the user frees; else E and t (wall) of every part, rho of every material.
 
-    Of shells and beams, that is; where there are neither, E and rho of every material of solids.
+    This default holds for shells and beams.  Without either, it is E and rho of every material of
+    solids.
     """
     if question.parameters:
         return [_freed(question, reduced, f_max, p) for p in question.parameters]
@@ -326,7 +327,13 @@ def freed_by(question: Question, reduced: ReducedProblem, f_max: float) -> list[
 
 
 def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreeParameter) -> Effect:
-    """One number, or an effect whose place is known, of the parts named."""
+    """One number, or an effect of known place, for the parts that the user names.
+
+    Raises
+    ------
+    FileError
+        If deck and test do not determine the place of the effect.
+    """
     if p.field in UNITS:
         return freed(reduced.groups, p)
     placed = family(p.field).placed
@@ -345,14 +352,14 @@ def _freed(question: Question, reduced: ReducedProblem, f_max: float, p: FreePar
 
 
 def ready_for_responses(question: Question, nominal: Modelled, f_max: float) -> ReducedProblem:
-    """A structure made ready: the basis holds what is measured, what is free, and all joints."""
+    """The reduced problem over a basis for measured dofs, free parameters and all joints."""
     built = nominal.structure
     reduced = reduced_problem(nominal, f_max, measured_on(question)(built), base=question.base)
     return carrying(reduced, [*freed_by(question, reduced, f_max), *joint_nuisances(built)])
 
 
 def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProblem:
-    """The reduced problem over a basis that carries what is free in every fit."""
+    """The reduced problem over a basis that also represents these effects."""
     for effect in effects:
         x = np.array([p.mean for p in effect.parameters])
         model = reduced.model_for(effect, x)
@@ -361,7 +368,7 @@ def carrying(reduced: ReducedProblem, effects: Sequence[Effect]) -> ReducedProbl
 
 
 def _sensor_note(question: Question) -> str:
-    """How far sensors and gauges may be off without the model being blamed for it."""
+    """Sentence on the errors of sensors and gauges that the model need not explain."""
     known, sd = question.accuracy, _place_sd(question)
     stated = f", {1e3 * sd:.2g} mm at worst where the table of sensors says it" if sd else ""
     place = f"{1e3 * known.position:.2g} mm in place{stated}"

@@ -1,4 +1,4 @@
-"""What a diagnosis is asked: a structure, what was measured on it and where (SI, Hz)."""
+"""Input of a diagnosis: a structure, its measurements and their places (SI, Hz)."""
 
 from dataclasses import dataclass, field, replace
 
@@ -23,7 +23,7 @@ from .map_fit import MassMeasurement
 
 @dataclass(frozen=True, eq=False)
 class OtherRecording:
-    """A recording of the same labels that is not fitted: repeat, article or level."""
+    """A further recording with the same labels, which is not fitted: repeat, article or level."""
 
     name: str
     relation: str
@@ -34,7 +34,7 @@ class OtherRecording:
 
 @dataclass(frozen=True, eq=False)
 class OtherTest:
-    """Such a recording with its modes."""
+    """A further recording with its identified modes."""
 
     recording: OtherRecording
     identified: Identified
@@ -42,10 +42,10 @@ class OtherTest:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Everything a diagnosis is asked with (SI, Hz).
+    """All input of a diagnosis (SI, Hz).
 
-    ``assembly`` is the article, as the deck has it; what was measured is ``tested`` of it.
-    ``held_sensors`` and ``held_band`` are never fitted; None: chosen here.
+    ``assembly`` is the article as the deck has it; ``tested`` gives it with the sensors' masses.
+    ``held_sensors`` and ``held_band`` are never fitted; where None, ``prepare`` chooses them.
     """
 
     assembly: Assembly
@@ -61,23 +61,23 @@ class Question:
     held_sensors: tuple[str, ...] | int | None = None
     held_band: tuple[float, float] | None = None
     gain_known: bool = True
-    parameters: tuple[FreeParameter, ...] = ()  # what the user frees; none: a default set
+    parameters: tuple[FreeParameter, ...] = ()  # freed by the user; none: a default set
     carried: tuple[tuple[int, float], ...] = ()  # (grid, kg) of sensors of known mass
     others: tuple[OtherRecording, ...] = ()
     level: float | None = None  # of the recording that is fitted [N], [m/s²]
-    control: Control = "force"  # what was held at it
+    control: Control = "force"  # quantity that was kept at the level
     accuracy: SensorAccuracy = field(default_factory=SensorAccuracy)
     identified_noise: bool = False  # whiten with the covariance of the identification
 
     def tested(self, assembly: Assembly) -> Assembly:
-        """An article with the sensors of known mass on it, as it was measured."""
+        """The article with the sensors of known mass on it, as it was measured."""
         if not self.carried:
             return assembly
         grids, m = zip(*self.carried, strict=True)
         return with_masses(assembly, grids, np.array(m))
 
     def searched(self, assembly: Assembly) -> Assembly:
-        """The same with springs in its rigid ties, so firm that nothing gives until one is let."""
+        """The tested article with springs in its rigid ties, stiff enough to act as rigid."""
         return on_firm_springs(self.tested(assembly))
 
     @property
@@ -86,12 +86,12 @@ class Question:
         return self.inputs.directions if self.inputs.base.any() else None
 
     def driven_around(self, built: Structure) -> sp.csr_array:
-        """How modes are driven: rows at the likely places of the shakers, or the base's load."""
+        """Rows of the excitation: at the likely places of the shakers, or the base's load."""
         return self.inputs.around(built) if self.base is None else self.inputs.loads(built)
 
     @property
     def weighed_with_sensors(self) -> MassMeasurement | None:
-        """The weighing of the article and what the sensors add to it, as the model has them."""
+        """The weighed mass of the article plus the sensors' masses, as the model has them."""
         if self.mass_measurement is None:
             return None
         mass = self.mass_measurement.mass + sum(m for _, m in self.carried)
@@ -100,19 +100,19 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """An updating problem and what scores it.
+    """An updating problem and the data that score it.
 
     Attributes
     ----------
-    problem : what the diagnosis works with
+    problem : the updating problem of the diagnosis
     score : data on which Q is reported (over the same basis), with ``use`` = fitted samples
     held : samples held out, in the shape of ``score.use``
     what : the held-out data in words
-    notes : how the recording was read, and why
-    nominal : the structure of the deck, its modes solved as far as anyone here asks
+    notes : sentences on how the recording is compared, and why
+    nominal : the structure of the deck, with all modes that a diagnosis needs
     unseen : the held-out samples in the shape of ``problem.data.use``
     noise : E|Δ log10 H|² of the samples from the noise of the recording; None for poles
-    others : recordings that no fit sees, with their modes
+    others : recordings that are not fitted, with their modes
     levels : the modes over levels of excitation, where there are two and more
     """
 
@@ -124,7 +124,7 @@ class Prepared:
     nominal: Modelled
     noise: np.ndarray | None = None
     identified: Identified | None = None
-    too_little: str = ""  # why the data cannot bear a name
+    too_little: str = ""  # reason why the data are too few to name an effect
     kept: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))  # poles that are modes
     unseen: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     others: tuple[OtherTest, ...] = ()

@@ -1,12 +1,12 @@
-"""Modes of the reduced model, and what its slopes are in them."""
+"""Modes of the reduced model, and its slopes in modal coordinates."""
 
 import numpy as np
 import scipy.linalg as sl
 
 from ..errors import ModelError
 
-SEEN = 0.1  # rounding of the highest λ [rad²/s²] beyond which soft modes are sought another way
-FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: above it none is rigid; what rounding leaves
+SEEN = 0.1  # rounding of the highest λ [rad²/s²] above which soft modes need another solver
+FLEXIBLE, ROUNDING = 1e-9, 1e-12  # of the highest λ: flexible modes lie above; size of rounding
 
 
 def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -31,9 +31,10 @@ def real_modes(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _softest_first(K: np.ndarray, M: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same where something is so stiff that its rounding would be seen in soft modes.
+    """λ and φ where a part is so stiff that its rounding would spoil soft modes.
 
-    Of M φ = μ (K + σM) φ, μ = 1 / (λ + σ), the softest are the largest, and rounding is of these.
+    The problem M φ = μ (K + σM) φ with μ = 1 / (λ + σ) has the softest modes at the largest μ, and
+    rounding is relative to these.
     """
     mu, phi = sl.eigh(M, K + shift * M, driver="gvd")
     mu, phi = mu[::-1], phi[:, ::-1]
@@ -41,7 +42,7 @@ def _softest_first(K: np.ndarray, M: np.ndarray, shift: float) -> tuple[np.ndarr
 
 
 def in_modes(slopes: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    """φᵀ A φ of every slope (n_p, m, m); most parameters move stiffness or mass alone."""
+    """φᵀ A φ of every slope (n_p, m, m), in place; zero slopes are skipped."""
     acts = slopes.any(axis=(1, 2))
     slopes[acts] = phi.T @ slopes[acts] @ phi
     return slopes

@@ -1,8 +1,8 @@
-"""The reduced model in which every hypothesis is tried.
+"""The reduced model on which every hypothesis is tested.
 
 K(x) = K_0 + Σ_g e^{E+t} A_g + e^{E+3t+b} B_g + Σ c bᵀb + Σ c A over groups g of shells and beams, M
-likewise; E, t, ρ, b (bending alone) are the sums of the log fields of all effects at x.  It costs a
-small dense eigenproblem; derivatives are exact, K and M being known functions of the fields.
+likewise.  E, t, ρ, b (bending alone) are the sums of the log fields of all effects at x.  A state
+costs a small dense eigenproblem.  Derivatives are exact, as K and M are known functions of x.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,13 +37,13 @@ class Reduced:
     Attributes
     ----------
     groups : of the structure's shells and beams
-    vectors : Φ (n, r)        M-orthonormal; behind the dofs of the deck those of clamps let go
+    vectors : Φ (n, r)        M-orthonormal; dofs of released clamps follow those of the deck
     linear, cubic : {component: (g, r)}  "" alone, or one entry for each of Q11 Q22 Q12 Q66
     mass : (g, r)             these three are stacks of r by r matrices, one for each group
-    K0, M0 : (r, r)           all that is in no group
-    weight0 : float           mass beside the groups [kg]
-    base : what a moving base does to the basis, or None where forces drive the structure
-    following : (n, clamps)   how the structure follows unit motions of clamps that were let go
+    K0, M0 : (r, r)           share of everything outside the groups
+    weight0 : float           mass outside the groups [kg]
+    base : participation of the basis in base motion, or None where forces drive the structure
+    following : (n, clamps)   response of the structure to unit motions of released clamps
     """
 
     groups: ElementGroups
@@ -57,24 +57,24 @@ class Reduced:
     base: BaseParticipation | None = None
     following: np.ndarray | None = None
     _seen: dict[int, tuple[sp.csr_array, np.ndarray]] = field(default_factory=dict, repr=False)
-    _within: "Reduced | None" = None  # over the first vectors of this basis: what it knows is kept
+    _within: "Reduced | None" = None  # over the first vectors of this basis; its results are reused
 
     @property
     def basis(self) -> np.ndarray:
-        """Φ in one array, made anew at each call."""
+        """Φ in one array, built at each call."""
         return np.hstack(self.vectors.blocks)
 
     def rows(self, rows: sp.csr_array, keep: bool = True, strained: bool = False) -> np.ndarray:
-        """Rows of the structure in the basis (k, r); projected once where they are to be kept.
+        """Rows of the structure in the basis (k, r); projected once where ``keep`` is true.
 
-        Rows over the dofs of the deck see no clamp's own; ``strained`` ones see what deforms.
+        Rows over the dofs of the deck are zero at clamps.  ``strained`` rows see only deformation.
         """
         if keep:
             return self._once(rows, lambda: self._rows(rows, strained))
         return self.vectors.seen(self.wide(rows, strained))
 
     def _rows(self, rows: sp.csr_array, strained: bool) -> np.ndarray:
-        """All of them; an extended model looks at its new vectors alone."""
+        """Project rows; an extended model projects on its new vectors alone."""
         wide, inner = self.wide(rows, strained), self._within
         if inner is None or wide.shape[1] > inner.vectors.shape[0]:
             return self.vectors.seen(wide)
@@ -84,7 +84,7 @@ class Reduced:
         return np.hstack([old, wide @ self.vectors.blocks[-1][: wide.shape[1]]])
 
     def wide(self, rows: sp.csr_array, strained: bool) -> sp.csr_array:
-        """The rows; ``strained`` ones over clamps as well, less what follows them."""
+        """The rows; ``strained`` ones get columns for clamps, less the motion that follows."""
         if not strained or self.following is None:
             return rows
         return sp.csr_array(sp.hstack([rows, sp.csr_array(-(rows @ self.following))]))
@@ -101,7 +101,7 @@ class Reduced:
             return self.vectors.reduced(A)
         old = self._within.operator(A)
         r = len(old)
-        if r == self.vectors.shape[1]:  # of the same basis: clamps let go
+        if r == self.vectors.shape[1]:  # the same basis: only clamps were released
             return old
         border = self.vectors.bordering(A)
         return np.block([[old, border[:r]], [border[:r].T, _symmetric(border[r:])]])
@@ -113,7 +113,7 @@ class Reduced:
         return known[1]
 
     def released(self, built: Structure, following: np.ndarray) -> Self:
-        """The same model of a structure with more dofs, which no vector of the basis moves yet."""
+        """The model on a structure with further dofs, which no vector of the basis moves yet."""
         more = len(built.system.dofs) - self.vectors.shape[0]
         return replace(
             self, groups=replace(self.groups, structure=built), following=following,
@@ -122,7 +122,7 @@ class Reduced:
         )  # fmt: skip
 
     def extended(self, vectors: np.ndarray) -> Self:
-        """The same model over a basis that holds these (n, k) as well; short ones move no clamp."""
+        """The model over a basis that also holds these vectors (n, k); short ones move no clamp."""
         system, (n, r) = self.groups.structure.system, self.vectors.shape
         if len(vectors) < n:
             vectors = np.pad(vectors, ((0, n - len(vectors)), (0, 0)))
@@ -131,7 +131,7 @@ class Reduced:
             return self
         basis, k = self.vectors.grown(new), new.shape[1]
         stiff: dict[str, list[np.ndarray]] = {}
-        for name, pair in self.pieces():  # the mass goes along, which costs less than alone
+        for name, pair in self.pieces():  # the mass is projected with them, which costs less
             *stiff[name], heavy = self.groups.project([*pair, self.groups.mass], basis, k)
 
         def rest(old: np.ndarray, A: sp.csr_array, shells: Sequence[np.ndarray]) -> np.ndarray:
@@ -157,12 +157,12 @@ class Reduced:
             yield from self.groups.components()
 
     def split_for(self, effect: Effect, x: np.ndarray) -> Self:
-        """The same model, split into components where the effect changes one of them."""
+        """The model, split into components where the effect changes one of them."""
         split = any(change.field in COMPONENTS for change in effect.fields(x))
         return self.with_components() if split and "" in self.linear else self
 
     def with_components(self) -> Self:
-        """The same model, the plane stiffness in four components; one for all who hold it."""
+        """The model with plane stiffness in four components; one copy serves all its users."""
         if (known := self._split.get("")) is not None:
             return known
         linear: dict[str, MatrixStack] = {}
@@ -178,7 +178,7 @@ class Reduced:
 
 
 def reduce(groups: ElementGroups, basis: np.ndarray, base: BaseMotion | None = None) -> Reduced:
-    """Project a structure on a basis; ``base`` where its supports are what moves."""
+    """Project a structure on a basis; ``base`` is given where moving supports are the input."""
     system, vectors = groups.structure.system, Basis((np.ascontiguousarray(basis),))
     linear, cubic, mass = groups.project((groups.linear, groups.cubic, groups.mass), vectors)
     K, M = vectors.reduced(system.elastic), vectors.reduced(system.M)
@@ -196,16 +196,16 @@ class State:
 
     Attributes
     ----------
-    lam : (m,)             ω² [rad²/s²]; m = r and the degrees of freedom that effects bring
+    lam : (m,)             ω² [rad²/s²]; m = r plus the degrees of freedom that effects add
     phi : (r, m)           eigenvectors in the basis
     own : (m - r, m)       eigenvectors at the degrees of freedom of effects
-    dK, dM : (n_p, m, m)   ∂K, ∂M over the basis and what effects bring; None where not asked for
-    weight, dweight        mass on the scales [kg] and its gradient (n_p,)
+    dK, dM : (n_p, m, m)   ∂K, ∂M over the basis and dofs of effects; None where not requested
+    weight, dweight        weighed mass [kg] and its gradient (n_p,)
     offset, doffset        log10 factor of the channels (n_out,), (n_out, n_p), or None
     drive, ddrive          load of a moving base on each mode (k, r), (n_p, k, r), or None
-    dissipated             what effects dissipate in the modes, or None
+    dissipated             dissipation of effects in the modes, or None
     moved, dmoved          change of the modes where they are measured, outputs and inputs (p, m),
-                           or None, and its derivative by the parameters it hangs on
+                           or None, and its derivatives by position of the parameter
     """
 
     lam: np.ndarray
@@ -229,7 +229,7 @@ class State:
         return np.concatenate([self.phi, self.own])
 
     def without_slopes(self) -> Self:
-        """The same without ∂K and ∂M, which weigh ten times the rest."""
+        """The state without ∂K and ∂M, which take ten times the memory of the rest."""
         lost = self.dissipated
         return replace(self, dK=None, dM=None, dissipated=None if lost is None else lost.held)
 
@@ -301,7 +301,7 @@ def evaluate(
 def _moved(
     model: Reduced, effects: Sequence[Effect], x: np.ndarray, phi: np.ndarray
 ) -> tuple[np.ndarray | None, dict[int, np.ndarray]]:
-    """What the effects change of the modes at the places that were measured; its derivatives."""
+    """Change of the modes by effects at the measured places, and its derivatives."""
     total: np.ndarray | None = None
     slopes: dict[int, np.ndarray] = {}
     for effect, at in slices(effects):
@@ -317,7 +317,7 @@ def _moved(
 def _participating(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], n_own: int
 ) -> Participating | None:
-    """What the base does to the shells as these fields have them; None where it does not move."""
+    """Base participation of the shells with these fields; None where the base does not move."""
     if model.base is None:
         return None
     w = np.exp(mass_log(logs))
@@ -325,7 +325,7 @@ def _participating(
 
 
 def slices(effects: Sequence[Effect]) -> list[tuple[Effect, slice]]:
-    """Every effect and where its parameters stand in x."""
+    """Every effect and the positions of its parameters in x."""
     ends = np.cumsum([len(e.parameters) for e in effects])
     return [(e, slice(end - len(e.parameters), end)) for e, end in zip(effects, ends, strict=True)]
 
@@ -338,7 +338,7 @@ def log_fields(
     Raises
     ------
     ModelError
-        If a component of the plane stiffness is to change in a model that is not split by them.
+        If a component of the plane stiffness changes in a model that is not split into components.
     """
     n, n_p = len(model.groups), count(effects)
     logs = {name: np.zeros(n) for name in ("t", "E", "rho", "bending", *COMPONENTS)}
@@ -357,7 +357,7 @@ def log_fields(
 def _shells(
     model: Reduced, logs: dict[str, np.ndarray], slopes: dict[str, np.ndarray], gradient: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """K, M and, where asked for, their derivatives (n_p, r, r) from the fields."""
+    """K, M and, with ``gradient``, their derivatives (n_p, r, r) from the fields."""
     r, n_p = len(model.K0), slopes["t"].shape[1] if gradient else 0
     K, M, dK, dM = model.K0.copy(), model.M0.copy(), np.zeros((n_p, r, r)), np.zeros((n_p, r, r))
     for stacks, power in ((model.linear, 1), (model.cubic, 3)):
@@ -373,7 +373,7 @@ def _shells(
 def _add(
     stack: MatrixStack, w: np.ndarray, change: np.ndarray | None, A: np.ndarray, dA: np.ndarray
 ) -> None:
-    """Add Σ_g w_g A_g to A, and its slopes to those of the parameters that have any."""
+    """Add Σ_g w_g A_g to A, and the slopes Σ_g c_gp A_g to dA where ``change`` is given."""
     if not len(w):
         return
     stack.add_to([A], w[None])

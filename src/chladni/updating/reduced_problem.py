@@ -1,4 +1,4 @@
-"""A structure made ready for trying hypotheses: groups of elements, basis, factor, places."""
+"""A structure prepared for testing hypotheses: groups of elements, basis, factor, places."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from ..model.assembly import Assembly
 from ..sparse.factor import Factor
 from .reduced_model import Reduced, reduce
 
-FEWEST = 12  # modes of a basis whose structure has no flexible one below that: six, and six rigid
-FOLLOWED = 10  # rounds in which the response to a clamp's motion is found with a shifted factor
+FEWEST = 12  # modes of a basis without a flexible mode in reach: six rigid, six flexible
+FOLLOWED = 10  # iterations for the response to a clamp's motion, which use a shifted factor
 AT_ONCE = 32  # places whose static responses are in memory at a time
 REACH = 2.5  # the basis holds modes up to this many times the highest frequency of interest
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedProblem:
-    """One structure, its reduced model, and where unknown things may sit.
+    """One structure, its reduced model, and the candidate places of effects.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class ReducedProblem:
     f_max: float
 
     def flexibility(self, where: ElementGrids) -> np.ndarray:
-        """B (K + σM)⁻¹ bᵀ less what the basis has of it (k,) [m/N]."""
+        """b (K + σM)⁻¹ bᵀ less the share within the basis (k,) [m/N]."""
         exact = np.concatenate(
             [(rows @ attachments(self.factor, rows)).diagonal() for rows in _pieces(where.rows)]
         )
@@ -60,11 +60,11 @@ class ReducedProblem:
         return np.maximum(exact - inside, 0.0)
 
     def with_attachments(self, rows: sp.csr_array) -> Reduced:
-        """The reduced model over a basis that can carry these rows."""
+        """The reduced model over a basis with the static responses to loads on these rows."""
         return self.model.extended(attachments(self.factor, rows))
 
     def model_for(self, effect: Effect, x: np.ndarray) -> Reduced:
-        """The reduced model over a basis that can carry an effect near x, split as it needs."""
+        """The reduced model over a basis that can represent an effect near x, split as needed."""
         model, rows = self.model, effect.basis_rows(x, self.shapes)
         if rows is None:
             return model.split_for(effect, x)
@@ -93,9 +93,9 @@ class ReducedProblem:
         return self.model.vectors.blocks[0][: len(self.structure.system.dofs), :low]
 
     def _released(self, effect: Effect) -> Reduced:
-        """The reduced model with clamps let go, which the structure follows by -K⁻¹ K_qg.
+        """The reduced model with clamps released; the structure follows their motion by -K⁻¹ K_qg.
 
-        The factor is that of K + σM; each round leaves σ/(σ + λ_1) = 1/5 of the last error.
+        The factor is that of K + σM; each iteration leaves σ/(σ + λ_1) = 1/5 of the last error.
         """
         if self.model.following is not None:
             return self.model
@@ -109,7 +109,7 @@ class ReducedProblem:
 
 
 def _pieces(rows: sp.csr_array) -> Iterator[sp.csr_array]:
-    """Some rows at a time: their static responses are as large as the structure each."""
+    """Blocks of rows, to save memory: each static response has all dofs of the structure."""
     yield from (rows[k : k + AT_ONCE] for k in range(0, rows.shape[0], AT_ONCE))
 
 
@@ -118,7 +118,7 @@ def reduced_problem(
     groups: int = 64, extra: np.ndarray | None = None, reach: float = REACH,
     base: np.ndarray | None = None,
 ) -> ReducedProblem:  # fmt: skip
-    """Make a structure ready.
+    """Build the reduced problem of a structure.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def reduced_problem(
         model = modelled(model, reach * f_max)
     built, modes = model.structure, model.up_to(reach * f_max)
     flexible = modes.frequency[modes.frequency > 0.02 * f_max]
-    if not len(flexible):  # stiffer than all that was measured
+    if not len(flexible):  # the first flexible mode lies above the measured band
         modes = normal_modes(built.system, min(FEWEST, len(built.system.dofs)))
         flexible = modes.frequency[modes.frequency > 0.02 * f_max]
     hertz = 0.5 * float(flexible[0]) if len(flexible) else 0.1 * f_max

@@ -1,4 +1,4 @@
-"""A fit once more where the reduced model has left its ground."""
+"""Renewal of a fit where the reduced model is no longer accurate."""
 
 from dataclasses import dataclass, replace
 
@@ -17,18 +17,18 @@ from .question import Prepared, Question
 from .reduced_model import evaluate
 from .reduced_problem import reduced_problem
 
-TRIES = 3  # times the basis is widened by what it lacks
+TRIES = 3  # times the basis is extended by its missing vectors
 
 
 @dataclass(frozen=True, eq=False)
 class Renewal:
-    """A hypothesis on ground that bears it.
+    """A hypothesis fitted again on a more accurate reduced model.
 
     Attributes
     ----------
     hypothesis : HypothesisFit
-    note : how far the reduced model is off
-    worst : largest relative frequency error that is left
+    note : sentence on the error of the reduced model
+    worst : largest remaining relative frequency error
     """
 
     hypothesis: HypothesisFit
@@ -37,7 +37,7 @@ class Renewal:
 
     @property
     def distrust(self) -> tuple[str, ...]:
-        """Why the result is not to be trusted; empty where the reduced model serves."""
+        """Reason not to trust the result; empty where the reduced model is accurate enough."""
         if self.worst <= LIMIT:
             return ()
         return (
@@ -50,12 +50,12 @@ class Renewal:
 def renewed(
     question: Question, prepared: Prepared, hypothesis: HypothesisFit, held: bool = False
 ) -> Renewal:
-    """The hypothesis on ground that bears it, and a sentence on how far the reduced model is off.
+    """Fit a hypothesis again on an accurate reduced model, and report the model's error.
 
-    Mesh error, modal discrepancy and the basis belong to the structure they were made for. Where
-    the effect makes it another one they are made anew. Elsewhere the basis is widened by what it
-    lacks, while it lacks more than ``LIMIT``. The same parameters are then fitted from where they
-    were, or ``held`` there.
+    Mesh error, modal discrepancy and the basis belong to the structure they were made for. They are
+    computed again where the effect changes that structure. Otherwise the basis is extended by its
+    missing vectors until its error is at most ``LIMIT``. The same parameters are then fitted from
+    their last values, or ``held`` at them.
     """
     problem = prepared.problem
     if any(e.remakes_structure for e in hypothesis.effects):
@@ -73,7 +73,7 @@ def renewed(
                 fit = replace(begun, state=state, data=data)
             else:
                 fit = fitted(model, begun.effects, data, problem.mass_measurement, begun.x)
-        except ModelError as error:  # what the coarse basis could not feel
+        except ModelError as error:  # the coarse basis hid an impossible structure
             note = f"{note}; with what it lacked added to its basis it could not be fitted: {error}"
             break
         hypothesis = replace(hypothesis, fit=fit, model=model)
@@ -97,7 +97,7 @@ def _said(found: Accuracy) -> str:
 def _on_new_structure(
     question: Question, old: UpdatingProblem, hypothesis: HypothesisFit
 ) -> tuple[UpdatingProblem, HypothesisFit]:
-    """A strong change fitted again on a structure that has it already, with all named beside it."""
+    """Fit a strong change again on a structure that includes it, with the other named effects."""
     assembly, found = question.assembly, []
     for effect in hypothesis.effects:
         x = hypothesis.fit.of(effect)
@@ -129,7 +129,7 @@ def _on_new_structure(
 
 
 def _with_valleys(hypothesis: HypothesisFit, old: HypothesisFit) -> HypothesisFit:
-    """The hypothesis with other values that it had, as far behind it as they were."""
+    """The hypothesis with its earlier local optima, at the same distance in evidence as before."""
     ahead = hypothesis.neg2_log_evidence - old.neg2_log_evidence
     valleys = (replace(v, neg2_log_evidence=v.neg2_log_evidence + ahead) for v in old.valleys)
     return replace(hypothesis, valleys=tuple(valleys))

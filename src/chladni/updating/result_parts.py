@@ -1,4 +1,4 @@
-"""What a diagnosis says, part by part: effects, alternatives, calibrated values, the remainder."""
+"""Parts of a diagnosis report: effects, alternatives, calibrated values, the remainder."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -26,12 +26,12 @@ from .result import (
 )
 from .rows_of_fits import row_of
 
-STRUCTURED = 5.0  # times the spread of the recording: more than that is not noise
-HEAVIER = 0.02  # of the deck's mass: what paint and sealant weigh, which no deck of sheets has
+STRUCTURED = 5.0  # times the standard deviation of the recording: more than that is not noise
+HEAVIER = 0.02  # of the deck's mass: paint and sealant, which no deck of sheets contains
 
 
 def named_effects(diagnosis: Diagnosis) -> tuple[NamedEffect, ...]:
-    """The effects that are named, where they are and how large; what gains most comes first."""
+    """The named effects with place and size, largest gain first."""
     found = diagnosis.found
     if found is None:
         return ()
@@ -55,7 +55,7 @@ def _located(hypothesis: HypothesisFit, effect: Effect) -> Location:
 
 
 def _reported(hypothesis: HypothesisFit, effect: Effect) -> tuple[Estimate, ...]:
-    """The values of an effect; intervals reach over all valleys that are nearly as probable."""
+    """The values of an effect; intervals span all local optima that are nearly as probable."""
     rows = effect.reported(hypothesis.fit.of(effect), hypothesis.fit.sd(effect))
     if effect is not hypothesis.effect:
         return rows
@@ -73,7 +73,7 @@ def _reach(pick: Callable[[list[float]], float], values: Iterable[float | None])
 
 
 def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """A sentence on other values of the named effect that explain the poles nearly as well."""
+    """Sentence on other values of the named effect that explain the poles nearly as well."""
     found = diagnosis.found
     if found is None or not found.nearly:
         return ()
@@ -98,7 +98,7 @@ def otherwise(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> tuple[str, ...]:
-    """A sentence on weight that the deck lacks or has too much of, where nothing is named.
+    """Sentence on a difference between weighed mass and deck, where no effect is named.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def laid_on_sheets(diagnosis: Diagnosis, weighed: float | None, deck: float) -> 
 
 
 def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
-    """Everything that was tried and is not the answer, with the reason; most probable first."""
+    """All tested hypotheses that are not the answer, with the reason; most probable first."""
     found = diagnosis.found
     best = found if found is not None else diagnosis.null
     named = () if found is None else tuple(e.name for e in found.effects)
@@ -137,7 +137,7 @@ def alternatives(diagnosis: Diagnosis) -> tuple[Alternative, ...]:
 
 
 def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit) -> str:
-    """Why a hypothesis was not named, with a number."""
+    """Reason why a hypothesis was not named, with a number."""
     gain, due = diagnosis.two_log_bayes_factor(hypothesis), diagnosis.due_of(hypothesis)
     if refused := dict(diagnosis.passed_over).get(hypothesis.effect.name):
         return f"gains {gain:.1f} in -2 ln evidence, but {refused}"
@@ -163,7 +163,7 @@ def why_not(diagnosis: Diagnosis, hypothesis: HypothesisFit, best: HypothesisFit
 def agreement(
     prepared: Prepared, diagnosis: Diagnosis, fitted: Scores, held_out: Scores
 ) -> Agreement:
-    """The scores, what was held out, and what the leading effect gained."""
+    """The scores, the held-out data in words, and the gain of the leading effect."""
     found = diagnosis.found
     last, what = found or diagnosis.null, prepared.what
     if last.channels:
@@ -180,9 +180,9 @@ def agreement(
 
 
 def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
-    """Why a calibration is not to be trusted: it predicts the held-out data worse than the deck.
+    """Reason not to trust a calibration that predicts the held-out data worse than the deck.
 
-    By no more than the noise of the recording leaves of Q it may be chance.
+    An increase of Q within the noise of the recording may be chance and is accepted.
     """
     held = None if agreement is None else agreement.held_out
     if held is None or held.nominal is None or held.calibrated is None:
@@ -197,10 +197,10 @@ def foretells_worse(agreement: Agreement | None) -> tuple[str, ...]:
 
 
 def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
-    """Ordinary parameters as they were found beside scatter, joints and folds, and in the decks.
+    """Calibrated parameters as estimated with scatter, joints and folds, and as written.
 
-    The deck that is written has none of these to stand for and may need other values to respond
-    alike: those that serve it are no estimates. Of several states the shared ones are both.
+    The written deck has no such nuisances, so it may need other values for the same response.  Its
+    values are therefore no estimates.  Parameters shared by several states serve as both.
     """
     deck = (diagnosis.as_deck or diagnosis.plain).fit
     whole = (diagnosis.found or diagnosis.null).fit
@@ -213,14 +213,14 @@ def calibrated(diagnosis: Diagnosis) -> tuple[CalibratedParameter, ...]:
         written = effect.reported(deck.of(effect), fit.sd(effect))
         for parameter, row, other in zip(effect.parameters, rows, written, strict=True):
             given = parameter.value(parameter.nominal)
-            called = getattr(effect, "called", "")  # by the user
+            called = getattr(effect, "called", "")  # the user's name of the parameter
             where = f"{called}: {effect.text}" if called not in ("", row.name) else effect.text
             out.append(CalibratedParameter(where, row, given, other.value if changed else given))
     return tuple(out)
 
 
 def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
-    """Ordinary parameters that several states share, fitted to all of them at once."""
+    """Calibrated parameters that several states share, fitted to all of them at once."""
     seen: dict[tuple[str, str], CalibratedParameter] = {}
     for one in joint.fits:
         for effect in (e for e in one.fit.effects if e.kind == "ordinary"):
@@ -234,7 +234,7 @@ def shared_values(joint: JointFit) -> tuple[CalibratedParameter, ...]:
 
 
 def remainder(prepared: Prepared, diagnosis: Diagnosis) -> Remainder:
-    """Is what calibration leaves structure or noise: its rms over the recording's own spread."""
+    """The residual of calibration compared with the recording's noise, in rms."""
     plain = diagnosis.plain
     if isinstance(prepared.score, Poles):
         real = real_poles(prepared, diagnosis.found or diagnosis.null)

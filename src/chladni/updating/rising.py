@@ -1,16 +1,16 @@
 """Stiffness that rises with frequency and dissipates, in a model whose modes are real.
 
-Where damping is equalised a mode shows the stiffness it meets at its own frequency.  So what rises
-is multiplied from either side by a function of the model's own frequencies, Ĝ = g(M⁻¹K), which is
-diagonal in the modes it has without the rise; its derivative is that of a function of a matrix,
+With equalised damping a mode shows the stiffness at its own frequency.  So the rising stiffness is
+multiplied from both sides by a function of the model's own frequencies, Ĝ = g(M⁻¹K).  It is
+diagonal in the modes without the rise.  Its derivative is that of a function of a matrix, by
 divided differences of g (Daleckii and Krein; Higham 2008, Functions of Matrices, 3.11).
 
-What it loses is no part of K, but N = Σ η φᵀ A φ: on its diagonal the damping of the modes,
-ζ_j = N_jj / 2λ_j (Ungar and Kerwin 1962), and beside it what makes modes complex,
+The loss is not in K but in N = Σ η φᵀ A φ.  Its diagonal gives the damping of the modes,
+ζ_j = N_jj / 2λ_j (Ungar and Kerwin 1962).  Its other entries make modes complex,
 ψ_j = φ_j + i Σ_i φ_i N_ij / (λ_j - λ_i), i ≠ j.
 
-Complex residues outlive the equalisation: a residue a + ib of a mode is (a + b s/ω_j) / (s² + λ_j)
-there, so that of all modes together, with D = 1 / (s² + Λ),
+Complex residues remain after equalisation.  A mode of residue a + ib contributes
+(a + b s/ω_j) / (s² + λ_j) there.  With D = 1 / (s² + Λ), all modes together contribute
 
     ΔH = -s φ_o [D P D + ½ (D Q + Q D)] φ_iᵀ,  P_ij = N_ij (1/ω_i + 1/ω_j) / 2,
                                                Q_ij = N_ij / (ω_i ω_j (ω_i + ω_j)).
@@ -27,7 +27,7 @@ from ..effects.effect import MatrixTerm, Rise
 from .real_modes import in_modes
 
 CLOSE = 1e-7  # relative distance of λ within which a divided difference is a derivative
-RIGID = 1e-9  # of the highest λ: below it nothing strains
+RIGID = 1e-9  # of the highest λ: modes below have no strain
 APART = 1e-4  # relative distance of λ within which two modes are one and do not mix
 
 
@@ -39,7 +39,7 @@ class UnrisenModes(NamedTuple):
 
 
 def applied(part: MatrixTerm, u: np.ndarray, frame: UnrisenModes, M: sp.csr_array) -> np.ndarray:
-    """A u on all dofs, or Gᵀ A G u (n, k); beside the modes of the frame nothing rises further."""
+    """A u on all dofs, or Gᵀ A G u (n, k); the rise is constant beyond the modes of the frame."""
     if part.rise is None:
         return np.asarray(part.operator @ u)
     L = part.rise.log_frequency(frame.lam)
@@ -51,13 +51,13 @@ def applied(part: MatrixTerm, u: np.ndarray, frame: UnrisenModes, M: sp.csr_arra
 
 @dataclass(frozen=True, eq=False)
 class Dissipated:
-    """What effects dissipate in the modes of a state.
+    """Dissipation of effects in the modes of a state.
 
     Attributes
     ----------
-    ratio, slopes : (m,), (n_p, m)           ζ they bring to each mode, ∂ζ/∂x
-    coupling, dcoupling : (m, m), (n_p, m, m)   N beside its diagonal, ∂N/∂x of modes as they are
-    omega : (m,) [rad/s]    of the modes; infinite of rigid ones, which nothing couples
+    ratio, slopes : (m,), (n_p, m)           ζ that effects add to each mode, ∂ζ/∂x
+    coupling, dcoupling : (m, m), (n_p, m, m)   N off its diagonal, ∂N/∂x with the modes held
+    omega : (m,) [rad/s]    of the modes; infinite for rigid ones, which are not coupled
     """
 
     ratio: np.ndarray
@@ -68,19 +68,19 @@ class Dissipated:
 
     @property
     def held(self) -> "Dissipated":
-        """The same, moved by no parameter."""
+        """The dissipation without its slopes, so that no parameter moves it."""
         return replace(self, slopes=self.slopes[:0], dcoupling=self.dcoupling[:0])
 
     def seen(
         self, s: np.ndarray, d: np.ndarray, phi_o: np.ndarray, phi_i: np.ndarray
     ) -> np.ndarray:
-        """ΔH of the complex modes (n_f, n_out, n_in), of D (n_f, m) at s (n_f,)."""
+        """ΔH of the complex modes (n_f, n_out, n_in), from d = D (n_f, m) at s (n_f,)."""
         return self._of(self.coupling, s, d, phi_o, phi_i)
 
     def seen_slopes(
         self, s: np.ndarray, d: np.ndarray, phi_o: np.ndarray, phi_i: np.ndarray
     ) -> Iterator[tuple[int, np.ndarray]]:
-        """The same of ∂N/∂x, of every parameter that moves it."""
+        """Position and ∂(ΔH)/∂x of every parameter that moves N."""
         for p in np.flatnonzero(self.dcoupling.any(axis=(1, 2))):
             yield int(p), self._of(self.dcoupling[p], s, d, phi_o, phi_i)
 
@@ -97,7 +97,7 @@ class Dissipated:
 
 
 class Risen(NamedTuple):
-    """λ, φ (r, m), dK, dM (n_p, m, m) in these modes, and what is dissipated in them."""
+    """λ, φ (r, m), dK, dM (n_p, m, m) in these modes, and their dissipation."""
 
     lam: np.ndarray
     phi: np.ndarray
@@ -107,14 +107,14 @@ class Risen(NamedTuple):
 
 
 class Rising:
-    """What rises, gathered as if it did not while the effects of a state are gone through."""
+    """Collector of rising stiffness; K first takes each part without its rise."""
 
     def __init__(self) -> None:
-        """Nothing rises yet."""
+        """Start without any part."""
         self.parts: list[tuple[MatrixTerm, np.ndarray, slice]] = []
 
     def add(self, part: MatrixTerm, A: np.ndarray, at: slice) -> None:
-        """An operator (r, r) that stands in K by its coefficient; its parameters' place in x."""
+        """Add an operator A (r, r), in K with its coefficient; ``at``: its parameters in x."""
         if part.rise is not None:
             self.parts.append((part, A, at))
 
@@ -122,7 +122,7 @@ class Rising:
         self, lam: np.ndarray, phi: np.ndarray, dK: np.ndarray, dM: np.ndarray, M: np.ndarray,
         gradient: bool,
     ) -> Risen:  # fmt: skip
-        """:meth:`risen` of slopes over the basis, as a state has them: φ⁻ᵀ is M φ."""
+        """Apply :meth:`risen` with slopes over the basis, as in a state: φ⁻ᵀ is M φ."""
         found = self.risen(lam, phi, in_modes(dK.copy(), phi), in_modes(dM.copy(), phi), gradient)
         back = (M @ found.phi).T
         return found._replace(dK=in_modes(found.dK, back), dM=in_modes(found.dM, back))
@@ -160,7 +160,7 @@ def _risen_part(
     Parameters
     ----------
     A : (m, m)           in modes
-    flow : (n_p, m, m)   ∂(M⁻¹K)/∂x in modes; None where no slopes are asked for
+    flow : (n_p, m, m)   ∂(M⁻¹K)/∂x in modes; None where no slopes are requested
     """
     rise, c = part.rise, part.coefficient
     assert rise is not None
@@ -178,7 +178,7 @@ def _risen_part(
 
 
 def _divided(g: np.ndarray, lam: np.ndarray, rise: Rise) -> np.ndarray:
-    """(g_i - g_j) / (λ_i - λ_j), g' where they are one (m, m)."""
+    """Divided differences (g_i - g_j) / (λ_i - λ_j), g' where the λ coincide (m, m)."""
     f = np.sqrt(np.maximum(lam, 0)) / (2 * np.pi)
     inside = (f > rise.band[0]) & (f < rise.band[1])
     steep = np.where(inside, rise.power * g / (2 * np.where(inside, lam, 1.0)), 0.0)
@@ -191,7 +191,7 @@ def _dissipated(
     parts: Sequence[tuple[MatrixTerm, np.ndarray, np.ndarray, slice]], lam: np.ndarray,
     dK: np.ndarray, dM: np.ndarray, gradient: bool,
 ) -> Dissipated:  # fmt: skip
-    """Of what rises, c G A G and its slopes in the modes of λ (m,)."""
+    """Dissipation of the rising parts, from c G A G and its slopes in the modes of λ (m,)."""
     m, strained = len(lam), np.where(lam > RIGID * lam[-1], lam, np.inf)
     N, dN, slopes = np.zeros((m, m)), np.zeros((len(dK), m, m)), np.zeros((len(dK), m))
     mixing = _mixing(lam, dK, dM) if gradient else None
@@ -215,9 +215,9 @@ def _dissipated(
 def _mixing(
     lam: np.ndarray, dK: np.ndarray, dM: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """∂φ_j/∂x in modes (n_p, m, m) but for its length, ∂λ (n_p, m), and φᵀ∂Mφ of each (n_p, m).
+    """∂φ_j/∂x in modes (n_p, m, m) without its change of length, ∂λ and φᵀ∂Mφ of each (n_p, m).
 
-    Modes nearer than ``APART`` are left as they are: any mixture of them is a mode.
+    Modes nearer than ``APART`` do not mix with each other: any mixture of them is a mode.
     """
     gap = lam[None, :] - lam[:, None]
     inverse = gap / (gap**2 + (APART * np.maximum(np.abs(lam), RIGID * lam[-1])) ** 2)

@@ -1,4 +1,4 @@
-"""Hypotheses after their fits as the rows of numbers and flags that a decision reads."""
+"""Rows of numbers and flags that a decision reads from fitted hypotheses."""
 
 from collections.abc import Sequence
 
@@ -32,7 +32,7 @@ def row_of_null(null: HypothesisFit) -> Row:
 
 
 def simplest_first(hypotheses: Sequence[HypothesisFit], null: float) -> list[HypothesisFit]:
-    """Best first, but for a leader that another close behind is to be preferred to.
+    """Sort hypotheses best first; a preferred one close behind the leader takes its place.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
-"""Every place at once: exact low-rank re-analysis, ordinary parameters profiled out linearly.
+"""Scan of all places at once, by exact low-rank re-analysis with linear marginalisation.
 
-The receptance of the structure with a dynamic stiffness D(s) at b (a spring k, a mass m s², a lump
-on a spring m s² ω²/(ω² + s²)) is G_of - G_ob (1/D + G_bb)⁻¹ G_bf;
-G_bb carries the residual flexibility of what the basis leaves out.  Ordinary parameters, scatter
-and the errors of the model's form are marginalised: C = I + W Wᵀ with W the slopes times the prior
-deviations (Woodbury).
+The structure with a dynamic stiffness D(s) at b has the receptance G_of - G_ob (1/D + G_bb)⁻¹ G_bf.
+D is a spring k, a mass m s² or a mass on a spring, m s² ω²/(ω² + s²).  G_bb includes the residual
+flexibility beyond the basis.  Calibration parameters, scatter and the errors of the model's form
+are marginalised: C = I + W Wᵀ with W the slopes times the prior standard deviations (Woodbury).
 """
 
 from collections.abc import Sequence
@@ -22,10 +21,10 @@ from .reduced_model import Reduced, State, evaluate
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """A state of the base effects and what is needed to score small changes of it.
+    """A state of the base effects, linearised to score small changes.
 
-    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|²; ``slopes`` (n, n_p) are those of the
-    residual, the row of the scales included in both.
+    ``Z`` (k, n) is such that rᵀ C⁻¹ r = |r|² - |Z r|².  ``slopes`` (n, n_p) are those of the
+    residual.  Both include the row of the weighing.
     """
 
     effects: tuple[Effect, ...]
@@ -41,7 +40,7 @@ class Baseline:
         return (residuals**2).sum(axis=0) - ((self.Z @ residuals) ** 2).sum(axis=0)
 
     def with_mass(self, r: np.ndarray, added: np.ndarray | float) -> np.ndarray:
-        """The data's residuals (n_data, m) with the row of the scales below them."""
+        """The data's residuals (n_data, m) with the row of the weighing below them."""
         if self.mass_measurement is None:
             return r
         row = (self.state.weight + added - self.mass_measurement.mass) / self.mass_measurement.sd
@@ -80,7 +79,7 @@ def point_scores(
     Parameters
     ----------
     strengths : [kg] or [N/m]
-    residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
+    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
     """
     at = reanalysis(base, model, data, places, residual_flexibility, matrix == "M")
     out = np.empty((len(places), len(strengths)))
@@ -94,14 +93,14 @@ def oscillator_scores(
     base: Baseline, model: Reduced, data: Responses, places: ElementGrids, mass: float,
     hertz: np.ndarray, residual_flexibility: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Best mass of a lump on a spring at each place, and the score with it (n_places, n_hertz).
+    """Best mass on a spring at each place, and the score with it (n_places, n_hertz).
 
     The responses are taken as linear in the mass along the secant from none to ``mass`` [kg].
 
     Parameters
     ----------
-    hertz : (k,)                    frequencies of the lump on the spring alone
-    residual_flexibility : (n_places,)  of the place itself beyond the basis [m/N]
+    hertz : (k,)                    frequencies of the mass on its spring, with a fixed base
+    residual_flexibility : (n_places,)  of the place beyond the basis [m/N]
     """
     at = reanalysis(base, model, data, places, residual_flexibility, True)
     amount, score = np.empty((2, len(places), len(hertz)))
@@ -114,7 +113,7 @@ def oscillator_scores(
 
 @dataclass(frozen=True, eq=False)
 class Reanalysis:
-    """What the responses of a state become with something at one of many places.
+    """Responses of a state with a dynamic stiffness added at one of many places.
 
     Attributes
     ----------
@@ -131,7 +130,7 @@ class Reanalysis:
     G_bb: np.ndarray
 
     def residuals(self, D: np.ndarray, added: float) -> np.ndarray:
-        """Residuals (n, n_places) with the dynamic stiffness D (n_f,), ``added`` kg weighed."""
+        """Residuals (n, n_places) with the dynamic stiffness D (n_f,) and ``added`` kg of mass."""
         share = D / (1 + D * self.G_bb)
         change = self.G_ob[..., None] * (share[:, :, None, None] * self.G_bi[:, :, None, :])
         r = whitened(self.data, self.base.state, self.H[None] - change)
@@ -144,7 +143,7 @@ def reanalysis(
 ) -> Reanalysis:  # fmt: skip
     """Receptances between the places, the outputs and the inputs.
 
-    What is ``massive`` feels the motion of a base as well, a spring that of the structure alone.
+    A ``massive`` addition is also loaded by base motion; a spring only by the structure's motion.
     """
     phi_o, phi_i, d = data.modal(base.state)
     phi_b = model.rows(places.rows) @ base.state.phi
@@ -175,17 +174,17 @@ def whitened(data: Responses, state: State, H: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Probe(Effect):
-    """A field, as t, E or rho, of every group by itself."""
+    """A field such as t, E or rho, with one parameter for every group."""
 
     field: str = "t"
 
     def fields(self, x: np.ndarray) -> tuple[FieldChange, ...]:
-        """Its logarithm in each group is one parameter."""
+        """The logarithm of the field in each group is one parameter."""
         return (FieldChange(self.field, x, np.eye(len(x))),)
 
 
 def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.ndarray:
-    """∂r/∂ln t, E or rho of every group, the row of the scales included (n, n_groups)."""
+    """∂r/∂ln t, E or rho of every group, including the row of the weighing (n, n_groups)."""
     n = len(model.groups)
     unknown = tuple(Parameter(str(g), "-", 0.0, 1.0, kind="linear") for g in range(n))
     probe = _Probe(unknown, field=field)
@@ -196,13 +195,13 @@ def field_slopes(base: Baseline, model: Reduced, data: Data, field: str) -> np.n
     return J[:, -n:]
 
 
-AT_ONCE = 64  # slopes of so many changes are in memory at a time
+AT_ONCE = 64  # number of changes whose slopes are in memory at a time
 
 
 def bending_slopes(
     base: Baseline, model: Reduced, data: Data, sets: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """∂r/∂a of a B added to K, B the bending stiffness of each set of shells (n, n_sets)."""
+    """∂r/∂a of a·B added to K, with B the bending stiffness of each set of shells (n, n_sets)."""
     groups, r, m = model.groups, model.vectors.shape[1], len(base.state.lam)
     dofs = (6 * groups.nodes[:, :, None] + np.arange(6)).reshape(len(groups.nodes), 24)
     out = [np.zeros((len(base.residual), 0))]
@@ -213,18 +212,18 @@ def bending_slopes(
             V = model.vectors.seen(groups.structure.T[dofs[shells].ravel()])
             bent = groups.cubic[shells] @ V.reshape(len(shells), 24, r)
             dK[j, :r, :r] = V.T @ bent.reshape(-1, r)
-        # stiffness moves no load of a base and no shape beside those of the modes
+        # stiffness changes no load of a base, and no shapes except those of the modes
         lost = None if base.state.dissipated is None else base.state.dissipated.held
         still = replace(base.state, doffset=None, ddrive=None, dmoved={}, dissipated=lost)
         state = replace(still, dK=dK, dM=np.zeros_like(dK))
         J = data.scaled(state, True)[1]
-        rest = len(base.residual) - len(J)  # what the scales say does not change
+        rest = len(base.residual) - len(J)  # the row of the weighing does not change
         out.append(np.concatenate([J, np.zeros((rest, len(chunk)))]))
     return np.concatenate(out, axis=1)
 
 
 def direction_scores(base: Baseline, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Best amount along each column and the score there: min_a (r + a c)ᵀ C⁻¹ (r + a c)."""
+    """Best amount a of each column c, and its score min_a (r + a c)ᵀ C⁻¹ (r + a c)."""
     Zc, Zr = base.Z @ columns, base.Z @ base.residual
     cc = (columns**2).sum(axis=0) - (Zc**2).sum(axis=0)
     cr = columns.T @ base.residual - Zc.T @ Zr

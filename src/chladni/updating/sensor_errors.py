@@ -1,15 +1,15 @@
-"""What sensors and force gauges show wrongly by themselves: gain, tilt and place of each.
+"""Errors of sensors and force gauges themselves: gain, tilt and place of each.
 
-No model need explain it, and no parameter should bend for it: the errors are small, independent
-and of known size, and what they do to log10 H is linear in them. With e the relative error of the
-gain, θ the tilt and x the error of the place, and u, v square to the direction n = u x v,
+A model need not explain these errors, and parameters should not adapt to them. They are small,
+independent and of known size, and their effect on log10 H is linear. Let e be the relative error of
+the gain, θ the tilt, x the error of the place, and u, v normal to the direction n = u x v:
 
-d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H,
+d(ln H) = e + (θ_u H_u + θ_v H_v + x_u ∂H/∂u + x_v ∂H/∂v) / H.
 
-H_u the response along u, ∂H/∂u = -φ_v, ∂H/∂v = φ_u the slopes of the sheet from its rotations
-(w(x + dx) = w + θ × dx · n). Their covariance V Vᵀ is whitened out of the residuals before anything
-is fitted (C = I + V Vᵀ): channel by channel, for each has its own five, and then what the inputs
-do to all channels.
+H_u is the response along u.  The slopes of the sheet ∂H/∂u = -φ_v, ∂H/∂v = φ_u follow from its
+rotations (w(x + dx) = w + θ × dx · n). The covariance V Vᵀ of the errors is whitened out of the
+residuals before anything is fitted (C = I + V Vᵀ). The five errors of each output come first, one
+channel at a time.  The errors of the inputs follow, which act on all channels.
 """
 
 from dataclasses import dataclass, replace
@@ -36,8 +36,8 @@ class Side:
     Attributes
     ----------
     gain : relative standard deviation
-    rows : four (k, n)     motions that tilts and wrong places mix in, times their deviations
-    carried : (4, k, n_in) what a moving base carries along of them
+    rows : four (k, n)     motions added by tilts and wrong places, times standard deviations
+    carried : (4, k, n_in) rigid-body share of these motions under a moving base
     modal : (4, k, r)      the rows in a basis
     """
 
@@ -52,7 +52,7 @@ class Side:
 
 
 def side(dofs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy) -> Side:
-    """Of all places of one side; what a place's own deviation is goes before the usual one."""
+    """Errors of all outputs, or of all inputs; a place's own sd, if any, replaces the usual one."""
     u, v = dofs.across()
     place, turn = sp.diags_array(np.where(dofs.sd > 0, dofs.sd, known.position)), known.direction
     rows = (
@@ -72,28 +72,28 @@ class SensorErrors:
     inputs: Side
 
     def over(self, model: Reduced) -> Self:
-        """The same in the basis of this model."""
+        """The errors with their rows in the basis of this model."""
         return replace(self, outputs=self.outputs.over(model), inputs=self.inputs.over(model))
 
 
 def sensor_errors(
     outputs: MeasuredDofs, inputs: MeasuredDofs, built: Structure, known: SensorAccuracy
 ) -> SensorErrors:
-    """As they are to be expected of sensors and force gauges known so well."""
+    """Expected errors of sensors and force gauges of this accuracy."""
     return SensorErrors(side(outputs, inputs, built, known), side(inputs, inputs, built, known))
 
 
 def columns(
     errors: SensorErrors, data: Lines, state: State, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """d ln H / scale per standard deviation: of each output (5, *H), of the inputs (k, *H)."""
+    """Columns d ln H / scale per sd: for each output (5, *H), for the inputs (k, *H)."""
     H = data.model(state)
     outputs = _of_outputs(errors.outputs, data, state, H, scale)
     return outputs, _of_inputs(errors.inputs, data, state, H, scale)
 
 
 def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
-    """|d ln H|² that is to be expected of them (n_f, n_out, n_in)."""
+    """Expected |d ln H|² from the sensor errors (n_f, n_out, n_in)."""
     both = columns(errors, data, state, np.ones(data.values.shape))
     return np.asarray(sum((np.abs(z) ** 2).sum(axis=0) for z in both))
 
@@ -101,7 +101,7 @@ def variance(errors: SensorErrors, data: Lines, state: State) -> np.ndarray:
 def _of_outputs(
     errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
-    """What one standard deviation of each error of an output does to its deviation (5, *H)."""
+    """Change of the deviation of each output by one sd of each of its errors (5, *H)."""
     _, phi_i, d = data.modal(state)
     out = [errors.gain / scale]
     for modal, carried in zip(errors.modal, errors.carried, strict=True):
@@ -113,7 +113,7 @@ def _of_outputs(
 def _of_inputs(
     errors: Side, data: Lines, state: State, H: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
-    """The same of each input, zero where another drives; of a moving base its gain alone."""
+    """Change by the errors of each input, zero for other inputs; a moving base has gain alone."""
     phi_o, phi_i, d = data.modal(state)
     out = []
     for i in range(len(phi_i)):

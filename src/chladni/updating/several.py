@@ -1,15 +1,15 @@
-"""Two effects at once, and three: what one left is searched again with it in place.
+"""Search for sets of two or three effects, by repeated searches of what a set leaves.
 
-1. grown: with what was found in the base, the whole catalogue is scanned again and the leading
-   candidates are fitted, all that was found before moving along;
-2. revised: each older one is sought anew beside the younger, for alone it had to explain more than
-   its own;
-3. backward: what does not gain its price beside the others goes (Efroymson 1960, stepwise
-   regression); what has a place stands at one of its own;
-4. where one effect alone leaves what it should explain and no second pays, the families in front
-   are tried in pairs, for an effect may explain only beside another.
+1. Grow: the whole catalogue is scanned again with the found effects in the base.  The leading
+   candidates are fitted, and the earlier effects stay free.
+2. Revise: each older effect is searched again with the newer ones in place, because alone it had to
+   explain more than its share.
+3. Prune: an effect that does not gain its price in the presence of the others is removed (Efroymson
+   1960, stepwise regression).  Effects with a place have different places.
+4. Pair: one effect alone may leave a misfit that no second effect explains well enough.  The
+   leading families are then tried in pairs, because some effects explain only together.
 
-All of a set are compared with errors of the model's form as they spread from the set's own state.
+The members of a set are compared under one error of the model's form, from the set's own state.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,9 +34,9 @@ from .search_round import search_round, taken
 
 MOST = 3  # effects in one answer
 FITTED = 6  # candidates of a later round that are fitted
-WORTH = 0.25  # of the gain due, by rough fits: below it none of a round is followed further
-PAIRED = 4  # families in front that are tried in pairs
-BETTER = 1.0  # in -2 ln evidence, from which another hypothesis takes the place of one
+WORTH = 0.25  # of the gain due, by rough fits: a round whose best is below it is dropped
+PAIRED = 4  # leading families that are tried in pairs
+BETTER = 1.0  # gain in -2 ln evidence from which another effect replaces a member
 ATTEMPTS = 4  # rounds that may change the set
 
 Say = Callable[[str, float], None]
@@ -44,18 +44,18 @@ Say = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Effects that explain the recording together, each of which pays; most gain first.
+    """Effects that explain the recording together, each with enough gain; largest gain first.
 
     Attributes
     ----------
     hypothesis : all of them, comparable with the effects that were tried alone
-    own : the same with errors of the model's form as they spread from its own state
-    gains : in -2 ln evidence, what ``own`` loses without each, the others fitted again
-    without : comparable with ``own``, the best without each
-    rivals : of each, other families that would do in its place
-    due : gain that each had to bring
+    own : all of them, with errors of the model's form from its own state
+    gains : loss of ``own`` in -2 ln evidence without each, the others fitted again
+    without : the best fit without each, comparable with ``own``
+    rivals : for each, other families that explain as much in its place
+    due : gain that each needed
     about : the model whose state errors of form spread from in ``own``
-    ahead : of the best effect alone, in -2 ln evidence
+    ahead : gain over the best effect alone, in -2 ln evidence
     """
 
     hypothesis: HypothesisFit
@@ -69,13 +69,13 @@ class Several:
 
     @property
     def pay(self) -> bool:
-        """Whether what was fitted pays the whole price, of each beside the others and of all."""
+        """True where each member, and the set over one effect, gains its full price when fitted."""
         return min(*self.gains, self.ahead) > self.due
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What was found beside a leader, in the order in which the sets grew, and how it went."""
+    """Sets that a search found from a leader, in the order they grew, and a note on its course."""
 
     sets: tuple[Several, ...]
     note: str
@@ -85,10 +85,10 @@ def several(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float, unfit: bool,
     progress: Say = lambda text, share: None,
 ) -> Search:  # fmt: skip
-    """Sets of effects that grow from the best one, every member of which pays a good part.
+    """Sets of effects grown from the best one, where every member gains a good part of its price.
 
-    Those that :attr:`Several.pay` stand by what was fitted alone; for others the data that no fit
-    saw are to pay the rest.
+    The fitted data alone suffice for sets that :attr:`Several.pay`. For other sets, held-out data
+    must supply the rest of the gain.
 
     Parameters
     ----------
@@ -113,17 +113,17 @@ def several(
 
 
 def _gain(without: HypothesisFit, hypothesis: HypothesisFit) -> float:
-    """In -2 ln evidence."""
+    """Gain of a hypothesis over a simpler one, in -2 ln evidence."""
     return without.neg2_log_evidence - hypothesis.neg2_log_evidence
 
 
 def price(due: float, size: int) -> float:
-    """Gain that the last of so many effects has to bring: every round of a search is paid for."""
+    """Gain that the last of so many effects needs: every round of a search adds to it."""
     return due + 2 * float(np.log(size))
 
 
 def _better(one: Search, other: Search) -> Search:
-    """The search that ended with the better set; what pays in full is before what pays in part."""
+    """The search that ended with the better set; a set with full gains precedes all others."""
 
     def end(search: Search) -> tuple[bool, float]:
         last = next((s for s in reversed(search.sets) if s.pay), search.sets[-1])
@@ -136,9 +136,9 @@ def _begun_with(
     problem: UpdatingProblem, lead: HypothesisFit, due: float, progress: Say,
     best: HypothesisFit | None = None, known: Sequence[Several] = (),
 ) -> Search:  # fmt: skip
-    """The sets that grow from one hypothesis, until none more pays or they stay behind the best.
+    """Sets grown from one hypothesis, until no further effect gains enough or the best is ahead.
 
-    A search that comes upon a set that is known would go on as the one that found it, and ends.
+    A search ends where it reaches a known set, because it would continue as the earlier one did.
     """
     current, out, note, seen = lead, list[Several](), "", list[set[int]]()
     for k in range(ATTEMPTS):
@@ -153,7 +153,7 @@ def _begun_with(
             if best is not None and _gain(best, _as_alone(problem, more.hypothesis)) < 0:
                 break
             found, paid = _revised(problem, more, current.effects, price(due, size))
-        except ModelError as error:  # a fit that has left all structures that can be
+        except ModelError as error:  # the fit reached an impossible structure
             note = f"what {current.name} leaves could not be searched: {error}"
             break
         again = any(_same(problem, found.own, other.own) for other in known)
@@ -166,7 +166,7 @@ def _begun_with(
 
 
 def _same(problem: UpdatingProblem, one: HypothesisFit, other: HypothesisFit) -> bool:
-    """Whether two sets hold the same effects, each where the other has it."""
+    """True where two sets hold the same effects at the same places."""
 
     def has(effect: Effect) -> bool:
         its = ((e, other.fit.of(e)) for e in other.effects if e.name == effect.name)
@@ -179,7 +179,7 @@ def _same(problem: UpdatingProblem, one: HypothesisFit, other: HypothesisFit) ->
 def _standing(
     problem: UpdatingProblem, lead: HypothesisFit
 ) -> tuple[UpdatingProblem, HypothesisFit]:
-    """The problem with a hypothesis in its base, errors spreading from it; its fit there."""
+    """The problem with a hypothesis in its base and model errors from its state; its fit there."""
     held = problem.holding([(e, lead.fit.of(e)) for e in lead.effects])
     model, x = held.reduced.model, np.concatenate([lead.fit.of(e) for e in held.base])
     if isinstance(lead.data, Responses) and lead.data.error is not None:
@@ -194,7 +194,7 @@ def _standing(
 def _holding(
     problem: UpdatingProblem, lead: HypothesisFit, effects: Sequence[Effect]
 ) -> UpdatingProblem:
-    """The problem with some effects of a hypothesis in its base, and the data as it has them."""
+    """The problem with some effects of a hypothesis in its base, and the hypothesis's data."""
     held = problem.holding([(e, lead.fit.of(e)) for e in effects])
     assert isinstance(lead.data, Responses)
     return replace(held, data=lead.data.over(held.reduced.model))
@@ -202,11 +202,11 @@ def _holding(
 
 @dataclass(frozen=True, eq=False)
 class _More:
-    """A set with one effect more.
+    """A set with one further effect.
 
-    ``rivals`` would do in the places of its members, ``without`` are the best fits without them;
-    both by the id of the member, as far as they are known. Errors of form spread from a state of
-    the model ``about``.
+    ``rivals`` are hypotheses that explain as much in the place of a member.  ``without`` are the
+    best fits without a member.  Both are keyed by the id of the member, as far as known. Errors of
+    form spread from a state of the model ``about``.
     """
 
     hypothesis: HypothesisFit
@@ -218,7 +218,7 @@ class _More:
 def _grown(
     problem: UpdatingProblem, current: HypothesisFit, due: float
 ) -> tuple[_More | None, str]:
-    """The set with the best effect more, if that pays, and how much it gains."""
+    """The set with the best further effect if its gain is enough, and a sentence on the gain."""
     held, null = _standing(problem, current)
     found = _round(held, null, candidates(held.begun_wide(), null, FITTED), WORTH * due)
     if not found:
@@ -238,22 +238,22 @@ def _grown(
 def _round(
     held: UpdatingProblem, null: HypothesisFit, tried: Sequence[Candidate], least: float
 ) -> list[HypothesisFit]:
-    """A round of a search; what moved onto one of its own family that is there is left out."""
+    """A round of a search, less effects that moved onto a present effect of their own family."""
     hypotheses = search_round(held, null, tried, lambda text, share: None, least)
     return [t for t in hypotheses if not repeats(_moved(held, t), t.effect, t.fit.of(t.effect))]
 
 
 def _moved(held: UpdatingProblem, to: HypothesisFit) -> UpdatingProblem:
-    """The problem with what was found where a hypothesis has it."""
+    """The problem with its found effects at the values of a hypothesis."""
     return replace(held, found=tuple((e, to.fit.of(e)) for e, _ in held.found))
 
 
 def _revised(
     problem: UpdatingProblem, more: _More, members: Sequence[Effect], due: float
 ) -> tuple[Several, Several | None]:
-    """The set with some of its members sought anew, less what does not pay a good part.
+    """Search some members again, then remove members without a good part of their price.
 
-    Where some of it pay no more than that, those that pay in full are a set as well.
+    Where some members gain only a part, the members with full gains form a second set.
     """
     for member in members:
         more = _sought_anew(problem, more, member)
@@ -266,7 +266,7 @@ def _revised(
 
 
 def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More:
-    """The set with what explains most in the place of one of its members, which may be itself."""
+    """The set with one member replaced by the effect that explains most; it may be the same."""
     lead = more.hypothesis
     rest = _without(problem, lead, member)
     held = _holding(problem, rest, rest.effects)
@@ -285,20 +285,20 @@ def _sought_anew(problem: UpdatingProblem, more: _More, member: Effect) -> _More
 
 
 def _other(hypothesis: HypothesisFit, member: Effect) -> bool:
-    """Whether it is of another family, and as it was fitted no other name for the same."""
+    """True for another family whose fitted effect is not the member under another name."""
     effect = hypothesis.effect
     return member.name not in (effect.name, effect.becomes(hypothesis.fit.of(effect)))
 
 
 def _preferred(best: HypothesisFit, lead: HypothesisFit, member: Effect) -> bool:
-    """Whether another effect stands in the place of a member: it is better, or simpler and tied."""
+    """True where another effect replaces a member: it is better, or simpler and tied."""
     ahead, x = _gain(lead, best), lead.fit.of(member)
     simpler = member.becomes(x) == best.effect.name or bool(member.implausible(x))
     return ahead > BETTER or (simpler and best.effect.name != member.name and ahead > -TIED)
 
 
 def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
-    """A fit of the base of a problem with its parameters in the order of that base."""
+    """A fit of the base of a problem, repeated with its parameters in the order of that base."""
     x = np.concatenate([fit.fit.of(e) for e in held.base])
     model, data = held.reduced.model, held.data
     again = fitted(model, held.base, data, held.mass_measurement, x, ROUGH)
@@ -306,7 +306,7 @@ def _in_order(held: UpdatingProblem, fit: HypothesisFit) -> HypothesisFit:
 
 
 def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> HypothesisFit:
-    """The best fit of all but one of a set's members, from where the set has them."""
+    """The best fit of a set without one member, starting from the values of the set."""
     first, *rest = (e for e in lead.effects if e is not member)
     held = _holding(problem, lead, rest)
     tries = []
@@ -320,7 +320,7 @@ def _without(problem: UpdatingProblem, lead: HypothesisFit, member: Effect) -> H
 
 
 def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> Several:
-    """The set less what does not gain that part of its price beside the others."""
+    """The set without members that gain less than ``part`` of their price among the others."""
     lead, known = more.hypothesis, more.without
     while True:
         if len(lead.effects) < 2:
@@ -341,14 +341,14 @@ def _paying(problem: UpdatingProblem, more: _More, due: float, part: float) -> S
 
 
 def _as_alone(problem: UpdatingProblem, own: HypothesisFit) -> HypothesisFit:
-    """The set with errors of the model's form as single effects were compared with."""
+    """The set fitted with the errors of the model's form that single effects were compared with."""
     data = problem.data.over(own.model)
     fit = fitted(own.model, own.fit.effects, data, problem.mass_measurement, own.fit.x)
     return replace(own, fit=fit)
 
 
 def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[Rival, ...]:
-    """Other families that do as well as a member in its place."""
+    """Other families that explain as much as a member in its place."""
     every = [
         Rival(t.effect.name, _gain(t, lead), t.effect.implausible(t.fit.of(t.effect)))
         for t in rivals
@@ -359,7 +359,7 @@ def _close(rivals: Sequence[HypothesisFit], lead: HypothesisFit) -> tuple[Rival,
 def _in_pairs(
     problem: UpdatingProblem, singles: Sequence[HypothesisFit], due: float
 ) -> list[Several]:
-    """The best pair of the families in front, if it is ahead of one alone and both of it pay."""
+    """The best pair of leading families, if it beats one alone and both members gain enough."""
     base, alone = _standing(problem, singles[0])
     data = base.data
     tries = []

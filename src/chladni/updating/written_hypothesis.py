@@ -1,4 +1,4 @@
-"""A hypothesis as a deck can hold it: no scatter, no joints that scatter, no error of the mesh."""
+"""Hypotheses in the form of a deck: no scatter of parts or joints, no mesh error."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,19 +14,19 @@ from .likelihood import Responses
 from .map_fit import MassMeasurement, fit
 from .reduced_model import evaluate
 
-HELD = 1e-4  # sd of a parameter that a fit has to leave where it is
-LEFT = 0.1  # decades that a deck may be off: with less, numbers go to their priors' ends for little
+HELD = 1e-4  # sd of a parameter that a fit must not move
+LEFT = 0.1  # sd of a deck's error [decades]: less moves numbers to their priors' ends for little
 
 
 def as_written(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None
 ) -> HypothesisFit:
-    """The hypothesis as a deck can hold it: without scatter and modal discrepancy, the effect held.
+    """The hypothesis in the form of a deck: no scatter or modal discrepancy, the effect held.
 
-    The ordinary parameters are fitted anew, for they were found beside a scatter that is not there
-    any more.  The learned error of the model stays in the likelihood, else they would bend to make
-    up for mesh and joints: on a coarse plate with a concealed crack E went to 264 GPa for 210
-    without it, and to 212 with it.
+    Calibration parameters are fitted again, because the scatter they were found with is gone.  The
+    learned error of the model stays in the likelihood.  Otherwise the parameters would compensate
+    for mesh and joints.  On a coarse plate with a concealed crack E went to 264 GPa for 210 without
+    it, and to 212 with it.
     """
     effects, start, (effect, *beside) = _kept(hypothesis)
     model = hypothesis.model
@@ -37,16 +37,16 @@ def as_written(
 def as_foretold(
     hypothesis: HypothesisFit, mass_measurement: MassMeasurement | None, unseen: np.ndarray
 ) -> HypothesisFit:
-    """The hypothesis as a deck can hold it, so that the deck responds as the hypothesis does.
+    """The hypothesis in the form of a deck that reproduces the hypothesis's responses.
 
-    What it has beside the deck (mesh error, joints, folds, scatter) is known on all lines and at
-    all sensors, where they were held out too, for there it is foretold and not measured. The
-    ordinary parameters take up what they can of that, as far as their priors let them against a
-    spread of ``LEFT``, and as far as all of them stay within the 95 % intervals of what was found:
-    a number that the data exclude is no property of the structure. On the demo the held-out Q of
-    the deck is 0.0185 so, 0.0195 where numbers may leave their intervals and 0.0245 with the
-    numbers as found. What changes no response, and natural frequencies, are written as
-    :func:`as_written` does.
+    A deck has no mesh error, joints, folds or scatter.  The hypothesis predicts their effect on all
+    lines and sensors, including held-out ones, without measured values. Calibration parameters
+    compensate for them as far as two limits allow. They are fitted to the predicted responses with
+    their priors and a standard deviation ``LEFT``, and all stay within their 95 % intervals. A
+    number that the data exclude is no property of the structure. On the demo the held-out Q of the
+    deck is 0.0185 in this way, 0.0195 where numbers may leave their intervals and 0.0245 with the
+    numbers as found. :func:`as_written` serves natural frequencies and effects that change no
+    response.
 
     Parameters
     ----------
@@ -71,19 +71,19 @@ def as_foretold(
 
 
 def _share_within(sd: np.ndarray, step: np.ndarray) -> float:
-    """How much of a step may be made until the first number leaves its 95 % interval."""
+    """Largest share of a step for which all numbers stay within their 95 % intervals."""
     far = np.abs(step) > 0
     return float(min([1.0, *(1.96 * sd[far] / np.abs(step[far]))]))
 
 
 def of_mesh(effects: Sequence[Effect]) -> np.ndarray:
-    """Which of their parameters are of errors of the mesh (n_p,) bool: no deck has these in it."""
+    """True for parameters of mesh errors (n_p,) bool, which no deck contains."""
     each = [np.full(len(e.parameters), isinstance(e, MeshError)) for e in effects]
     return np.concatenate([np.zeros(0, bool), *each])
 
 
 def _kept(hypothesis: HypothesisFit) -> tuple[list[Effect], np.ndarray, tuple[Effect, ...]]:
-    """What a deck keeps, where it was found; and what was named, which has to stay there."""
+    """Effects that a deck can hold, their values, and the named effects, held at theirs."""
     found = hypothesis.fit
     held = {id(e): _held(e, found.of(e)) if e.parameters else e for e in hypothesis.effects}
     kept = [e for e in found.effects if e.writable]
@@ -92,13 +92,13 @@ def _kept(hypothesis: HypothesisFit) -> tuple[list[Effect], np.ndarray, tuple[Ef
 
 
 def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
-    """A hypothesis without effects as a deck can hold it, its numbers as they were found.
+    """A hypothesis without effects in the form of a deck, with its numbers as found.
 
-    They were found beside all that is known to err, and the better for it: on a tailgate where
-    nothing was missing E of the inner panel ended 2 % nearer its value, t 2 % and E of a bracket
-    7 % than fitted anew without joints and scatter, which :func:`as_written` does.  Joints that
-    took more than joints scatter are numbers of the deck as well: a deck whose adhesive is six
-    times too soft stays 4 % off in frequency without.
+    The numbers were found with all known errors in the model, which makes them more accurate. The
+    alternative is :func:`as_written`, a new fit without joints and scatter.  On a tailgate where
+    nothing was missing, E of the inner panel ended 2 % nearer its value than there, t 2 % and E of
+    a bracket 7 %.  Joints whose change exceeds their usual scatter are numbers of the deck as well.
+    Without them a deck whose adhesive is six times too soft stays 4 % off in frequency.
     """
     fit = hypothesis.fit
     every = [calibrated_family(e) if is_strained(e, fit.of(e)) else e for e in fit.effects]
@@ -111,6 +111,6 @@ def as_found(hypothesis: HypothesisFit) -> HypothesisFit:
 
 
 def _held(effect: Effect, x: np.ndarray) -> Effect:
-    """An effect that has to stay at x."""
+    """An effect held at x."""
     at = zip(effect.parameters, x, strict=True)
     return replace(effect, parameters=tuple(replace(p, mean=float(v), sd=HELD) for p, v in at))

@@ -1,7 +1,8 @@
-"""Q of decks as they are written: no mesh error, no scatter, no gain beside them.
+"""Q of decks as written, without mesh error, scatter or gain errors.
 
-The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and the static
-responses to its sensors' and shakers' unit loads, as the reduced model of a diagnosis does.
+The response of a structure at its sensors comes from Rayleigh-Ritz on its own modes and static
+responses.  The static loads are unit loads at sensors and shakers, as in the reduced model of a
+diagnosis.
 """
 
 from dataclasses import replace
@@ -33,10 +34,10 @@ def written_Q(
     ----------
     sets : of samples, in the shape of ``prepared.score.use``
     real : (n,) bool       poles of the test that are modes
-    fault : what is named; faults of channels among it are taken out of the recording before it is
-        compared
+    fault : the named effects; faults of channels among them are removed from the recording before
+        it is compared
 
-    Where the gain is unknown, the mean level over the fitted samples is taken out as well.
+    Where the gain is unknown, the mean level over the fitted samples is removed as well.
     """
     data, state = seen(question, prepared.score, model, prepared.problem.setup.f_max)
     if isinstance(data, Poles):
@@ -54,7 +55,7 @@ def written_Q(
 def gain_offset(
     question: Question, prepared: Prepared, data: Responses, state: State
 ) -> np.ndarray:
-    """log10 of the factor on every channel (n_out,) that an unknown gain is; else zero."""
+    """log10 of the unknown common gain of all channels (n_out,); zero where the gain is known."""
     none = np.zeros(len(data.a), complex)
     if question.gain_known:
         return none
@@ -64,7 +65,7 @@ def gain_offset(
 def seen(
     question: Question, score: Responses | Poles, model: Modelled, f_max: float
 ) -> tuple[Responses | Poles, State]:
-    """The data with this structure's rows in its own modes, and those modes."""
+    """The data with this structure's rows in its own modes, and the state of those modes."""
     built, modes = model.structure, model.up_to(REACH * f_max)
     basis = modes.shapes
     if isinstance(score, Poles):
@@ -92,10 +93,10 @@ def _state(lam: np.ndarray, phi: np.ndarray) -> State:
 
 
 def noise_Q(prepared: Prepared, use: np.ndarray, real: np.ndarray | None = None) -> float | None:
-    """Q that the noise of the recording alone leaves; None where nothing is in use.
+    """Expected Q from the noise of the recording alone; None where it is unknown.
 
-    Of responses it is known to first order: where noise is as large as the response (1/ln² 10),
-    that says nothing, and neither does this.
+    For responses it holds to first order.  It fails where noise is as large as the response, above
+    1/ln² 10, and is None there.
     """
     if isinstance(prepared.score, Poles):
         chosen = use if real is None else use & real
