@@ -1,4 +1,4 @@
-"""Where to shake: every candidate's condition number, drive point and rattle.
+"""Ranking of shaker places by condition number, driving-point residue and rattle.
 
 The condition number is that of Echaniz Granado (2015), section 4.1.1 and table 2.
 """
@@ -16,7 +16,7 @@ from .gramians import condition, controllability_gramian, hankel_values, observa
 
 @dataclass(frozen=True, eq=False)
 class Shaking:
-    """What is needed to judge any set of actuators: gramians add up over actuators.
+    """Gramians of all actuator candidates and of the sensors; they add up over actuators.
 
     Attributes
     ----------
@@ -28,12 +28,12 @@ class Shaking:
     observed: np.ndarray
 
     def condition(self, actuators: np.ndarray) -> float:
-        """σ_max/σ_min of the Hankel values, all these actuators at work."""
+        """Ratio σ_max/σ_min of the Hankel values with all these actuators at work."""
         W = self.each[np.asarray(actuators, dtype=np.int64)].sum(axis=0)
         return float(condition(hankel_values(W, self.observed)))
 
     def conditions(self) -> np.ndarray:
-        """σ_max/σ_min of every candidate alone (n,)."""
+        """Ratio σ_max/σ_min of every candidate alone (n,)."""
         return condition(hankel_values(self.each, self.observed))
 
 
@@ -53,10 +53,15 @@ def shaking(
 def best_actuators(
     shaker: Shaking, count: int, allowed: np.ndarray | None = None, *, exhaustive: int = 2000
 ) -> np.ndarray:
-    """The ``count`` allowed actuators of the lowest condition number together (sorted).
+    """The ``count`` allowed actuators of the lowest joint condition number (sorted positions).
 
-    Every combination is tried up to ``exhaustive`` of them; beyond, one actuator after the other
-    and then exchange, one for one.
+    All combinations are tried where they are at most ``exhaustive``.  Otherwise actuators are added
+    one by one and then exchanged one for one.
+
+    Raises
+    ------
+    ShapeError
+        If there are fewer allowed candidates than ``count``.
     """
     n = len(shaker.each)
     among = np.flatnonzero(np.ones(n, bool) if allowed is None else allowed)
@@ -72,14 +77,14 @@ def best_actuators(
 
 
 def _joined(shaker: Shaking, found: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The actuators and the one of the others that lowers the condition number most."""
+    """The actuators plus the other candidate that lowers the condition number most."""
     W = shaker.each[found].sum(axis=0) + shaker.each[others]
     best = int(np.argmin(condition(hankel_values(W, shaker.observed))))
     return np.r_[found, others[best]]
 
 
 def _exchanged(shaker: Shaking, found: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The actuators after swaps, one for one, until none lowers the condition number."""
+    """The actuators after one-for-one swaps, until no swap lowers the condition number."""
     now, better = shaker.condition(found), True
     while better:
         better = False
@@ -93,7 +98,8 @@ def _exchanged(shaker: Shaking, found: np.ndarray, among: np.ndarray) -> np.ndar
 def driving_point_residue(frequency: np.ndarray, phi: np.ndarray) -> np.ndarray:
     """Residue φ_ir² / (2 ω_r) of each mode at each candidate as its own driving point (n, r).
 
-    Its mean over the modes says how well a place drives, its least how surely it drives all.
+    Its mean over the modes measures how well a place drives the structure.  Its minimum shows
+    whether the place drives every mode.
     """
     return np.asarray(phi) ** 2 / (4 * np.pi * np.asarray(frequency))
 
@@ -106,7 +112,7 @@ def rattle_margin(
     clearance: np.ndarray,
     force: float,
 ) -> np.ndarray:
-    """Clearance over the greatest relative motion when each candidate is driven; < 1 rattles (n,).
+    """Clearance over the greatest relative motion with each candidate driven; < 1 rattles (n,).
 
     At the resonance of mode r a force F at i closes gap g by |φ_ir ψ_gr| F / (2 ζ_r ω_r²).
 
@@ -127,7 +133,7 @@ def rattle_margin(
 
 @dataclass(frozen=True, eq=False)
 class ActuatorRanking:
-    """Candidates for the shaker, the best first; those vetoed come last.
+    """Candidates for the shaker, best first; vetoed ones come last.
 
     Attributes
     ----------
@@ -153,10 +159,10 @@ def ranked_actuators(
     margin: np.ndarray | None = None,
     access: np.ndarray | None = None,
 ) -> ActuatorRanking:
-    """Candidates by condition number; no access or a rattle margin below 1 is a veto.
+    """Rank candidates by condition number; no access or a rattle margin below 1 is a veto.
 
-    Where none drives all modes, as where two share a frequency, every condition is infinite: then
-    the least residue decides.
+    Every condition is infinite where no candidate drives all modes, for example where two modes
+    share a frequency.  The least residue decides then.
     """
     n = len(phi)
     margin = np.full(n, np.inf) if margin is None else margin

@@ -1,7 +1,7 @@
-"""Models with drawn thickness: what a layout must serve when the deck is not quite the article.
+"""Models with drawn thickness, for layouts that must serve articles that differ from the deck.
 
-Every draw is a reduced model over the deck's own modes far beyond the band and the modes of a few
-drawn models solved in full, so fifty draws cost little more than one.
+Every draw is a reduced model.  Its basis holds the deck's own modes far beyond the band and the
+modes of a few drawn models solved in full.  Fifty draws cost little more than one.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Ensemble:
     ----------
     model : Reduced
     effects : tuple of PartScale   thickness of each part
-    rigid : int                    rigid modes, which every draw has too
+    rigid : int                    number of rigid modes, equal for every draw
     """
 
     model: Reduced
@@ -47,7 +47,7 @@ class Ensemble:
 def ensemble(
     built: Structure, f_max: float, spread: float, progress: Progress = silent
 ) -> Ensemble:
-    """Make a structure ready for draws of thickness.
+    """Prepare a structure for draws of thickness.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def random(rng: np.random.Generator, n_parts: int, spread: float) -> np.ndarray:
 def _solved(
     built: Structure, effects: tuple[PartScale, ...], x: np.ndarray, f_max: float
 ) -> np.ndarray:
-    """Mode shapes up to a frequency of a model drawn at x."""
+    """Mode shapes of a model drawn at x, up to f_max."""
     drawn = with_thickness(built, effects, x)
     where = drawn.assembly.points[drawn.assembly.rows(drawn.system.dofs[:, 0])]
     shapes = normal_modes(drawn.system, band=f_max, points=where).shapes
@@ -91,7 +91,7 @@ def _solved(
 
 
 def with_thickness(built: Structure, effects: tuple[PartScale, ...], x: np.ndarray) -> Structure:
-    """The structure assembled anew with the thickness of each part times e^x."""
+    """The structure assembled again with the thickness of each part times e^x."""
     made = built.assembly
     for effect, value in zip(effects, x, strict=True):
         made = effect.apply(made, np.array([value]))
@@ -105,8 +105,8 @@ def drawn(
 
     Parameters
     ----------
-    seen : (m, k)   the basis as the candidates see it
-    modes : flexible modes r of each
+    seen : (m, k)   the basis at the candidates, along their directions
+    modes : number r of flexible modes of each draw
     """
     rng, keep = np.random.default_rng(seed), slice(models.rigid, models.rigid + modes)
     frequency, shapes = [], []

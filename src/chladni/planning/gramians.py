@@ -1,8 +1,8 @@
-"""Can the modes be seen and driven: ranks, gramians in closed form, balanced realisation.
+"""Observability and controllability of modes: ranks, closed-form gramians, balanced realisation.
 
-States are those of :func:`chladni.dynamics.statespace.state_space`, (η_r, η_r'/ω_r) mode by mode,
-in which a lightly damped mode has equal entries. Moore (1981), IEEE Trans. Autom. Control 26(1),
-17-32; Laub et al. (1987), IEEE Trans. Autom. Control 32(2), 115-122; Gawronski, Dynamics and
+States are those of :func:`chladni.dynamics.statespace.state_space`, (η_r, η_r'/ω_r) mode by mode.
+A lightly damped mode has equal entries in these states. Moore (1981), IEEE Trans. Autom. Control
+26(1), 17-32; Laub et al. (1987), IEEE Trans. Autom. Control 32(2), 115-122; Gawronski, Dynamics and
 Control of Structures (1998), ch. 4.
 """
 
@@ -19,12 +19,12 @@ from ..errors import AccuracyError, LabelError, ShapeError
 def controllability_gramian(
     frequency: np.ndarray, damping: np.ndarray, phi_in: np.ndarray
 ) -> np.ndarray:
-    """W_c of A W + W Aᵀ + B Bᵀ = 0 in closed form (2r, 2r).
+    """Gramian W_c of A W + W Aᵀ + B Bᵀ = 0 in closed form (2r, 2r).
 
     Parameters
     ----------
-    frequency : (r,)      [Hz], none of them zero
-    damping : (r,)        fraction of critical, none of them zero
+    frequency : (r,)      [Hz], all above zero
+    damping : (r,)        fraction of critical, all above zero
     phi_in : (n_in, r)    mode shapes at the actuators [1/√kg]
     """
     omega, zeta = _stable(frequency, damping, phi_in)
@@ -37,9 +37,10 @@ def observability_gramian(
     phi_out: np.ndarray,
     quantity: Quantity = "receptance",
 ) -> np.ndarray:
-    """W_o of Aᵀ W + W A + Cᵀ C = 0 in closed form (2r, 2r), as Aᵀ = S A S with S = diag(-1, 1).
+    """Gramian W_o of Aᵀ W + W A + Cᵀ C = 0 (2r, 2r), in closed form.
 
-    ``phi_out`` (n_out, r) are the mode shapes at the sensors, ``quantity`` is what they measure.
+    It uses Aᵀ = S A S with S = diag(-1, 1). ``phi_out`` (n_out, r) are the mode shapes at the
+    sensors, ``quantity`` is the measured quantity.
     """
     omega, zeta = _stable(frequency, damping, phi_out)
     displacement, velocity = _readings(omega, zeta, phi_out, quantity)
@@ -50,7 +51,13 @@ def observability_gramian(
 def _stable(
     frequency: np.ndarray, damping: np.ndarray, phi: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angular frequencies [rad/s] and damping, if the system decays at all."""
+    """Angular frequencies [rad/s] and damping of a system that decays.
+
+    Raises
+    ------
+    ShapeError
+        If shapes and frequencies disagree, or a mode is rigid or undamped.
+    """
     omega = 2 * np.pi * np.asarray(frequency, dtype=float)
     zeta = np.broadcast_to(np.asarray(damping, dtype=float), omega.shape)
     if np.ndim(phi) != 2 or np.shape(phi)[1] != len(omega):
@@ -76,8 +83,8 @@ def _readings(
 def _gramian(omega: np.ndarray, zeta: np.ndarray, b1: np.ndarray, b2: np.ndarray) -> np.ndarray:
     """Stationary second moments of η'' + 2ζω η' + ω² η with white noise in η' (b2) and η (b1).
 
-    For modes r, s with a = ω_r, c = ω_s, d = 2 ζ_r a, e = 2 ζ_s c the Lyapunov equation is four
-    equations in X = E[η_r η_s], Y = E[η_r η_s'], Z = E[η_r' η_s] and V = E[η_r' η_s'].
+    Take modes r, s with a = ω_r, c = ω_s, d = 2 ζ_r a, e = 2 ζ_s c. The Lyapunov equation gives
+    four equations in X = E[η_r η_s], Y = E[η_r η_s'], Z = E[η_r' η_s] and V = E[η_r' η_s'].
     """
     a, c = omega[:, None], omega[None]
     d, e = 2 * (zeta * omega)[:, None], 2 * (zeta * omega)[None]
@@ -95,7 +102,7 @@ def _gramian(omega: np.ndarray, zeta: np.ndarray, b1: np.ndarray, b2: np.ndarray
 
 
 def gramians(system: StateSpace) -> tuple[np.ndarray, np.ndarray]:
-    """W_c and W_o of any stable system, by the Lyapunov equations."""
+    """Gramians W_c and W_o of any stable system, by the Lyapunov equations."""
     A, B, C = system.A, system.B, system.C
     if np.linalg.eigvals(A).real.max(initial=-1.0) >= 0:
         raise ShapeError("a system with rigid, undamped or unstable poles has no gramians")
@@ -105,8 +112,8 @@ def gramians(system: StateSpace) -> tuple[np.ndarray, np.ndarray]:
 def gramian_quotient(W: np.ndarray, frequency: np.ndarray | None = None) -> float:
     """Largest over smallest diagonal entry of a gramian; inf where one vanishes.
 
-    It depends on the coordinates: with ``frequency`` those of Echaniz Granado (2015), section
-    4.1.1, are taken, (η, η'), where an observability gramian has ω_r² W for the velocity states.
+    It depends on the coordinates. With ``frequency`` they are (η, η') of Echaniz Granado (2015),
+    section 4.1.1.  There an observability gramian has ω_r² W for the velocity states.
     """
     diagonal = np.diag(W).copy()
     if frequency is not None:
@@ -125,9 +132,9 @@ def hankel_values(Wc: np.ndarray, Wo: np.ndarray) -> np.ndarray:
 
 
 def _factors(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """U, L with W = (U L)(U L)ᵀ for a symmetric, positive semi-definite W (n, n).
+    """Factors U, L with W = (U L)(U L)ᵀ for a symmetric, positive semi-definite W (n, n).
 
-    Eigenvalues within n ε of the largest are rounding and count as zero, whatever the machine.
+    Eigenvalues below n ε of the largest are rounding and count as zero on every machine.
     """
     lam, U = np.linalg.eigh(W)
     rounding = len(W) * np.finfo(float).eps * lam[-1]
@@ -135,9 +142,9 @@ def _factors(W: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def condition(hankel: np.ndarray) -> np.ndarray:
-    """Largest over smallest Hankel value: the lower, the better all modes are seen and driven.
+    """Largest over smallest Hankel value; low where all modes are well observed and driven.
 
-    Infinite where the smallest squared is within n ε of the largest squared: rounding, no motion.
+    It is infinite where the smallest squared is below n ε of the largest squared: that is rounding.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = hankel[..., 0] / hankel[..., -1]
@@ -188,8 +195,8 @@ def modal_rank(
 ) -> int:
     """Rank of the observability (or controllability) matrix of 2r states, mode by mode.
 
-    A pole is observable when no combination of the modes that share it is blind at every sensor
-    (Popov-Belevitch-Hautus): the rank is 2 Σ rank Φ[:, cluster]. Modes nearer than ``gap`` in
+    A pole is observable when every combination of the modes that share it moves some sensor
+    (Popov-Belevitch-Hautus).  So the rank is 2 Σ rank Φ[:, cluster]. Modes nearer than ``gap`` in
     relative frequency share a pole; ``tolerance`` is relative to the greatest shape value.
     """
     order = np.argsort(frequency, kind="stable")

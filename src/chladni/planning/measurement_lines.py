@@ -1,4 +1,4 @@
-"""Which frequencies to measure and how long that takes.
+"""Choice of spectral lines for a test, and the duration of the test.
 
 Echaniz Granado (2015), section 4.2.5 and table 3.
 """
@@ -14,7 +14,7 @@ def half_bandwidth(frequency: np.ndarray, damping: np.ndarray | float) -> np.nda
 
 
 def even_lines(low: float, high: float, damping: float, per_bandwidth: float = 3.0) -> np.ndarray:
-    """Lines f_k+1 = f_k (1 + 2ζ/n): n in every half-bandwidth 2ζf, wherever the resonance is [Hz].
+    """Lines f_k+1 = f_k (1 + 2ζ/n) [Hz]: n in every half-bandwidth 2ζf of any resonance.
 
     The last line is the first at or above ``high``.
 
@@ -40,10 +40,10 @@ def lines_for_poles(
     reach: float = 2.0,
     between: float = 0.02,
 ) -> np.ndarray:
-    """Lines where the predicted poles need them: dense near each, sparse between [Hz].
+    """Lines [Hz] that are dense near each predicted pole and sparse between poles.
 
-    Within ``reach`` half-bandwidths of a pole there are ``per_bandwidth`` lines per 2ζf, elsewhere
-    the relative step is ``between`` (it grows by no more than 1.3 from line to line).
+    Within ``reach`` half-bandwidths of a pole there are ``per_bandwidth`` lines per 2ζf.  Elsewhere
+    the relative step is ``between``; it grows by at most 1.3 from line to line.
     """
     lines, step = [low], between * low
     width = half_bandwidth(frequency, damping)
@@ -88,7 +88,7 @@ def delay_at(
 ) -> np.ndarray:
     """Cycles to wait at every line until the slowest transient near it has decayed (n,).
 
-    A transient of mode r at line f decays by e^(-2π ζ_r f_r / f) a cycle; modes further away than
+    A transient of mode r at line f decays by e^(-2π ζ_r f_r / f) a cycle.  Modes farther away than
     five half-bandwidths are hardly excited by a step and are left out.
     """
     f = np.asarray(lines)[:, None]

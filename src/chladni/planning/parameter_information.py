@@ -1,4 +1,4 @@
-"""Which parameters a test can tell: a linearised calibration with fitted and held-out data."""
+"""Information of a test on parameters: a linearised calibration with held-out data."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ class Linearised:
     Attributes
     ----------
     residual, jacobian : (m,), (m, p)             of the fitted data
-    held_residual, held_jacobian : (h,), (h, p)   of data the fit never sees
+    held_residual, held_jacobian : (h,), (h, p)   of held-out data
     """
 
     residual: np.ndarray
@@ -35,14 +35,14 @@ class Linearised:
         return self.jacobian.shape[1]
 
     def fitted(self, freed: np.ndarray) -> np.ndarray:
-        """θ (p,) that minimises |r_0 + J θ|² + |θ|² over the freed parameters, others 0."""
+        """Minimiser θ (p,) of |r_0 + J θ|² + |θ|² over the freed parameters, others 0."""
         free = positions_of(freed, len(self))
         theta, J = np.zeros(len(self)), self.jacobian[:, free]
         theta[free] = -np.linalg.solve(J.T @ J + np.eye(len(free)), J.T @ self.residual)
         return theta
 
     def posterior(self, freed: np.ndarray) -> np.ndarray:
-        """Standard deviation √diag(JᵀJ + I)⁻¹ of the freed, in prior ones: 1 = nothing learned."""
+        """Posterior over prior standard deviation √diag(JᵀJ + I)⁻¹ of the freed parameters."""
         J = self.jacobian[:, positions_of(freed, len(self))]
         return np.sqrt(np.diag(np.linalg.inv(J.T @ J + np.eye(J.shape[1]))))
 
@@ -51,10 +51,10 @@ class Linearised:
         return float(np.mean((self.held_residual + self.held_jacobian @ theta) ** 2))
 
     def improvement(self, freed: np.ndarray) -> float:
-        """log10 Q_nominal / Q_fitted of the held-out data: decades; negative where over-fitted."""
+        """log10 Q_nominal / Q_fitted of the held-out data [decades]; negative where over-fitted."""
         before, after = self.held_out(np.zeros(len(self))), self.held_out(self.fitted(freed))
         return float(np.log10(before / after))
 
     def unlearned(self, freed: np.ndarray) -> float:
-        """Σ s_k²: how many of the freed parameters the data say nothing of, in [0, n_freed]."""
+        """Σ s_k²: effective number of freed parameters the data leave unknown, in [0, n_freed]."""
         return float((self.posterior(freed) ** 2).sum())

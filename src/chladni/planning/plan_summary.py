@@ -50,7 +50,7 @@ class PlannedSensor:
 
 @dataclass(frozen=True, eq=False)
 class PlannedActuator:
-    """A shaker place, what speaks for it and what against it."""
+    """A shaker place with its scores and the reasons against it."""
 
     at: PlannedPlace
     condition: float
@@ -66,7 +66,7 @@ class PlannedActuator:
 
 @dataclass(frozen=True)
 class PlannedMode:
-    """How well the sensors see a mode; ``mode`` counts in the deck, from 1."""
+    """Visibility of a mode at the sensors; ``mode`` counts in the deck, from 1."""
 
     mode: int
     frequency_hz: float
@@ -79,7 +79,7 @@ class PlannedMode:
 
 @dataclass(frozen=True)
 class MovedSensor:
-    """A sensor given up at one label and taken at another, so that a mode is seen."""
+    """A sensor moved from one label to another, so that a mode is seen."""
 
     mode: int
     given_up: str
@@ -90,7 +90,7 @@ class MovedSensor:
 
 @dataclass(frozen=True)
 class RattleOverview:
-    """What the mesh says of clearances, whichever place is shaken."""
+    """Clearances in the mesh and their consequence for all shaker places."""
 
     force_n: float
     places_vetoed: int
@@ -103,7 +103,7 @@ class RattleOverview:
 
 @dataclass(frozen=True)
 class PlanScores:
-    """Numbers by which one layout is held against another."""
+    """Numbers by which layouts are compared."""
 
     log_det: float
     log_det_by_method: Mapping[str, float]
@@ -165,7 +165,7 @@ def summary(found: Plan) -> PlanSummary:
 
 
 def _place(found: Plan, i: int) -> PlannedPlace:
-    """What is known of one place and direction."""
+    """Description of one place and direction."""
     m = found.mounts
     grid = int(m.ids[i]) if found.places.is_grid[m.place[i]] else None
     mounted: Literal["flat", "on a block"] = "flat" if m.normal[i] else "on a block"
@@ -266,9 +266,9 @@ def durations(found: Plan) -> Durations:
 
 
 def sensors_csv(found: Plan, driven: str = "") -> str:
-    """The table a case reads: sensors in order of rank, then the shakers, or ``driven`` for them.
+    """The sensor table of a case: sensors in order of rank, then the shakers or ``driven``.
 
-    A place that is no grid is given by x, y, z [m]; its label is a number no grid has.
+    A place that is not a grid is given by x, y, z [m]; its label is a number that no grid has.
     """
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow

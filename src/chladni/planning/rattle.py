@@ -1,8 +1,8 @@
-"""Which shaker places rattle: the force at which two sheets first meet, from the mesh's gaps.
+"""Force at each shaker place at which two sheets first meet, from the gaps of the mesh.
 
-Where sheets touch as far as the mesh can tell, the gap is somewhere between nothing and what its
-facets leave in doubt. The middle of that is taken, so that such pairs take part in the veto; where
-two sheets lie on each other without doubt it is ``TAKE_UP``.
+Where sheets touch within the accuracy of the mesh, the gap lies between zero and the uncertainty of
+its facets. The middle of that interval is used, so that such pairs take part in the veto. The gap
+of sheets that certainly lie on each other is ``TAKE_UP``.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ TAKE_UP = 2e-5  # [m]: roughness and paint, of sheets that lie on each other
 
 @dataclass(frozen=True, eq=False)
 class Openings:
-    """Places where two sheets may meet, all pairs of parts together.
+    """Places where two sheets may meet, for all pairs of parts.
 
     Attributes
     ----------
     pairs : ((str, str), ...)       parts
     pair : (g,) int                 position of the pair of each place
     points : (g, 3)                 [m]
-    clearance : (g,)                [m]; of places that touch the middle of what it may be
-    known : (g,) bool               False where the sheets touch as far as the mesh can tell
+    clearance : (g,)                [m]; for touching places the middle of the possible interval
+    known : (g,) bool               False where the sheets touch within the accuracy of the mesh
     motion : (g, r)                 opening in each mode [1/√kg]
-    touching : ((str, str), ...)    pairs that touch somewhere away from joints as the mesh has it
+    touching : ((str, str), ...)    pairs that touch away from joints within the mesh's accuracy
     """
 
     pairs: tuple[tuple[str, str], ...]
@@ -42,13 +42,13 @@ class Openings:
 
 @dataclass(frozen=True, eq=False)
 class Rattle:
-    """What meets first where each candidate is shaken, at its resonance of least force.
+    """First contact for each shaker candidate, at the resonance of least force.
 
     Attributes
     ----------
-    force : (n,)      amplitude at which the first place closes [N]; inf where none can
-    place : (n,) int  of the openings; -1 where none can
-    mode : (n,) int   -1 where none can
+    force : (n,)      amplitude at which the first place closes [N]; inf where none closes
+    place : (n,) int  position among the openings; -1 where none closes
+    mode : (n,) int   resonance at which it closes; -1 where none closes
     """
 
     force: np.ndarray
@@ -78,7 +78,7 @@ def openings(assembly: Assembly, motion: np.ndarray) -> Openings:
 
 
 def _likely(g: Gaps) -> np.ndarray:
-    """The clearance, or where it is within its doubt the middle of [c - u, c + u] from zero up."""
+    """The clearance c; for touching sheets the middle of [c - u, c + u], cut off at zero."""
     least = np.maximum(g.clearance - g.uncertainty, 0.0)
     most = np.maximum(g.clearance + g.uncertainty, 2 * TAKE_UP)
     return np.where(g.touching, (least + most) / 2, g.clearance)
@@ -95,9 +95,9 @@ def _joined(blocks: list[np.ndarray], columns: int) -> np.ndarray:
 def first_rattle(
     frequency: np.ndarray, damping: np.ndarray, phi: np.ndarray, gaps: Openings
 ) -> Rattle:
-    """F = min c 2ζω² / |φ_ir ψ_gr| over gaps g and modes r, for each candidate i.
+    """Force F = min c 2ζω² / |φ_ir ψ_gr| over gaps g and modes r, for each candidate i.
 
-    Its value is :func:`chladni.planning.rattle_margin` at one newton; here with the culprit.
+    The value is :func:`chladni.planning.rattle_margin` at one newton; gap and mode come with it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a sensor can be glued: flat, off edges and folds, with room above; across a beam."""
+"""Candidate places for sensors: flat, off edges and folds, with room above; across a beam."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,33 +13,33 @@ from ..geometry.sampling import farthest_point_sample
 from ..model.assembly import Assembly
 from ..view.surface import Surface, surface
 
-TILT = np.radians(35.0)  # of the four slanting lines of sight beside the straight one
+TILT = np.radians(35.0)  # of the four oblique lines of sight around the normal one
 FOOT, ROOM = 0.008, 0.03  # radius of a sensor's foot, height it needs [m]
-SMALLER = (1.0, 0.5, 0.25)  # of a foot, in turn, until something passes
-RELATIVE = 400.0  # where the unit of length is unknown a foot is this part of the structure
+SMALLER = (1.0, 0.5, 0.25)  # of a foot, in turn, until a place passes
+RELATIVE = 400.0  # size of the structure over a foot, where the unit of length is unknown
 
 
 @dataclass(frozen=True, eq=False)
 class SensorCandidates:
-    """Where a sensor can sit, in an order in which any first few cover the structure.
+    """Places where a sensor can sit, in an order in which any first few cover the structure.
 
-    A place is a grid or, where no corner of a shell will do, its centre: a coarse mesh has no grid
-    within a narrow strip.
+    A place is a grid, or the centre of a shell that has no suitable corner.  A coarse mesh has no
+    grid within a narrow strip.
 
     Attributes
     ----------
-    ids : (n,) int          grid; for a centre a digit 1 set before the number of its shell, made
-                            as long as the longest number of the deck (see :func:`centre_ids`)
+    ids : (n,) int          grid; for a centre the digit 1 before the number of its shell, padded
+                            to the longest number of the deck (see :func:`centre_ids`)
     is_grid : (n,) bool
     nodes : (n, 4) int      rows of points around the place; a grid repeats itself
     weights : (n, 4)        of these
     points : (n, 3)         [m]
     normals : (n, 3)        unit normal, as the shells around the place are oriented
     side : (n,)             +1, -1: the side of that normal which can be reached
-    straight : (n,) bool    nothing stands in the way along the normal: room for a shaker's rod
-    refused : {why: count}  places of the surface that were not taken
-    foot : share of a sensor's foot over which the surface is flat: 1, or 1/2 or 1/4 where nothing
-           else is; 0 on beams, which have no sheet
+    straight : (n,) bool    free line along the normal: room for the rod of a shaker
+    refused : {why: count}  places of the surface that were refused
+    foot : share of a sensor's foot over which the surface is flat: 1, or 1/2 or 1/4 where no place
+           passes with more; 0 on beams, which have no sheet
     """
 
     ids: np.ndarray
@@ -68,7 +68,7 @@ class SensorCandidates:
 
 
 def centre_ids(assembly: Assembly) -> np.ndarray:
-    """Numbers that no grid bears for the centres of all shells: 47 -> 100047 beside grid 12345."""
+    """Numbers for the centres of all shells that no grid has: 47 -> 100047 with grid 12345."""
     longest = max(int(assembly.ids.max(initial=0)), int(assembly.shells.ids.max(initial=0)))
     return assembly.shells.ids + 10 ** len(str(longest))
 
@@ -82,14 +82,14 @@ def find_sensor_candidates(
     flat: float = 10.0,
     unit: str = "m",
 ) -> SensorCandidates:
-    """At most ``count`` places spread over the sheets, each farthest from those before it.
+    """At most ``count`` places spread over the sheets, each farthest from the earlier ones.
 
     A structure of beams alone has them at its grids, across the beams.
 
     Parameters
     ----------
-    foot : radius that must be flat and free of edges, folds and joints [m]; half of it, and half of
-           that, where the whole is nowhere
+    foot : radius that must be flat and free of edges, folds and joints [m]; half or a quarter of
+           it, where no place passes with more
     room : height that must be free above [m]
     flat : greatest root mean square angle of the surface within the foot [degree]
     unit : "" where lengths are in an unknown unit: foot and room are then parts of the structure
@@ -97,7 +97,7 @@ def find_sensor_candidates(
     Raises
     ------
     ModelError
-        If nothing passes.
+        If no place passes.
     """
     seen = surface(assembly, unit)
     if not len(seen.faces):
@@ -173,7 +173,7 @@ class _Every:
         refused: Mapping[str, int],
         foot: float,
     ) -> SensorCandidates:
-        """Some of them, with what was found out about them."""
+        """The sensor candidates at some of these places, with their properties."""
         return SensorCandidates(
             self.ids[at],
             self.is_grid[at],
@@ -207,7 +207,7 @@ def _every(assembly: Assembly, seen: Surface, sheet: np.ndarray) -> _Every:
 
 
 def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
-    """Whether a corner of the shell around a place is a clear grid (n,)."""
+    """True where a corner of the shell around a place is a clear grid (n,)."""
     grids = np.zeros(int(every.nodes.max()) + 1, bool)
     grids[every.nodes[clear & every.is_grid, 0]] = True
     return grids[every.nodes].any(axis=1)
@@ -216,7 +216,7 @@ def _has_one(every: _Every, clear: np.ndarray) -> np.ndarray:
 def _flat(
     seen: Surface, sheet: np.ndarray, every: _Every, foot: float, flat: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Normals of all places; which are flat within a foot, and which of these off the edges."""
+    """Normals of all places; masks of places flat within a foot, and also off the edges."""
     normals, bend = _bend(seen, sheet, every, foot)
     smooth = bend <= np.sin(np.radians(flat)) ** 2
     clear = smooth.copy()
@@ -229,7 +229,7 @@ def _bend(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal of each place and the mean sin² of the surface's angle to it within a foot.
 
-    That mean is 1 - nᵀ (Σ A n nᵀ) n / Σ A, blind to which way round the faces are numbered.
+    That mean is 1 - nᵀ (Σ A n nᵀ) n / Σ A, independent of the orientation of the faces.
     """
     a = vector_areas(seen.points, sheet)
     tensor = np.einsum("mi,mj->mij", a, unit(a))
@@ -259,10 +259,10 @@ def _off_edges(seen: Surface, points: np.ndarray, foot: float) -> np.ndarray:
 def _reachable(
     seen: Surface, points: np.ndarray, normals: np.ndarray, foot: float, room: float, enough: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """+1 or -1: the side of the normal that has room and is seen from outside, 0: neither (n,).
+    """Side +1 or -1 of the normal that has room and is seen from outside, 0 for neither (n,).
 
-    With it whether the line of sight along the normal itself is free (n,) bool. Stops when
-    ``enough`` have been found; the rest stays 0.
+    The second array is True where the line of sight along the normal is free (n,) bool. The search
+    stops when ``enough`` places are found; the rest stay 0.
     """
     triangles = np.concatenate([seen.faces[:, [0, 1, 2]], seen.faces[:, [0, 2, 3]]])
     corners = seen.points[triangles[triangles[:, 1] != triangles[:, 2]]]
@@ -324,7 +324,7 @@ class Obstacles:
         return any(not self._hit(to, square, d) for d in directions)
 
     def _hit(self, to: np.ndarray, square: np.ndarray, d: np.ndarray) -> bool:
-        """Whether the ray meets a triangle (Möller and Trumbore 1997, J. Graphics Tools 2(1))."""
+        """True if the ray meets a triangle (Möller and Trumbore 1997, J. Graphics Tools 2(1))."""
         along = to @ d
         near = np.flatnonzero((square - along**2 <= self.reach**2) & (along >= -self.reach))
         to, e1, e2 = to[near], self.e1[near], self.e2[near]

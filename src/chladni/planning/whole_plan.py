@@ -1,6 +1,6 @@
-"""From a structure to a test plan: sensors with direction, shaker, cords, lines.
+"""Test plan of a structure: sensors with direction, shaker, bungee cords, spectral lines.
 
-The road is that of Echaniz Granado (2015), section 4.1.
+The method is that of Echaniz Granado (2015), section 4.1.
 """
 
 from dataclasses import dataclass, replace
@@ -29,29 +29,29 @@ from .layouts.layout_rules import Rules, too_near
 from .rattle import Openings, Rattle, first_rattle, openings
 from .sensor_candidates import SensorCandidates, find_sensor_candidates
 
-SPARE = 6  # modes computed beyond those wanted, so that the sweep sees what lies above
-BLIND = 0.25  # of the floor: what no place sees better than this is not aimed at
+SPARE = 6  # modes computed beyond the target modes, for the sweep over more modes
+BLIND = 0.25  # of the floor: a mode that no place sees better is no target of the layout
 TANGENT = 0.6  # a direction this far off the normal (cosine) needs a mounting block
 
 
 @dataclass(frozen=True)
 class PlanSettings:
-    """What the test is to be; lengths in metres.
+    """Settings of a test plan; lengths in metres.
 
     Attributes
     ----------
-    sensors : uniaxial accelerometers at hand
-    modes : target modes; None: those below ``f_max``, or 24, or 4/5 of the sensors
+    sensors : number of uniaxial accelerometers
+    modes : target modes; None: modes below ``f_max``, or 24, or 4/5 of the sensors
     f_max : highest frequency of interest [Hz]
     damping : expected damping ratio of every mode
-    candidates : places looked at
+    candidates : number of candidate places
     spacing : least distance between two sensors [m]
-    alike : two modes may look alike at the sensors (AutoMAC) up to this; 1: as they come
-    actuators : shakers that are to work together
+    alike : highest AutoMAC of two modes at the sensors; 1: no limit
+    actuators : number of shakers that work together
     force : amplitude of a shaker at which nothing may rattle [N]
     floor : least visibility of a mode: largest motion a sensor sees over the largest anywhere
     mass : of one sensor [kg]
-    draws, spread : models drawn with every part's thickness uncertain by this share (1 sd);
+    draws, spread : number of models drawn, and standard deviation of ln of every part's thickness;
                     the layout then serves all of them
     seed : of the draws
     """
@@ -83,7 +83,7 @@ class Mount:
     points, directions : (m, 3)
     labels : tuple of str   412:+Z along an axis, else 412:n
     normal : (m,) bool      glued flat; False: on a block, along the sheet
-    side : (m,)             +1, -1: on which side of the surface normal
+    side : (m,)             +1, -1: side of the surface normal
     """
 
     ids: np.ndarray
@@ -102,18 +102,18 @@ class Plan:
     Attributes
     ----------
     places : SensorCandidates
-    modal : ModalModel            target modes, damping as wished
+    modal : ModalModel            target modes, damping as in the settings
     first : int                   number of the first of them in the deck (rigid modes before it)
     mounts : Mount                every candidate: normals first, then directions on blocks
     phi : (m, r)                  target shapes at the mounts
-    aimed : (r,) bool             modes a sensor glued flat sees at all: the layout is for them
+    aimed : (r,) bool             modes visible to a sensor glued flat: the layout is for them
     layout : (n_sensors,) int     mounts, the most informative first
-    moves : tuple of Move         sensors given up so that a mode is seen
+    moves : tuple of Move         sensors moved so that a mode is seen
     visible_before, visible : (r,)  before and after the moves
     log_det : {method: value}     of the layouts of several methods, before the moves
     sweep : ((modes, overlap), ...)  share of the layout kept when the sweep takes more modes
-    actuators : ActuatorRanking   over the normals, each alone; without a straight way to the
-                                  place, or where it rattles below the wished force: vetoed
+    actuators : ActuatorRanking   over the normals, each alone; vetoed without a free line to the
+                                  place, or where it rattles below the force of the settings
     rattle : Rattle               at the normals
     openings : Openings           where sheets may meet
     together : (k,) int           the shakers that drive all modes most evenly together
@@ -158,11 +158,11 @@ def plan(
     unit: str = "m",
     progress: Progress = silent,
 ) -> Plan:
-    """Candidates on the mesh, effective independence and exchange, visibility, shaker, cords.
+    """Plan a test: candidates on the mesh, effective independence, exchange, shaker and cords.
 
     Parameters
     ----------
-    built : the assembled structure, where it is at hand
+    built : the assembled structure, if it exists already
     unit : "" where the deck's unit of length is not known
     """
     settings = settings or PlanSettings()
@@ -237,7 +237,7 @@ def plan(
 
 
 def target_modes(built: Structure, settings: PlanSettings) -> tuple[ModalModel, ModalModel, int]:
-    """Target modes, these and some above, and the number of rigid modes before them."""
+    """Target modes, target modes plus some above, and the number of rigid modes before them."""
     due = settings.modes or min(24, 4 * settings.sensors // 5)
     n = len(built.system.dofs)
     where = built.assembly.points[built.assembly.rows(built.system.dofs[:, 0])]
@@ -267,7 +267,7 @@ def recovered(built: Structure, vectors: np.ndarray) -> np.ndarray:
 
 
 def seen_at(places: SensorCandidates, mounts: Mount, moving: np.ndarray) -> np.ndarray:
-    """Motion of all points (n_points, 3, r) as the mounts see it along their directions (m, r)."""
+    """Motion along the mounts' directions (m, r), from that of all points (n_points, 3, r)."""
     at = places.moving(moving, mounts.place)
     return np.einsum("mir,mi->mr", at, mounts.directions)
 
@@ -283,7 +283,7 @@ def mounts_at(places: SensorCandidates) -> Mount:
         directions.append(axes[good])
     at, along = np.concatenate(place), np.concatenate(directions)
     labels = _labels(places.ids[at], along)
-    once = np.sort(np.unique(labels, return_index=True)[1])  # of a beam two ways are places already
+    once = np.sort(np.unique(labels, return_index=True)[1])  # beams already have both directions
     at, along, labels = at[once], along[once], [labels[k] for k in once]
     ids = places.ids[at]
     return Mount(
@@ -308,7 +308,7 @@ def _labels(ids: np.ndarray, directions: np.ndarray) -> list[str]:
 
 
 def _near(mounts: Mount, settings: PlanSettings) -> Rules:
-    """Sensors keep their distance; one grid bears one sensor."""
+    """Rules that sensors keep their distance and a grid has one sensor at most."""
     near = too_near(mounts.points, max(settings.spacing, 1e-9))
     return Rules(near=near)
 
@@ -338,7 +338,7 @@ def _layout(
 
 
 def _only(kept: np.ndarray, n: int) -> Rules:
-    """Rules that leave no choice but the kept."""
+    """Rules that forbid all candidates except the kept ones."""
     forbidden = np.ones(n, bool)
     forbidden[kept] = False
     return Rules(forbidden=forbidden)
@@ -349,8 +349,8 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 
     Echaniz Granado (2015), section 4.1 and figure 8.
 
-    Each entry is (modes, overlap of its layout with that of the entry before); it ends where the
-    places tell no more modes apart.
+    Each entry is (modes, overlap of its layout with that of the entry before). The list ends where
+    the places cannot distinguish more modes.
     """
     most = min(n_sensors, phi.shape[1])
     counts = sorted({*np.linspace(max(2, target // 3), most, 7).astype(int).tolist(), target})
@@ -367,10 +367,10 @@ def mode_sweep(phi: np.ndarray, n_sensors: int, target: int) -> tuple[tuple[int,
 def hang_points(
     moving: np.ndarray, places: SensorCandidates, count: int = 4, first: int = 5
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Grids that move least in the first modes, well apart: near nodes, where cords add least.
+    """Grids that move least in the first modes, well apart: cords add least near nodes.
 
-    Returns the grids and their rms motion, each mode over its largest anywhere; ``moving`` is the
-    motion of all points (n_points, 3, r).
+    Returns the grids and their rms motion, where each mode is scaled to its largest motion;
+    ``moving`` is the motion of all points (n_points, 3, r).
     """
     size = np.linalg.norm(moving[:, :, :first], axis=1)
     quiet = np.sqrt(((places.moving(size) / size.max(axis=0)) ** 2).mean(axis=1))

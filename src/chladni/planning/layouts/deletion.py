@@ -21,7 +21,7 @@ class Deletion:
     ----------
     ranked : (n_sensors,) int   kept candidates, the most informative first: the last of them is
                                 the sensor to give up when one is needed elsewhere
-    deleted : (n - n_sensors,)  the others in the order in which they went
+    deleted : (n - n_sensors,)  the others in the order of deletion
     log_det : (n_steps + 1,)    log det F before and after each deletion
     """
 
@@ -69,10 +69,10 @@ def deletion(
     prior: np.ndarray | None = None,
     rules: Rules | None = None,
 ) -> Deletion:
-    """Effective independence with the order of deletion kept; arguments as there.
+    """Effective independence with its order of deletion; see :func:`effective_independence`.
 
-    The ranking of the kept goes on deleting down to the number of unknowns; of these last, all
-    indispensable, the pivots of QR come first. Rules are obeyed all the way.
+    The kept candidates are ranked by further deletion down to the number of unknowns. The last
+    ones, all indispensable, are ranked by the pivots of QR. Rules apply throughout.
     """
     c = candidates(phi, noise, prior)
     kept, rules = start(c, n_sensors, rules)
@@ -164,8 +164,9 @@ def _delete(
 class _Course:
     """Independence E (d, len(at)) of the candidates at hand along a deletion.
 
-    Independent single readings are followed by rank-one updates in whitened rows (orthonormal at
-    the start, so F stays near I), set up anew from time to time; all else is computed each time.
+    Independent single readings use rank-one updates in whitened rows, which are recomputed from
+    time to time.  The rows are orthonormal at the start, so F stays near I.  All other cases are
+    computed each time.
     """
 
     def __init__(self, c: Candidates, at: np.ndarray) -> None:
@@ -177,7 +178,7 @@ class _Course:
         self.C, self.age = np.broadcast_to(np.eye(c.unknowns), (len(Q), *c.prior.shape)), 0
 
     def delete(self, i: int) -> None:
-        """Candidate i of those at hand leaves."""
+        """Delete candidate i of the remaining ones."""
         self.live[i], self.age = False, self.age + 1
         if self.simple and self.age < REFRESH and self.E[:, i].max() < 0.99:
             self.C, self.E = updated(self.Q, self.C, self.E, i, -1)
@@ -193,7 +194,7 @@ class _Course:
 
 
 def _ranked(c: Candidates, left: np.ndarray) -> np.ndarray:
-    """The layout with the most informative first, by deletion down to the indispensable."""
+    """The layout with the most informative first, by deletion down to indispensable sensors."""
     free = Rules().checked(len(c), 0)
     order, _ = _delete(c, left, min(max(c.fewest, 1), int(left.sum())), free)
     last = left.copy()
@@ -204,8 +205,8 @@ def _ranked(c: Candidates, left: np.ndarray) -> np.ndarray:
 def qr_ranking(phi: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
     """Candidates in the order of the pivots of QR of Φᵀ: each the farthest from those before it.
 
-    Manohar et al. (2018), IEEE Control Systems 38(3), 63-86. Beyond as many as modes the order
-    carries no more information than the norms that are left.
+    Manohar et al. (2018), IEEE Control Systems 38(3), 63-86. Beyond the number of modes the order
+    carries no more information than the remaining norms.
     """
     rows = phi.reshape(len(phi), -1, phi.shape[-1])
     if rows.shape[1] > 1:
@@ -224,10 +225,11 @@ def greedy(
     prior: np.ndarray | None = None,
     rules: Rules | None = None,
 ) -> np.ndarray:
-    """Positions, in the order chosen, of forward selection: each time the most telling candidate.
+    """Forward selection of the most informative candidate: positions in the order chosen.
 
-    Until the information is regular a faint prior stands in (the choice is then that of pivoted QR
-    of modes at equal energy) and D decides, as every layout is equally blind to A and E.
+    While the information is singular, a faint prior and the D criterion decide, because A and E do
+    not distinguish singular layouts. The choice is then that of pivoted QR with modes scaled to
+    equal energy.
     """
     c = candidates(phi, noise, prior)
     kept, checked = start(c, n_sensors, rules)

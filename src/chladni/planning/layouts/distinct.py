@@ -1,7 +1,7 @@
-"""Layouts at which no two modes look alike: exchange against a ceiling of the AutoMAC.
+"""Layouts with distinct modes: exchange under a ceiling of the AutoMAC.
 
-A large determinant makes shapes independent, not orthogonal: two modes may still look alike at the
-sensors (AutoMAC 0.3), and a model that is a little wrong then pairs them wrongly.
+A large determinant makes shapes independent, not orthogonal.  Two modes may still have similar
+shapes at the sensors (AutoMAC 0.3), and a slightly wrong model then pairs them wrongly.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ def distinct(
 
     One sensor after the other moves to its best place until a round moves none (coordinate
     exchange, Meyer and Nachtsheim 1995, Technometrics 37(1), 60-69). Where the ceiling cannot be
-    met some excess is left. Noise does not enter the AutoMAC, as wherever modes are paired by it.
+    met some excess is left. Noise does not enter the AutoMAC, nor does it where modes are paired.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _joined(c: Candidates, rest: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
-    """What each candidate adds to the Gram matrix: above the diagonal (d, n, q), on it (d, n, p).
+    """Shares of candidates in the Gram matrix: above the diagonal (d, n, q), on it (d, n, p).
 
     ``first``, ``second`` (q,) are the modes of each pair.
     """
@@ -107,7 +107,7 @@ class _Pairs:
         return cls(off, np.einsum("dikp,dikp->dip", A, A), first, second)
 
     def alone(self, kept: np.ndarray, ceiling: float) -> float:
-        """Excess of a layout."""
+        """Excess of a layout over the ceiling."""
         return float(self.excess(kept[:-1], kept[-1:], ceiling)[0])
 
     def excess(self, rest: np.ndarray, others: np.ndarray, ceiling: float) -> np.ndarray:

@@ -28,9 +28,9 @@ def exchange(
 ) -> np.ndarray:
     """A layout (increasing positions) that no single exchange improves; with ``pairs`` no double.
 
-    Each round makes the best of all swaps. Double exchange (D criterion, one reading a candidate)
-    starts where single exchange stops, skips every pair that cannot win by its bound
-    det ≤ Π (1 + E_j), and is exact.
+    Each round makes the best of all swaps. Double exchange is for the D criterion and one reading a
+    candidate.  It starts where single exchange stops and skips every pair that cannot win by its
+    bound det ≤ Π (1 + E_j), so it is exact.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _best_single(
 
 
 def _joinable(rules: Rules, mask: np.ndarray, i: int) -> np.ndarray:
-    """Which candidates may take the place of sensor i (n,) bool."""
+    """Mask of candidates that may take the place of sensor i (n,) bool."""
     rest = mask.copy()
     rest[i] = False
     may = rules.addable(rest, int(mask.sum()))

@@ -1,9 +1,9 @@
-"""What sensors tell of modes or parameters: the Fisher information and its measures.
+"""Fisher information of sensors on modes or parameters, and its measures.
 
 A candidate is a place (and direction) where a sensor may sit. It contributes k rows to the
-information F = F_0 + Σ_i A_iᵀ A_i: one row φ_i for a uniaxial sensor and target modes, three for a
-triaxial one, many for the sensitivities of an FRF. Several *draws* of the model (an ensemble over
-uncertain parameters) are judged by the mean over the draws, so one layout serves them all.
+information F = F_0 + Σ_i A_iᵀ A_i.  A uniaxial sensor and target modes give one row φ_i, a triaxial
+one gives three, the sensitivities of an FRF give many. Several *draws* of the model (an ensemble
+over uncertain parameters) are judged by the mean over the draws, so one layout serves them all.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Criterion = Literal["D", "A", "E"]
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What each candidate would tell of the unknowns; made by :func:`candidates`.
+    """Information of each candidate on the unknowns; made by :func:`candidates`.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Candidates:
 
     @property
     def fewest(self) -> int:
-        """Sensors without which F is singular: rows must be as many as unknowns."""
+        """Least number of sensors for a regular F: at least as many rows as unknowns."""
         return 0 if self.informed else -(-self.unknowns // self.rows.shape[2])
 
     def fisher(self, kept: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ class Candidates:
     def joining(self, kept: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Rows g with which F grows to F + gᵀg when one of the others joins (d, len(others), k, p).
 
-        For correlated noise the part of the reading that the kept sensors do not foretell:
+        For correlated noise it is the part of the reading that the kept sensors do not predict:
         g_j = (a_j - Σ_jS Σ_SS⁻¹ A_S) / √(Σ_jj - Σ_jS Σ_SS⁻¹ Σ_Sj).
         """
         if self.noise is None:
@@ -126,7 +126,7 @@ def candidates(
 
 
 def _stacked(phi: np.ndarray) -> np.ndarray:
-    """(n_draws, n, k, p) of any of the accepted shapes."""
+    """Rows (n_draws, n, k, p) from any of the accepted shapes."""
     if phi.ndim == 2:
         phi = phi[None]
     if phi.ndim == 3:
@@ -139,7 +139,7 @@ def _stacked(phi: np.ndarray) -> np.ndarray:
 
 
 def _square(a: np.ndarray, n: int, what: str) -> np.ndarray:
-    """A diagonal as a matrix; anything but (n,) or (n, n) is refused."""
+    """A diagonal as a matrix; shapes other than (n,) and (n, n) raise ShapeError."""
     a = np.diag(a) if a.ndim == 1 else a
     if a.shape != (n, n):
         raise ShapeError(f"the {what} is {a.shape}, it should be {(n, n)}")
@@ -147,7 +147,7 @@ def _square(a: np.ndarray, n: int, what: str) -> np.ndarray:
 
 
 def _positive(noise: np.ndarray, n: int) -> np.ndarray:
-    """The covariance, if it is one."""
+    """The noise as a covariance (n, n), checked to be symmetric and positive definite."""
     noise = _square(noise, n, "noise covariance")
     if np.abs(noise - noise.T).max() > 1e-12 * np.abs(noise).max():
         raise ShapeError("the noise covariance is not symmetric")
@@ -199,7 +199,7 @@ def changed(criterion: Criterion, F: np.ndarray, U: np.ndarray, sign: np.ndarray
 
     Returns
     -------
-    (m,)                -inf where nothing would be left to invert
+    (m,)                -inf where the changed information is singular
     """
     if criterion == "E":
         change = np.einsum("dmqi,q,dmqj->dmij", U, sign, U, optimize=True)
@@ -250,7 +250,7 @@ def whitened(c: Candidates, kept: np.ndarray) -> np.ndarray:
     Raises
     ------
     ShapeError
-        If the kept candidates cannot tell the unknowns apart: F is singular.
+        If the kept candidates cannot distinguish the unknowns: F is singular.
     """
     if c.noise is not None:
         R = np.linalg.cholesky(_regular(c.fisher(kept))).mT
@@ -275,7 +275,7 @@ def _root(prior: np.ndarray) -> np.ndarray:
 
 
 def _regular(F: np.ndarray) -> np.ndarray:
-    """F, if it can be inverted."""
+    """The information F, checked to be regular."""
     eigenvalues = np.linalg.eigvalsh(F)
     if np.any(eigenvalues[..., 0] <= 1e-14 * eigenvalues[..., -1]):
         raise ShapeError(
@@ -295,7 +295,7 @@ def combined(E: np.ndarray) -> np.ndarray:
 
 
 def information_entropy(F: np.ndarray) -> float:
-    """Entropy h = p/2 ln(2πe) - 1/2 ln det F: what stays unknown of p unknowns [nat].
+    """Entropy h = p/2 ln(2πe) - 1/2 ln det F: the remaining uncertainty of p unknowns [nat].
 
     Papadimitriou (2004), J. Sound and Vibration 278, 923-947.
     """

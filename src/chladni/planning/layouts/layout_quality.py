@@ -1,4 +1,4 @@
-"""What a layout is worth beyond its determinant: energy seen, visibility of each mode, mass."""
+"""Quality of a layout beyond its determinant: kinetic energy, visibility of each mode, mass."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ def visibility(seen: np.ndarray, largest: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Move:
-    """A sensor that was given up so that a mode is seen (Echaniz Granado 2015, section 4.2.4.6)."""
+    """A sensor that was moved so that a mode is seen (Echaniz Granado 2015, section 4.2.4.6)."""
 
     mode: int
     out: int
@@ -76,7 +76,7 @@ def with_visible_modes(
 def _move(
     phi: np.ndarray, kept: np.ndarray, largest: np.ndarray, mode: int, floor: float, rules: Rules
 ) -> tuple[int, int] | None:
-    """(rank of the sensor to give up, candidate to take), or None where nothing helps."""
+    """Rank of the sensor to give up and candidate to take, or None where no move helps."""
     now = visibility(phi[kept], largest)
     for k in range(len(kept) - 1, -1, -1):
         rest = np.delete(kept, k)
@@ -115,5 +115,5 @@ def loaded_frequency(
 
 
 def overlap(layout: np.ndarray, other: np.ndarray) -> float:
-    """Share of the sensors of one layout that the other has too, in [0, 1]."""
+    """Share of the sensors of one layout that the other also has, in [0, 1]."""
     return len(np.intersect1d(layout, other)) / max(len(layout), 1)

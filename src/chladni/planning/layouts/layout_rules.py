@@ -1,4 +1,4 @@
-"""What a layout must obey: fixed and forbidden places, minimum distance, regions; all as masks."""
+"""Rules for a layout: fixed and forbidden places, minimum distance, regions; all as masks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +12,7 @@ from .information import positions_of
 
 
 def too_near(points: np.ndarray, distance: float) -> np.ndarray:
-    """(n, n) bool: pairs of places nearer to each other than ``distance``.
+    """Pairs of places nearer to each other than ``distance`` (n, n) bool.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def too_near(points: np.ndarray, distance: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Rules:
-    """What a layout must obey.
+    """Rules for a layout.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Rules:
         return fixed, forbidden
 
     def checked(self, n: int, n_sensors: int) -> "Rules":
-        """The same rules with masks, if ``n_sensors`` of ``n`` candidates may obey them at all.
+        """These rules as masks, checked that ``n_sensors`` of ``n`` candidates can obey them.
 
         Raises
         ------
@@ -145,10 +145,10 @@ class Rules:
             raise ShapeError(f"the layout has {self._count(kept)} sensors by region")
 
     def deletable(self, kept: np.ndarray, n_sensors: int) -> np.ndarray:
-        """Which of the kept may leave on the way to ``n_sensors`` (n,) bool.
+        """Mask of the kept that may leave on the way to ``n_sensors`` (n,) bool.
 
-        Not the fixed; not from a region at its least; only from regions above their most once
-        as many deletions are left as they must lose.
+        Fixed candidates and those of a region at its least must stay. Regions above their most must
+        lose sensors.  Once the remaining deletions just suffice for that, only these may lose one.
         """
         may = kept & ~self.fixed
         if self.region is None:
@@ -163,7 +163,7 @@ class Rules:
         return may
 
     def addable(self, kept: np.ndarray, n_sensors: int) -> np.ndarray:
-        """Which candidates may join the kept on the way to ``n_sensors`` (n,) bool."""
+        """Mask of candidates that may join the kept on the way to ``n_sensors`` (n,) bool."""
         may = ~kept & ~self.forbidden
         waiting = np.flatnonzero(self.fixed & ~kept)
         if self.near is not None:
@@ -183,7 +183,7 @@ class Rules:
         return may
 
     def pairs(self, kept: np.ndarray, joining: np.ndarray) -> np.ndarray:
-        """Which two of ``joining`` may join the kept together (m, m) bool, to complete a layout."""
+        """Mask of pairs of ``joining`` that may together complete a layout (m, m) bool."""
         n = len(joining)
         may = np.ones((n, n), bool) if self.near is None else ~self.near[np.ix_(joining, joining)]
         np.fill_diagonal(may, False)
@@ -197,13 +197,13 @@ class Rules:
 
 
 def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:
-    """A largest set (n,) bool without forbidden or too near places; the worthier stays.
+    """A large set (n,) bool without forbidden or too near places; places of higher worth stay.
 
     Raises
     ------
     ShapeError
-        If fewer than ``n_sensors`` are left, however they are packed (worthiest first, then those
-        with the fewest neighbours first).
+        If fewer than ``n_sensors`` are left by either packing: highest worth first, or fewest
+        neighbours first.
     """
     allowed = ~rules.forbidden
     if rules.near is None:
@@ -220,7 +220,7 @@ def thinned(rules: Rules, worth: np.ndarray, n_sensors: int) -> np.ndarray:
 
 
 def _packed(rules: Rules, worth: np.ndarray) -> np.ndarray:
-    """Greedy packing: in order of worth, each place that is not too near to one taken before."""
+    """Greedy packing: in order of worth, each place that is not too near to an earlier one."""
     assert rules.near is not None
     kept, free = np.zeros(len(worth), bool), ~rules.forbidden
     for i in np.argsort(-np.where(rules.fixed, np.inf, worth), kind="stable"):

@@ -20,10 +20,10 @@ def annealed(
     noise: np.ndarray | None = None,
     rules: Rules | None = None,
 ) -> np.ndarray:
-    """Simulated annealing over single swaps: a loss Δ of log det is taken with odds e^(Δ/T).
+    """Simulated annealing over single swaps: a loss Δ of log det is accepted with odds e^(Δ/T).
 
-    T falls from ``hot`` to ``cold`` geometrically. The best layout met is returned (increasing),
-    quenched: single exchange until it helps no more.
+    T falls from ``hot`` to ``cold`` geometrically. The best layout found is returned (increasing)
+    after single exchange until no swap improves it.
     Kirkpatrick, Gelatt and Vecchi (1983), Science 220, 671-680.
     """
     c, rng = candidates(phi, noise), np.random.default_rng(seed)
@@ -46,7 +46,7 @@ def annealed(
 def _random_swap(
     c: Candidates, kept: np.ndarray, rules: Rules, rng: np.random.Generator
 ) -> tuple[float, np.ndarray] | None:
-    """(log det, layout) after one sensor, at random, has moved to a place at random."""
+    """log det and layout after a random sensor has moved to a random place."""
     k = int(rng.integers(len(kept)))
     mask = np.zeros(len(c), bool)
     mask[kept] = True
@@ -68,7 +68,7 @@ def evolved(
     noise: np.ndarray | None = None,
     rules: Rules | None = None,
 ) -> np.ndarray:
-    """Genetic search over random keys: every candidate bears a key, the highest that fit are kept.
+    """Genetic search over random keys: every candidate has a key, the highest allowed are kept.
 
     The keys make any crossing of two layouts a layout (Bean 1994, ORSA J. Computing 6, 154-160);
     they are evolved by differential evolution (scipy), ``population`` times n individuals.
@@ -97,7 +97,7 @@ def evolved(
 
 
 def keyed(keys: np.ndarray, n_sensors: int, rules: Rules) -> np.ndarray:
-    """The layout (increasing) of the highest keys that the rules let in, one after the other."""
+    """The layout (increasing) of the highest keys that the rules allow, one after the other."""
     if rules.free:
         return np.sort(np.argpartition(-keys, n_sensors - 1)[:n_sensors])
     kept = np.zeros(len(keys), bool)

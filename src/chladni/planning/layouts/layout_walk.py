@@ -1,4 +1,4 @@
-"""A layout in the making, one sensor at a time: what searches and environments walk on."""
+"""A layout that changes by one sensor at a time, for searches and environments."""
 
 import numpy as np
 
@@ -14,15 +14,15 @@ INDISPENSABLE = 1 - 1e-9  # independence from which on a deletion loses a mode
 class Walk:
     """A set of candidates that shrinks (delete) or grows (add) to ``n_sensors`` under rules.
 
-    Growing starts from nothing, so a faint prior stands in for the information that is not there
-    yet (:func:`chladni.planning.layouts.deletion.faint`); shrinking needs none.
+    Growing starts without sensors, so a faint prior replaces the missing information
+    (:func:`chladni.planning.layouts.deletion.faint`).  Shrinking needs none.
 
     Attributes
     ----------
     kept : (n,) bool
     reachable : (n,) bool   candidates that a complete layout may hold
-    worth : (n,)      in [0, 1], of who may move: independence E of the kept (shrinking), growth
-                      of log det over ``full`` (growing); 0 for the others
+    worth : (n,)      in [0, 1], for candidates that may move: independence E of the kept
+                      (shrinking), growth of log det over ``full`` (growing); 0 for the others
     full : float      30 for each row a candidate adds to the information
     log_det : float   log det F, prior included
     """
@@ -48,12 +48,12 @@ class Walk:
         self._anew()
 
     def exact(self) -> float:
-        """log det F of the kept, from scratch."""
+        """log det F of the kept, computed without updates."""
         F = self.c.fisher(np.flatnonzero(self.kept)) + (self.prior - self.c.prior)
         return value("D", F)
 
     def may(self) -> np.ndarray:
-        """Which candidates may move next (n,) bool: the rules, and no mode is lost."""
+        """Mask of candidates that may move next by the rules, without loss of a mode (n,) bool."""
         if self.grow:
             return self.rules.addable(self.kept, self.n_sensors)
         may = self.kept if self.rules.free else self.rules.deletable(self.kept, self.n_sensors)
@@ -64,7 +64,7 @@ class Walk:
         return bool(self.kept.sum() == self.n_sensors)
 
     def move(self, i: int) -> float:
-        """Candidate i leaves or joins; the change of log det F."""
+        """Move candidate i out or in; return the change of log det F."""
         if self.kept[i] == self.grow:
             raise ShapeError(f"candidate {i} has moved before")
         worth, before = float(self.worth[i]), self.log_det
@@ -83,7 +83,7 @@ class Walk:
         return self.log_det - before
 
     def _anew(self) -> None:
-        """Independence from scratch: rounding does not pile up."""
+        """Compute independence without updates, so that rounding does not accumulate."""
         self._age = 0
         if not self._simple:
             self._judge(self._blocks())
