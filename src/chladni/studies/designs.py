@@ -1,4 +1,4 @@
-"""Where in the unit cube samples lie: space-filling, full factorial, one at a time, for indices.
+"""Sample points in the unit cube: space-filling, full factorial, one at a time, for indices.
 
 Sources: Sobol' (1967) with Owen's scrambling, McKay, Beckman and Conover (1979), both by
 scipy.stats.qmc; Saltelli et al. (2010), Computer Physics Communications 181, 259-270, and
@@ -20,7 +20,7 @@ LEVELS = 4  # of the grid of Morris' elementary effects: the usual choice
 class Design:
     """Points (n, d) in the unit cube.
 
-    ``block`` consecutive points belong together, 1 where each stands for itself.
+    ``block`` consecutive points belong together; it is 1 where all points are independent.
     """
 
     points: np.ndarray
@@ -33,8 +33,8 @@ def design(sampler: str, n: int, d: int, seed: int, own: np.ndarray) -> Design:
 
     Parameters
     ----------
-    own : (d,)      the deck's own values in the unit cube, from which ``oat`` goes; where one lies
-                    outside of it, the nearest end
+    own : (d,)      the deck's own values in the unit cube, where ``oat`` starts; a value outside is
+                    moved to the nearest end
 
     Raises
     ------
@@ -84,7 +84,7 @@ def _oat(n: int, d: int, seed: int, own: np.ndarray) -> Design:
 
 
 def problem(d: int) -> dict[str, Any]:
-    """The unit cube in SALib's words."""
+    """The unit cube as a SALib problem."""
     return {"num_vars": d, "names": [str(k) for k in range(d)], "bounds": [[0.0, 1.0]] * d}
 
 
@@ -96,7 +96,7 @@ def _saltelli(n: int, d: int, seed: int, own: np.ndarray) -> Design:
         raise FileError(f"Sobol' indices of {d} parameters need at least {4 * (d + 2)} samples")
     rows = 2 ** int(np.log2(rows))  # a Sobol' sequence is balanced at powers of two
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its own remark on d = 1 and on numpy's generators
+        warnings.simplefilter("ignore")  # SALib's own warnings on d = 1 and numpy's generators
         X = sobol.sample(problem(d), rows, calc_second_order=False, seed=seed)
     return Design(X, d + 2)
 

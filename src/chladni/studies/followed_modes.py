@@ -10,7 +10,7 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..ema.correlation import mac, subspace_mac
 from ..geometry.sampling import farthest_point_sample
 
-MARGIN = 1.4  # as many modes are solved: a mode may rise past its neighbours
+MARGIN = 1.4  # modes solved over modes followed: a mode may rise past its neighbours
 MOST = 1500  # nodes at which shapes are compared: a MAC of thousands of dofs gains nothing
 CLOSE = 5e-3  # relative distance of frequencies below which shapes may mix freely
 LEAST = 0.5  # MAC below which a mode is lost
@@ -35,7 +35,7 @@ class FollowedModes:
 
     @property
     def solved(self) -> int:
-        """How many modes of a sample are solved for."""
+        """Number of modes that are solved for in a sample."""
         return self.rigid + int(np.ceil(MARGIN * len(self.frequency))) + 2
 
     @property
@@ -47,7 +47,7 @@ class FollowedModes:
     def found_in(self, modal: ModalModel) -> tuple[np.ndarray, np.ndarray]:
         """Frequency (r,) [Hz] and MAC (r,) of each in the modes of a sample; nan where it is lost.
 
-        Close modes may mix: a shape counts by its share in the space that the group spans
+        Close modes may mix.  A shape is assigned by its share in the space of a group
         (``subspace_mac``), and within the group by its own MAC.
         """
         elastic = modal.sel(np.arange(len(modal)) >= self.rigid)

@@ -1,4 +1,4 @@
-"""A study from its question to its table: nominal model, design, samples, sensitivities."""
+"""A parameter study from settings to table: nominal model, design, samples, sensitivities."""
 
 import platform
 import time
@@ -38,22 +38,22 @@ from .workers import affordable, client_of, refuse_many, results
 
 RESERVED = ("mode", "frequency", "mac", "done", "rms", "peak", "peak_hz", "frequency_hz",
             "frf_real", "frf_imag", "channel_name")  # names in the NetCDF file  # fmt: skip
-_RIGID = 6  # motions of a free structure in one piece
+_RIGID = 6  # rigid motions of a free structure in one piece
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterStudy:
-    """Samples and what came of them.
+    """Samples of a model and their results.
 
     Attributes
     ----------
     varied : tuple of Variation     (d)
     settings : StudySettings
-    design : Design                 points in the unit cube, and which belong together
+    design : Design                 points in the unit cube, in blocks that belong together
     X : (n, d)                      values of the parameters
     rows : (n) dicts                one per sample, in order; failed ones have no results
     nominal : dict                  the row of the deck's own values
-    store : folder or None          where whole responses are, if they were kept
+    store : folder or None          folder of whole responses, if they were kept
     kept : samples that an earlier run had finished
     provenance : files with their hashes, versions, seed
     """
@@ -82,7 +82,7 @@ class ParameterStudy:
 
     @property
     def failed(self) -> list[tuple[int, str]]:
-        """(number, why) of the samples without results."""
+        """Number and reason of every sample without results."""
         return [(r["sample"], r["why"]) for r in self.rows if r["status"] == "failed"]
 
     def column(self, name: str) -> np.ndarray:
@@ -97,7 +97,7 @@ class ParameterStudy:
 
     @cached_property
     def sensitivities(self) -> tuple[Sensitivity, ...]:
-        """Of every result that has any."""
+        """Sensitivities of every result that is worth reporting."""
         U, by = self.design.points, (self.settings.sampler, self.design.block)
         return tuple(
             sensitivity(c, self.column(c), self.X, U, *by) for c in worth_telling(self.columns)
@@ -114,17 +114,17 @@ def study(
     scheduler: Any = None,
     progress: Progress = silent,
 ) -> ParameterStudy:
-    """Sample parameters of a model, here or on any Dask cluster.
+    """Sample parameters of a model, in local processes or on any Dask cluster.
 
     Parameters
     ----------
-    vary : ranges as "t of inner=0.6:0.8", "E=90%:110%" or "point-mass at 412=0.01:0.2"; of a case
-        its [[parameter]] without any
-    out : folder of the store: a study that was begun there goes on where it stopped
-    workers : local processes (a script that asks for more than one needs the usual
-              ``if __name__ == "__main__":``); None: one per core, or this one where they would not
-              be worth their start
-    scheduler : address of a Dask scheduler, or a ``distributed.Client``, in their place
+    vary : ranges as "t of inner=0.6:0.8", "E=90%:110%" or "point-mass at 412=0.01:0.2"; without
+        any, the [[parameter]] of a case
+    out : folder of the store: a study that was begun there continues where it stopped
+    workers : local processes (a script that uses more than one needs the usual
+              ``if __name__ == "__main__":``); None: one per core, or only this one for a study too
+              short to start others
+    scheduler : address of a Dask scheduler, or a ``distributed.Client``, instead of processes
 
     Raises
     ------
@@ -186,7 +186,7 @@ def study(
 def _varied(
     model: Model, case: Case | None, vary: Sequence[VaryText]
 ) -> tuple[tuple[Variation, ...], list[str]]:
-    """What is varied, and what the user should know of it."""
+    """The varied parameters, and notes on them for the user."""
     notes: list[str] = []
     units = units_of(model.deck, model.units) if model.deck and model.units else model.units
     if vary:
@@ -207,14 +207,20 @@ def _varied(
 
 
 def _refuse_taken(names: Sequence[str], columns: Collection[str]) -> None:
-    """Refuse parameters called as a result is."""
+    """Refuse parameters with the name of a result.
+
+    Raises
+    ------
+    FileError
+        If a parameter has the name of a column of the table.
+    """
     for name in names:
         if name in {*columns, *OWN, *RESERVED}:
             raise FileError(f"a parameter cannot be called {name!r}, as a column of the table is")
 
 
 def _choices(assembly: Assembly) -> str:
-    """What could be varied, for the sentence."""
+    """The parameters that can be varied, as advice for an error message."""
     parts = [p for p in assembly.parts if fields_of(p)]
     if not parts:
         return 'give --vary "K=50%:200%" or the like'
@@ -223,9 +229,9 @@ def _choices(assembly: Assembly) -> str:
 
 
 def _places(varied: Sequence[Variation], own: np.ndarray) -> np.ndarray:
-    """The deck's own values in the unit cube (d,), beyond it where a range leaves them out.
+    """The deck's own values in the unit cube (d,); values outside [0, 1] lie outside the range.
 
-    Of what the deck has nothing of, and a range in the logarithm never reaches, the lower end.
+    A value of zero has no logarithm: a logarithmic range then takes its lower end.
     """
     out = []
     for v, value in zip(varied, own, strict=True):
@@ -241,7 +247,7 @@ def _places(varied: Sequence[Variation], own: np.ndarray) -> np.ndarray:
 def _asked(
     model: Model, case: Case | None, varied: tuple[Variation, ...], settings: StudySettings
 ) -> StudyModel:
-    """The question of every sample: the nominal model's modes, and how far modes are solved."""
+    """The study model of every sample: nominal modes, and the frequency up to which to solve."""
     tested = case.tested(model.assembly) if case is not None else model.assembly
     whole = Model(model.source, tested, model.unit, (), model.length)
     if settings.inputs:
@@ -260,9 +266,10 @@ def _asked(
 
 
 def _elastic(whole: Model, count: int) -> ModalModel:
-    """Normal modes with so many elastic ones, of a structure in however many loose pieces.
+    """Normal modes with ``count`` elastic ones, of a structure in any number of loose pieces.
 
-    Among rigid motions alone rounding passes for elastic modes: twice as many must agree on them.
+    Rounding makes rigid motions pass for elastic modes where there are few others.  So the number
+    of modes is doubled until the number of rigid ones stays the same.
     """
     n = count + _RIGID
     modal = whole.modes(n)
@@ -287,7 +294,7 @@ def _store(
 
 
 def _identity(asked: StudyModel) -> dict[str, Any]:
-    """What makes two studies the same one: contents, not names and places of files."""
+    """Identity of a study: the contents of its files and settings, not names or folders."""
     s, case = asked.settings, asked.case
     measured: tuple[Any, ...] = ()
     if case is not None:
@@ -308,7 +315,7 @@ def _identity(asked: StudyModel) -> dict[str, Any]:
 def _provenance(
     model: Model, case: Case | None, varied: Sequence[Variation], settings: StudySettings
 ) -> dict[str, Any]:
-    """Files by their hashes, versions, ranges, seed: enough to make the study again."""
+    """Files with hashes, versions, ranges and seed: enough to repeat the study."""
     files = [s.path for s in model.deck.sources] if model.deck is not None else []
     if case is not None:
         files += [case.path]
@@ -343,12 +350,12 @@ class _Clock:
         told(f"{before} of {n} samples", before / n)
 
     def told_of(self, what: str) -> None:
-        """Say what it waits for."""
+        """Report what the study waits for."""
         self.told(what, self.done / self.n)
 
     def tick(self, done: int) -> None:
-        """Say how far it is."""
-        if not self.begun:  # the start of workers is no sample's time
+        """Report the number of finished samples, rate and remaining time."""
+        if not self.begun:  # the start of workers does not count as time of samples
             self.begun, self.before = time.monotonic(), done
         self.done = done
         new, spent = done - self.before, time.monotonic() - self.begun
@@ -372,7 +379,7 @@ def per_time(rate: float) -> str:
 
 
 def remaining(seconds: float) -> str:
-    """A duration as a person says it.
+    """A duration in words, in the most readable unit.
 
     >>> remaining(40), remaining(200), remaining(9000)
     ('40 s', '3 min', '2.5 h')

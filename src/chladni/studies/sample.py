@@ -1,4 +1,4 @@
-"""One sample of a study: a pure function of the values its parameters have."""
+"""One sample of a study: a pure function of the values of its parameters."""
 
 import time
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ from .followed_modes import FollowedModes
 from .study_settings import StudySettings
 from .variation import Variation
 
-FAULTS = (  # what a value out of reach may end in, so that the other samples go on
+FAULTS = (  # errors of a sample with impossible values; the other samples continue
     *(ChladniError, ArithmeticError, ValueError, LookupError),
     *(np.linalg.LinAlgError, MemoryError, RuntimeError),
 )
@@ -28,12 +28,12 @@ FAULTS = (  # what a value out of reach may end in, so that the other samples go
 
 @dataclass(frozen=True, eq=False)
 class StudyModel:
-    """All that a sample needs beside its values; it is sent to every worker once.
+    """All that a sample needs in addition to its values; every worker receives it once.
 
     Attributes
     ----------
     model : Model            as the deck has it
-    case : Case or None      whose recording every sample is scored against
+    case : Case or None      every sample is scored against its recording
     varied : tuple of Variation
     settings : StudySettings
     modes : FollowedModes    of the nominal model
@@ -62,7 +62,7 @@ class StudyModel:
 
 @dataclass(frozen=True, eq=False)
 class SampleResult:
-    """What came of a sample: numbers by the names of their columns, or why there are none."""
+    """Result of a sample: numbers by the names of their columns, or the reason for failure."""
 
     number: int
     columns: dict[str, float] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class SampleResult:
 
 
 def computed(study: StudyModel, number: int, values: np.ndarray) -> SampleResult:
-    """The sample with these values (d,), on one BLAS thread; what goes wrong is its sentence."""
+    """The sample with these values (d,), on one BLAS thread; an error becomes its ``why``."""
     begun = time.perf_counter()
     try:
         with threadpool_limits(1), np.errstate(all="ignore"):
@@ -103,7 +103,7 @@ def _computed(study: StudyModel, values: np.ndarray) -> tuple[dict[str, float], 
 
 
 def solved(model: Model, count: int, reach: float) -> Modelled:
-    """The lowest modes of a model: those up to ``reach`` [Hz], or so many."""
+    """The lowest modes of a model: up to ``reach`` [Hz], or ``count`` modes where that is 0."""
     if reach:
         return model.solved(reach)
     modal: ModalModel = model.modes(count)
@@ -111,12 +111,12 @@ def solved(model: Model, count: int, reach: float) -> Modelled:
 
 
 def mass_column(model: Model) -> str:
-    """No unit is claimed for a bare deck without a unit system."""
+    """Name of the mass column; without a unit for a bare deck without a unit system."""
     return "mass_kg" if model.unit else "mass"
 
 
 def wished(settings: StudySettings, model: Model, made: Modelled) -> FRF:
-    """The responses that were asked for."""
+    """The responses that the settings request."""
     f = np.linspace(*settings.band, settings.lines)
     found = superposed(model, made, settings.outputs, settings.inputs, f, settings.damping)
     return found if found.quantity == "transmissibility" else found.to(settings.quantity)

@@ -1,11 +1,12 @@
-"""What each parameter does to each result, from the samples there are.
+"""Sensitivity of each result to each parameter, from the samples of a study.
 
-Logarithmic slopes d ln y / d ln p by least squares over all samples; standardised regression
-coefficients (Saltelli et al. 2008, Global Sensitivity Analysis, 1.2.5); first-order and total
-Sobol' indices (Saltelli et al. 2010) of a ``saltelli`` design; elementary effects (Morris 1991;
-Campolongo, Cariboni and Saltelli 2007) of a ``morris`` one. Estimates of Sobol' indices from any
-other design are noise at the sizes that are usual here (0.18 for 0 with 80 samples), so there are
-none: where R² is near one the squares of the standardised coefficients are what they would be.
+- Logarithmic slopes d ln y / d ln p by least squares over all samples.
+- Standardised regression coefficients (Saltelli et al. 2008, Global Sensitivity Analysis, 1.2.5).
+- First-order and total Sobol' indices (Saltelli et al. 2010) of a ``saltelli`` design.
+- Elementary effects (Morris 1991; Campolongo, Cariboni and Saltelli 2007) of a ``morris`` design.
+
+Other designs give no Sobol' indices: at usual sizes such estimates are noise (0.18 for 0 with 80
+samples). Where R² is near one, the squares of the standardised coefficients equal the indices.
 """
 
 import warnings
@@ -27,11 +28,11 @@ class Sensitivity:
     ----------
     result : name of its column
     log_slope : d ln y / d ln p of the best power law y = c Π p^s
-    r2 : share of the variance of ln y that law explains
+    r2 : share of the variance of ln y that this law explains
     standardised : regression coefficients times sd(p) / sd(y)
     first, total : Sobol' indices; ``first_interval``, ``total_interval``: half their 95 % interval
-    mu_star, sigma : mean of |elementary effects| and their spread, over the parameter's range
-    used : samples it rests on
+    mu_star, sigma : mean of |elementary effects| and their standard deviation, over the range
+    used : number of samples used
     """
 
     result: str
@@ -50,12 +51,12 @@ class Sensitivity:
 def sensitivity(
     result: str, y: np.ndarray, X: np.ndarray, U: np.ndarray, sampler: str, block: int
 ) -> Sensitivity:
-    """Every measure that the samples allow.
+    """All sensitivity measures that the samples allow.
 
     Parameters
     ----------
     y : (n,)       nan where a sample failed
-    X, U : (n, d)  values of the parameters, and their places in the unit cube
+    X, U : (n, d)  values of the parameters, and their positions in the unit cube
     """
     d = X.shape[1]
     none = np.full(d, np.nan)
@@ -75,7 +76,7 @@ _INDICES = ("first", "first_interval", "total", "total_interval", "mu_star", "si
 
 
 def _power_law(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
-    """Least squares of ln y on ln p; of y or p that are not positive there is none."""
+    """Least-squares fit of ln y on ln p: slopes (d,) and R²; nan where y or p is not positive."""
     d = X.shape[1]
     if not ((y > 0).all() and (X > 0).all()):
         return np.full(d, np.nan), np.nan
@@ -96,11 +97,11 @@ def _standardised(U: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _indices(
     y: np.ndarray, U: np.ndarray, good: np.ndarray, sampler: str, block: int
 ) -> dict[str, np.ndarray]:
-    """The indices a design was made for; a block with a failed sample is left out whole."""
+    """The indices a design was made for; blocks with a failed sample are left out."""
     whole = np.repeat(good.reshape(-1, block).all(axis=1), block) if block > 1 else good
     given, Y, rows = problem(U.shape[1]), y[whole], U[whole]
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # of SALib: its own use of old names, and too few samples
+        warnings.simplefilter("ignore")  # SALib's warnings: old names, too few samples
         if sampler == "saltelli" and len(Y) >= 2 * block:
             from SALib.analyze import sobol
 
@@ -118,5 +119,5 @@ def _indices(
 
 
 def worth_telling(columns: Sequence[str]) -> list[str]:
-    """Results by the names of their columns, without MAC and the frequencies of peaks."""
+    """Names of the results that are reported: all but MAC and the frequencies of peaks."""
     return [c for c in columns if not c.startswith(("mac", "peak"))]

@@ -1,4 +1,4 @@
-"""What a parameter study is asked: how many samples, how they are drawn, what is kept of each."""
+"""Settings of a parameter study: number of samples, sampler, and the results of each sample."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -8,12 +8,12 @@ from ..errors import LabelError
 
 Sampler = Literal["sobol", "lhs", "grid", "oat", "saltelli", "morris"]
 SAMPLERS: tuple[str, ...] = get_args(Sampler)
-MOST = 10_000_000  # samples; beyond it a slip of the keyboard
+MOST = 10_000_000  # samples; a larger number is taken as a typing error
 
 
 @dataclass(frozen=True)
 class StudySettings:
-    """A study's size, its sampler, and what is asked of every sample.
+    """Size of a study, its sampler, and the results of every sample.
 
     Attributes
     ----------
@@ -22,11 +22,11 @@ class StudySettings:
               (Sobol' indices), morris (elementary effects)
     seed : of the samplers that draw
     modes : elastic modes of the nominal model that are followed through the samples
-    outputs, inputs : labels between which responses are wanted; of a case with FRFs its own
+    outputs, inputs : labels of the responses; a case with FRFs has its own
     band : (low, high) [Hz] of these responses, on ``lines`` frequencies
     damping : ratio of every mode, where the case gives none
     quantity : receptance, mobility or accelerance
-    keep_frf : whole responses are kept beside their summary
+    keep_frf : keep whole responses in addition to their summary
     """
 
     samples: int = 100

@@ -1,13 +1,13 @@
-"""The folder of a study: what survives a kill at any instant, and how it goes on from there.
+"""The folder of a study, which survives a kill at any instant; the study can continue from it.
 
-``study_begun.json`` says what the study is, ``design.csv`` where its samples lie. ``samples.jsonl``
-gets one line per finished sample, whole and on the disk before the next is asked for; the line is
-what makes a sample finished, so that a whole response, if kept (``frf/000012.npz``), is written
-before it. A line torn by a kill is the last one and is cut off when the study goes on.
+``study_begun.json`` identifies the study, ``design.csv`` holds its points. ``samples.jsonl`` gets
+one line per finished sample, complete and on the disk before the next is requested. The line marks
+a sample as finished, so a whole response, if kept (``frf/000012.npz``), is written before it. A
+kill can damage only the last line, which is removed when the study continues.
 
-One growing text file, because only one process writes: it needs no database, no locks between
-machines and no shared memory (SQLite's write-ahead log does), so that it works on the network file
-systems of clusters, spares them a file per sample, and is read while it grows.
+Only one process writes, so one growing text file suffices. It needs no database, no locks between
+machines and no shared memory (as SQLite's write-ahead log does). It works on the network file
+systems of clusters without a file per sample, and can be read while it grows.
 """
 
 import csv
@@ -29,7 +29,7 @@ from .sample import SampleResult
 BEGUN, DESIGN, ROWS, FRFS, LOCK = (
     "study_begun.json", "design.csv", "samples.jsonl", "frf", ".study.lock",
 )  # fmt: skip
-OWN = ("sample", "status", "why", "seconds")  # columns beside parameters and results
+OWN = ("sample", "status", "why", "seconds")  # columns in addition to parameters and results
 _WORDS = {
     "model": "the deck, the case or the recording",
     "parameters": "what is varied, and how far",
@@ -45,7 +45,7 @@ class StudyStore:
     ----------
     folder : Path
     rows : {number: row}    of the finished samples, failed ones included
-    notes : what the user should know of the folder
+    notes : notes on the folder for the user
     """
 
     folder: Path
@@ -54,7 +54,7 @@ class StudyStore:
     notes: list[str] = field(default_factory=list)
 
     def keep(self, result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
-        """Write a finished sample; when this returns, no kill can take it."""
+        """Write a finished sample; it is safe from a kill when this returns."""
         if result.frf is not None:
             frf = result.frf
             write_npz(
@@ -71,7 +71,7 @@ class StudyStore:
         return row
 
     def frf_path(self, number: int) -> Path:
-        """Where the whole response of a sample is."""
+        """Path of the whole response of a sample."""
         return self.folder / FRFS / f"{number:06d}.npz"
 
 
@@ -86,11 +86,11 @@ def row_of(result: SampleResult, values: Mapping[str, float]) -> dict[str, Any]:
 def opened_store(
     folder: Path, identity: dict[str, Any], made: dict[str, Any], names: list[str], X: np.ndarray
 ) -> Iterator[StudyStore]:
-    """The store of this very study, new or begun earlier, locked against a second process.
+    """The store of this study, new or begun earlier, locked against a second process.
 
     Parameters
     ----------
-    identity : what makes two studies the same one, by the keys of the sentence that refuses
+    identity : identity of the study, by the words that an error message uses
     made : provenance for the record: files and their hashes, versions
     X : (n, d)   values of the parameters ``names``
 
@@ -119,7 +119,7 @@ def opened_store(
 
 
 def design_text(names: list[str], X: np.ndarray) -> str:
-    """The design as CSV, numbers as they are to the last digit."""
+    """The design as CSV, with all digits of every number."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["sample", *names])
@@ -143,7 +143,7 @@ def _refuse_another(begun: Path, identity: dict[str, Any]) -> None:
 
 
 def finished(path: Path, n: int) -> tuple[dict[int, dict[str, Any]], int]:
-    """({number: row} of the finished samples, bytes that hold them); a torn last line is left out.
+    """Rows of the finished samples by number, and their bytes; an incomplete last line is dropped.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A study as tables other programs read: CSV for pandas, NetCDF for xarray."""
+"""Tables of a study for other programs: CSV for pandas, NetCDF for xarray."""
 
 import csv
 import io
@@ -16,7 +16,7 @@ LARGEST = 1_500_000_000  # bytes of whole responses; beyond it they stay in file
 
 
 def write_csv(path: Path, found: ParameterStudy) -> Path:
-    """One line per sample; empty where there is nothing.
+    """Write one line per sample; missing values are empty.
 
     ``pandas.read_csv("samples.csv")`` reads it.
     """
@@ -29,9 +29,9 @@ def write_csv(path: Path, found: ParameterStudy) -> Path:
 
 
 def write_netcdf(path: Path, found: ParameterStudy) -> list[str]:
-    """Parameters, results and whole responses with their units, for ``xarray.open_dataset``.
+    """Write parameters, results and whole responses with units, for ``xarray.open_dataset``.
 
-    Dimensions are sample, mode, channel ("output from input") and line. Returns notes.
+    Dimensions are sample, mode, channel ("output from input") and line. Returns notes for the user.
     """
     from scipy.io import netcdf_file
 
@@ -66,7 +66,7 @@ def _variable(
 
 
 def _plain(text: str) -> str:
-    """Text as NetCDF 3 takes it: ASCII."""
+    """Text in ASCII, as NetCDF 3 requires."""
     return text.encode("ascii", "backslashreplace").decode()
 
 
@@ -94,7 +94,7 @@ def _channels(file: Any, found: ParameterStudy) -> None:
 
 
 def _texts(file: Any, name: str, texts: list[str]) -> None:
-    """Texts as rows of characters, which xarray joins."""
+    """Write texts as rows of characters, which xarray joins."""
     texts = [_plain(t) for t in texts]
     width = max(len(t) for t in texts)
     file.createDimension(f"{name}_letters", width)
@@ -104,7 +104,7 @@ def _texts(file: Any, name: str, texts: list[str]) -> None:
 
 
 def _responses(found: ParameterStudy) -> tuple[dict[int, Path], list[str]]:
-    """Files of the whole responses; none, and a note, where they are too large for one file."""
+    """Files of the whole responses; no file, and a note, where they are too large together."""
     if found.store is None or not found.settings.keep_frf:
         return {}, []
     folder = found.store / FRFS
@@ -128,7 +128,7 @@ def _whole(file: Any, found: ParameterStudy, files: dict[int, Path]) -> None:
     dims = ("sample", "line", "channel")
     real, imag = (file.createVariable(n, "d", dims) for n in ("frf_real", "frf_imag"))
     for made in (real, imag):
-        made.units = UNIT.get(quantity, "1").replace("²", "2")  # NetCDF 3 knows no such letters
+        made.units = UNIT.get(quantity, "1").replace("²", "2")  # NetCDF 3 is ASCII
         made.quantity = quantity
         made[:] = np.full((len(found.rows), len(f), shape[1] * shape[2]), np.nan)
     for k, path in files.items():
@@ -138,7 +138,7 @@ def _whole(file: Any, found: ParameterStudy, files: dict[int, Path]) -> None:
 
 
 def _attributes(file: Any, found: ParameterStudy) -> None:
-    """What the study was made of and with."""
+    """Write the provenance of the study as attributes."""
     made = found.provenance
     file.source, file.sampler, file.seed = _plain(made["source"]), made["sampler"], made["seed"]
     file.versions = " ".join(f"{k} {v}" for k, v in made["versions"].items())

@@ -1,4 +1,4 @@
-"""What a study varies: a number of the deck, between two values."""
+"""Variation of a number of the deck between two values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from .vary_text import VaryText
 
 _SAME = 1e-9
 _REACH = {"E": 1e7, "K": 1e9, "M": 1e6}  # in the logarithm: joints are unknown by decades
-FARTHEST = 20.0  # times the deck's own value, or a part of it
+FARTHEST = 20.0  # largest factor from the deck's own value, up or down
 _SDS = 2.0  # prior standard deviations to either side, where a case gives no bounds
 
 
@@ -30,9 +30,9 @@ class Variation:
 
     Attributes
     ----------
-    name : as it is called in tables, "t of inner"
-    free : FreeParameter    which number, of which parts
-    nominal : the deck's own value; 1 where its members have different ones
+    name : name in tables, "t of inner"
+    free : FreeParameter    the number and its parts
+    nominal : the deck's own value; 1 where the members' values differ
     low, high : in ``unit``, as ``nominal``
     unit : SI; "deck units" of a bare deck, "of the deck's" where members differ
     log : sampled uniformly in the logarithm
@@ -60,9 +60,9 @@ class Variation:
 def of_case(
     frees: Sequence[FreeParameter], assembly: Assembly
 ) -> tuple[list[Variation], list[str]]:
-    """The [[parameter]] of a case between their bounds, and what of them cannot be varied.
+    """The [[parameter]] of a case between their bounds, and notes on those that cannot be varied.
 
-    Where a bound is missing, two standard deviations of the prior stand in for it.
+    A missing bound is two standard deviations of the prior from the mean.
     """
     out, notes = [], []
     for free in frees:
@@ -84,15 +84,15 @@ def of_case(
 def of_parts(
     asked: VaryText, assembly: Assembly, deck: Deck | None, units: Units | None
 ) -> Variation:
-    """A number of parts over a range.
+    """The variation of a number of parts over a range.
 
-    Plain numbers are in the deck's own units, as they stand in its cards; per cent are of the
-    deck's own value.
+    Plain numbers are in the deck's own units, as in its cards; per cent are of the deck's own
+    value.
 
     Raises
     ------
     FileError, LabelError
-        One sentence that names the text, what is wrong with it, and what there is.
+        One sentence that names the text, its error and the alternatives.
     """
     free = free_parameter(_section(asked, assembly), assembly, deck)
     if asked.grid is not None or free.field not in FIELDS:
@@ -107,7 +107,7 @@ def of_parts(
 
 
 class _Wish(TomlSection):
-    """Words of the command line read as those of a [[parameter]]."""
+    """A parameter of the command line, read like a [[parameter]]."""
 
     def at(self, key: str) -> str:
         return f"{self.name} ({key})"
@@ -122,7 +122,7 @@ def _section(asked: VaryText, assembly: Assembly) -> TomlSection:
 
 
 def _called(free: FreeParameter) -> str:
-    """'t of inner, outer'; the field alone where all that have it share it."""
+    """Name such as 't of inner, outer'; the field alone where it is varied for all parts."""
     return f"{free.field} of {', '.join(free.parts)}" if free.parts else free.field
 
 
@@ -139,14 +139,14 @@ def _unit(assembly: Assembly, free: FreeParameter) -> str:
 
 
 def _turns(assembly: Assembly, free: FreeParameter) -> bool:
-    """Whether the springs are springs against rotation."""
+    """True where the springs or bushes act against rotation."""
     springs = assembly.springs.component[list(free.springs)]
     turned = assembly.bushes.stiffness[list(free.bushes), 3:]
     return bool((springs > 3).any() or turned.any())
 
 
 def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Units | None) -> float:
-    """What a plain number is multiplied by; refused where there is no one value to stand for."""
+    """Factor on a plain number; FileError where the members have no common value."""
     _, unit = _nominal(assembly, free, True)
     if not asked.plain or (units is None and unit != "of the deck's"):
         return 1.0
@@ -167,7 +167,7 @@ def _scale(asked: VaryText, assembly: Assembly, free: FreeParameter, units: Unit
 
 
 def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]:
-    """(low, high) in the unit of the nominal value; refused where it is far from that."""
+    """Ends (low, high) in the unit of the nominal value; FileError where they are far from it."""
     low, high = asked.ends(scale, nominal)
     reach = _REACH.get(asked.name, FARTHEST) if asked.log else FARTHEST
     for value in (low, high):
@@ -182,7 +182,7 @@ def _range(asked: VaryText, nominal: float, scale: float) -> tuple[float, float]
 
 
 def refuse_impossible(chosen: Sequence[Variation], assembly: Assembly) -> None:
-    """Refuse two ranges for one number, and Poisson's ratios of 1/2 and more."""
+    """Refuse two ranges for one number, and Poisson's ratios of 1/2 or more, by FileError."""
     for k, a in enumerate(chosen):
         if a.free.field == "nu":
             most = float(values_of(assembly, a.free).max()) * a.high / a.nominal

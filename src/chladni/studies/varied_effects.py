@@ -21,12 +21,12 @@ from ..units import Units
 from .variation import Variation
 from .vary_text import VaryText
 
-_TOP = 100.0  # [Hz] of priors, which no sample asks for
+_TOP = 100.0  # [Hz] highest frequency for priors, which samples do not use
 
 
 @dataclass(frozen=True, eq=False)
 class VariedEffect(Variation):
-    """The one number of an effect; without it, at 0, is the deck as it is."""
+    """Variation of the single number of an effect; at 0 the deck is unchanged."""
 
     effect: Effect = field(default_factory=Effect)
 
@@ -42,14 +42,14 @@ class VariedEffect(Variation):
 def of_effect(
     asked: VaryText, assembly: Assembly, case: Case | None, units: Units | None
 ) -> VariedEffect:
-    """An effect over a range, at a grid or, of a case, where its test says.
+    """The variation of an effect over a range, at a grid or at the place in the test of a case.
 
-    Numbers are in the deck's own units, as they would stand in its cards.
+    Numbers are in the deck's own units, as in its cards.
 
     Raises
     ------
     FileError
-        One sentence that names the text, what is wrong with it, and what there is.
+        One sentence that names the text, its error and the alternatives.
     """
     kind, grid = family(asked.name), asked.grid
     if asked.parts is not None:
@@ -66,7 +66,7 @@ def of_effect(
 
 
 def _at(asked: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
-    """The effect at a grid, across the sheet or beam where it pushes."""
+    """The effect at a grid; one with a direction acts across the sheet or beam."""
     where = _surroundings(assembly, None)
     if not issubclass(kind.effect, MovableAttachment) or kind.effect.own_dofs:
         raise _refused(asked, kind)
@@ -76,7 +76,7 @@ def _at(asked: VaryText, kind: Family, grid: int, assembly: Assembly) -> Effect:
 
 
 def _placed(asked: VaryText, kind: Family, assembly: Assembly, case: Case | None) -> Effect:
-    """The effect where the test of a case says that it acts."""
+    """The effect at the place given by the test of a case."""
     if kind.placed is None or kind.on_sheets:
         if issubclass(kind.effect, MovableAttachment) and not kind.effect.own_dofs:
             raise asked.refused(f"where? write {kind.name} at GRID=..., with a grid of the deck")
@@ -108,7 +108,7 @@ def _surroundings(assembly: Assembly, case: Case | None) -> Surroundings:
 
 
 def _scale(unit: str, units: Units | None) -> tuple[float, str]:
-    """What a number of the deck's units is multiplied by, and its unit then."""
+    """Factor on a number in the deck's units, and its unit after that."""
     if units is None:
         return 1.0, "deck units"
     return {"kg": units.inertia, "N/m": units.force / units.length}[unit], unit

@@ -1,4 +1,4 @@
-"""What ``--vary`` says, taken apart: a number of parts or an effect at a grid, and its range."""
+"""Parser of ``--vary``: a number of parts or an effect at a grid, and its range."""
 
 import re
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class VaryText:
     text : as it was given
     name : field of parts, or an effect of the catalogue
     parts : names with commas; None: of all that have the field
-    grid : where the effect sits; None: where a case says
+    grid : place of the effect; None: the place given by a case
     low, high : ends of the range as they were given
     log : uniform in the logarithm
     """
@@ -39,30 +39,30 @@ class VaryText:
 
     @property
     def is_effect(self) -> bool:
-        """Whether it varies an effect, not a number of parts."""
+        """True where it varies an effect, not a number of parts."""
         return self.name in names()
 
     @property
     def plain(self) -> bool:
-        """Whether an end is a number in the deck's own units, not a share of the deck's value."""
+        """True where an end is a number in the deck's own units, not a share of its value."""
         return not self.low.endswith("%") or not self.high.endswith("%")
 
     def refused(self, why: str) -> FileError:
-        """The sentence that names this text."""
+        """The error that names this text."""
         return FileError(f"--vary {self.text!r}: {why}")
 
     def ends(self, scale: float, nominal: float | None) -> tuple[float, float]:
-        """(low, high) in the unit of the nominal value.
+        """Ends (low, high) in the unit of the nominal value.
 
         Parameters
         ----------
-        scale : what a plain number is multiplied by
-        nominal : the deck's own value; None where it has nothing of it, and 0 may be an end
+        scale : factor on a plain number
+        nominal : the deck's own value; None where it has none, and 0 may be an end
 
         Raises
         ------
         FileError
-            If they are no numbers, a share of nothing, or no range.
+            If an end is not a number, a share has no value to refer to, or the range is empty.
         """
         if nominal is None and "%" in self.low + self.high:
             raise self.refused("the deck has nothing there of which to take a share")
@@ -89,7 +89,7 @@ def _no_range(text: str) -> FileError:
 
 
 def vary_text(text: str) -> VaryText:
-    """The text of ``--vary`` taken apart.
+    """Parse the text of ``--vary``.
 
     >>> vary_text("K of PBUSH 7 = 10:1e4:log").parts
     'PBUSH 7'
@@ -97,7 +97,7 @@ def vary_text(text: str) -> VaryText:
     Raises
     ------
     FileError
-        If it is of no form that is known.
+        If the text has no known form.
     """
     found = _FORM.fullmatch(text)
     if not found:

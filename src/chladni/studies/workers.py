@@ -1,4 +1,4 @@
-"""Samples on this process, on local processes, or on the workers of any Dask cluster."""
+"""Samples computed in this process, in local processes, or on any Dask cluster."""
 
 import logging
 import time
@@ -16,21 +16,21 @@ from .worker_memory import keep_freed_memory
 PATIENCE = 15  # seconds a scheduler may take to answer
 STARTS = 3  # tries to start local workers
 MOST = 4  # local processes a core
-WORTH = 10.0  # seconds of one process above which it pays to start others
+WORTH = 10.0  # seconds in one process above which others are started
 NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
-ALONE = 3.0  # seconds without a sample after which it is looked whether there is a worker
+ALONE = 3.0  # seconds without a sample after which the cluster is checked for workers
 _AHEAD = 2  # samples per thread that are on the cluster at a time
-_GLANCE = 0.005  # seconds between two looks whether a sample is finished
+_GLANCE = 0.005  # seconds between two checks for a finished sample
 _COUNTED = 5.0  # seconds after which the threads of a cluster, which may grow, are counted again
 
 
 def refuse_many(workers: int) -> None:
-    """Refuse numbers of local processes that are a slip.
+    """Refuse impossible numbers of local processes.
 
     Raises
     ------
     FileError
-        If there is none to do it, or there are more than ``MOST`` a core.
+        If the number is below one, or above ``MOST`` a core.
     """
     if workers < 1:
         raise FileError(f"workers = {workers}; at least one has to do it")
@@ -41,7 +41,7 @@ def refuse_many(workers: int) -> None:
 
 
 def affordable(samples: int, seconds: float) -> int:
-    """Local processes for so many samples of so many seconds each."""
+    """Number of local processes worth starting for these samples of ``seconds`` each."""
     if samples * seconds < WORTH:
         return 1
     return max(1, min(cores(), samples))
@@ -51,13 +51,13 @@ def results(
     study: StudyModel, X: np.ndarray, todo: Sequence[int], workers: int, scheduler: Any = None,
     told: Callable[[str], None] = lambda text: None,
 ) -> Iterator[SampleResult]:  # fmt: skip
-    """Samples ``todo`` of X in whatever order they are finished.
+    """Samples ``todo`` of X in the order in which they finish.
 
     Parameters
     ----------
     workers : local processes; with one, and no scheduler, samples are computed in this process
-    scheduler : a ``distributed.Client``, in the place of local processes
-    told : hears of what it waits for
+    scheduler : a ``distributed.Client`` instead of local processes
+    told : called with the reason of a wait
     """
     if not todo:
         return
@@ -95,7 +95,7 @@ def client_of(scheduler: Any) -> Iterator[Any]:
 
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
-    """A client of processes started for this study and ended with it."""
+    """A client of local processes that start and end with this study."""
     from distributed import Client
 
     quiet = _quiet("distributed", "distributed.client")
@@ -104,7 +104,7 @@ def _local(workers: int) -> Iterator[Any]:
 
 
 def _local_cluster(workers: int) -> Any:
-    """Processes of this machine; what ends one of them in its start is no reason to give up."""
+    """Processes of this machine; starting is tried again where a process dies on start."""
     from distributed import LocalCluster
 
     for again in reversed(range(STARTS)):
@@ -125,7 +125,7 @@ def _local_cluster(workers: int) -> Any:
 
 @contextmanager
 def _quiet(*names: str) -> Iterator[None]:
-    """Without what Dask logs: a worker that dies, a scheduler that is lost have their sentences."""
+    """Suppress Dask's log: dead workers and lost schedulers have messages of their own."""
     loggers = [logging.getLogger(name) for name in names]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -143,9 +143,9 @@ def _connected(address: str) -> Any:
     from distributed.comm.registry import get_backend
 
     try:
-        get_backend(parse_address(address)[0])  # no loop is begun for what is no address
+        get_backend(parse_address(address)[0])  # check the address before a loop is started
         return Client(address, timeout=PATIENCE)
-    # an assertion where the loop of an earlier client is just ending
+    # AssertionError arises where the loop of an earlier client is just ending
     except (OSError, ValueError, TypeError, RuntimeError, AssertionError) as error:
         why = " ".join(str(error).split()) or type(error).__name__
         raise FileError(
@@ -158,9 +158,9 @@ def _distributed(
     client: Any, study: StudyModel, X: np.ndarray, todo: Sequence[int],
     told: Callable[[str], None],
 ) -> Iterator[SampleResult]:  # fmt: skip
-    """Few samples at a time, so that a cluster that shrinks or a kill costs no more than these.
+    """Compute few samples at a time, so that a lost worker or a kill costs only these.
 
-    The model is a task of its own: the scheduler makes it again where the worker that held it dies.
+    The model is a task of its own: the scheduler repeats it where the worker that held it dies.
     """
     from distributed import as_completed
 
@@ -183,7 +183,7 @@ def _distributed(
 
 
 def _wait(ready: Any, client: Any, told: Callable[[str], None]) -> None:
-    """Until a sample is finished; once it is said that a cluster has nobody to do it."""
+    """Wait until a sample is finished; report once if the cluster has no workers."""
     looked, said = time.monotonic(), False
     while not ready.has_ready():
         time.sleep(_GLANCE)
@@ -194,12 +194,12 @@ def _wait(ready: Any, client: Any, told: Callable[[str], None]) -> None:
 
 
 def _threads(client: Any) -> int:
-    """Threads of the cluster now, one while none has come yet."""
+    """Present number of threads of the cluster, at least one."""
     return max(1, sum(_workers_of(client).values()))
 
 
 def _workers_of(client: Any) -> dict[str, int]:
-    """{address: threads} of the cluster now."""
+    """Present threads of the cluster by address of the worker."""
     try:
         return dict(client.nthreads())
     except OSError as error:
@@ -211,13 +211,13 @@ def _itself(study: StudyModel) -> StudyModel:
 
 
 def _on_worker(study: StudyModel, number: int, values: np.ndarray) -> SampleResult:
-    """A sample in a process that does nothing else."""
+    """Compute a sample in a process that does nothing else."""
     keep_freed_memory()
     return computed(study, number, values)
 
 
 def _result(future: Any, k: int) -> SampleResult:
-    """What a worker found; a sample that ends its workers has failed, all else ends the study."""
+    """Result of a worker; a sample that kills its workers fails, other errors end the study."""
     from distributed import KilledWorker
     from distributed.client import FutureCancelledError
 
