@@ -1,4 +1,4 @@
-"""What is drawn upon a picture of a structure: places, arrows, a scale bar, the axes."""
+"""Annotations on a picture of a structure: places, arrows, a scale bar, the axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Marker:
 
 
 def circle(ax: Axes, camera: Camera, point: np.ndarray, radius: float) -> None:
-    """The outline of a sphere is a circle in parallel projection."""
+    """Draw the outline of a sphere, which is a circle in parallel projection."""
     from matplotlib.patches import Circle
 
     u, v = camera.project(np.asarray(point)[None])[0]
@@ -34,7 +34,7 @@ def circle(ax: Axes, camera: Camera, point: np.ndarray, radius: float) -> None:
 def arrows(
     ax: Axes, camera: Camera, markers: Sequence[Marker], colour: str, reach: float, name: str
 ) -> None:
-    """Places as dots with their directions and labels; ``reach`` is an arrow's length [m]."""
+    """Draw places as dots with directions and labels; ``reach`` is an arrow's length [m]."""
     if not markers:
         return
     uv = camera.project(np.array([m.point for m in markers]))
@@ -42,14 +42,14 @@ def arrows(
     ax.plot(*uv.T, "o", ms=5, mfc=colour, mec="white", mew=0.7, zorder=6, label=name, clip_on=False)
     for place, arrow, marker in zip(uv, tip, markers, strict=True):
         style = {"arrowstyle": "-|>", "color": colour, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
-        ends = (tuple(place + arrow), tuple(place))  # a place on the rim has its arrow, too
+        ends = (tuple(place + arrow), tuple(place))  # keeps the arrow of a place at the rim
         if any(marker.direction):
             ax.annotate("", *ends, arrowprops=style, zorder=6, annotation_clip=False)
         paper.halo_text(ax, place + 1.12 * arrow, marker.label, colour)
 
 
 def scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
-    """A round length of about a fifth of the window, below the picture."""
+    """Draw a round length of about a fifth of the window, below the picture."""
     u0, u1, v0, v1 = camera.window
     length = round_length((u1 - u0) / 5)
     v = v0 - 0.05 * (v1 - v0)
@@ -63,7 +63,7 @@ def scale_bar(ax: Axes, camera: Camera, unit: str) -> None:
 
 
 def triad(ax: Axes, camera: Camera, small: bool = False) -> None:
-    """The basic axes as three short lines below the lower right corner."""
+    """Draw the basic axes as three short lines below the lower right corner."""
     u0, u1, v0, v1 = camera.window
     reach = (0.05 if small else 0.06) * min(u1 - u0, v1 - v0)
     origin = np.array([u1 - 1.8 * reach, v0 - 0.2 * reach])

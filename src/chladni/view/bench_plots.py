@@ -18,7 +18,7 @@ def sine_schedule(
     transient: np.ndarray,
     drive: str = "force [N]",
 ) -> Path:
-    """Cycles waited and measured, drive held and transient left, line by line (n,)."""
+    """Plot cycles of delay and measurement, drive and remaining transient by line (n,)."""
     figure = Figure(figsize=(8.2, 6.0), layout="constrained")
     top, middle, low = figure.subplots(3, 1, sharex=True)
     top.step(frequency, delay, where="post", color=TEST, lw=1.3, label="waited")
@@ -40,7 +40,7 @@ def sine_schedule(
 def time_histories(
     path: Path | str, t: np.ndarray, signals: Mapping[str, np.ndarray], title: str = ""
 ) -> Path:
-    """Signals (n,) by what they are, one below the other, over time (n,) [s]."""
+    """Plot signals (n,) by name, one below the other, over time (n,) [s]."""
     figure = Figure(figsize=(8.2, 1.6 + 1.3 * len(signals)), layout="constrained")
     axes = np.ravel(figure.subplots(len(signals), 1, sharex=True))
     for ax, (name, x) in zip(axes, signals.items(), strict=True):
@@ -61,7 +61,7 @@ def frf_over_coherence(
     title: str = "",
     unit: str = "",
 ) -> Path:
-    """|H| as measured and as an ideal front end would have it, over the coherence (n,)."""
+    """Plot |H| as measured and with an ideal front end, above the coherence (n,)."""
     figure = Figure(figsize=(8.2, 4.6), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.1))
     upper.plot(frequency, np.abs(measured), color=TEST, lw=1.6, alpha=0.8, label="recorded")

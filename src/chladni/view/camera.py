@@ -22,15 +22,15 @@ class Camera:
     window: tuple[float, float, float, float]
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) places in the picture plane [m]."""
+        """Positions in the picture plane (n, 2) [m]."""
         return np.asarray(points) @ np.stack([self.right, self.up], axis=1)
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """(n,) distance towards the eye [m]."""
+        """Distance towards the eye (n,) [m]."""
         return np.asarray(points) @ self.toward
 
     def framing(self, points: np.ndarray, margin: float = 0.04) -> Self:
-        """The same view on a window that holds these points."""
+        """Return the view with a window that holds these points."""
         uv = self.project(points)
         low, high = uv.min(axis=0), uv.max(axis=0)
         pad = margin * max(float(np.max(high - low)), 1e-9)
@@ -39,17 +39,17 @@ class Camera:
 
     @property
     def aspect(self) -> float:
-        """Width over height."""
+        """Width of the window over its height."""
         u0, u1, v0, v1 = self.window
         return (u1 - u0) / (v1 - v0)
 
 
 def best_view(seen: Surface, focus: np.ndarray | None = None, tilt: float = 24.0) -> Camera:
-    """The direction of largest projected area ½ Σ |a · d|, tilted a little so that depth shows.
+    """The camera along the largest projected area ½ Σ |a · d|, tilted a little to show depth.
 
-    Areas are counted over 400 directions spread by the golden angle (Vogel 1979); a structure
-    without faces is seen along the direction in which its points spread least. Where ``focus``
-    (k, 3) points are better seen from behind, the eye goes there.
+    It is searched over 400 directions spread by the golden angle (Vogel 1979). A structure without
+    faces is seen along the direction in which its points spread least. The view is from behind
+    where ``focus`` points (k, 3) are better seen from there.
     """
     front, back = both_views(seen, tilt)
     if focus is None or not len(focus) or not len(seen.faces):
@@ -59,13 +59,13 @@ def best_view(seen: Surface, focus: np.ndarray | None = None, tilt: float = 24.0
 
 
 def both_views(seen: Surface, tilt: float = 24.0) -> tuple[Camera, Camera]:
-    """The best view and the same from behind."""
+    """The best view, and the same view from behind."""
     d = _broadest(seen)
     return _looking(d, seen, tilt), _looking(-d, seen, tilt)
 
 
 def needed_views(seen: Surface) -> tuple[Camera, ...]:
-    """The best view; the one from behind too where a quarter of the faces is hidden."""
+    """The best view, and the view from behind where a quarter of the faces is hidden."""
     front, back = both_views(seen)
     if not len(seen.faces):
         return (front,)
@@ -86,7 +86,7 @@ def _looking(d: np.ndarray, seen: Surface, tilt: float) -> Camera:
 
 
 def visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 120) -> np.ndarray:
-    """Points (k,) bool that nothing lies clearly in front of, on a coarse depth map."""
+    """Mask of points (k,) bool that no face clearly covers, from a coarse depth map."""
     sheet = _samples(seen, (camera.window[1] - camera.window[0]) / cells)
     u0, u1, v0, v1 = camera.window
 
@@ -102,7 +102,7 @@ def visible(camera: Camera, seen: Surface, focus: np.ndarray, cells: int = 120) 
 
 
 def _samples(seen: Surface, step: float) -> np.ndarray:
-    """Points on the faces about a step apart (n, 3): k by k on each, k from the usual face."""
+    """Points on the faces about a step apart (n, 3): k by k on each, k from the typical face."""
     corners = seen.points[seen.faces]
     side = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     k = int(np.clip(np.ceil(np.quantile(side, 0.9) / step), 1, 12)) if len(side) else 1
@@ -131,7 +131,7 @@ def _broadest(seen: Surface) -> np.ndarray:
 
 
 def _outward(d: np.ndarray) -> np.ndarray:
-    """Of d and -d the one that looks from above, else from -Y, else from +X."""
+    """The one of d and -d that looks from above, else from -Y, else from +X."""
     for value in (d[2], -d[1], d[0]):
         if abs(value) > 0.2:
             return d if value > 0 else -d
@@ -139,7 +139,7 @@ def _outward(d: np.ndarray) -> np.ndarray:
 
 
 def _upright(d: np.ndarray, seen: Surface) -> np.ndarray:
-    """z is up unless one looks along it; then the shorter side is, so that pictures are wide."""
+    """The upward direction: z, or the shorter side in a view along z, so that pictures are wide."""
     up = np.array([0.0, 0.0, 1.0])
     if abs(d[2]) > 0.8:
         span = np.ptp(seen.points[seen.used], axis=0)

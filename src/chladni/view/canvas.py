@@ -1,7 +1,7 @@
-"""A shaded picture of a surface inside matplotlib axes: by VTK where it works, else by painting.
+"""A shaded picture of a surface in matplotlib axes, by VTK where it works, else by painting.
 
-Both draw the same parallel projection, so everything else (scale bar, labels, arrows, markers) is
-laid over the axes in metres of the picture plane and is the same with either.
+Both draw the same parallel projection.  Scale bar, labels, arrows and markers are drawn over it in
+metres of the picture plane, so they are the same with either.
 """
 
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ from .surface import Surface
 GREY = (0.80, 0.82, 0.85)
 _AMBIENT, _DIFFUSE = 0.52, 0.54
 _TILES = 12_000  # polygons the painter may cut faces into
-_KEY = 0.6  # share of the lamp over the shoulder, the rest comes from the eye
+_KEY = 0.6  # share of the light over the shoulder; the rest comes from the eye
 
 
 @dataclass(frozen=True, eq=False)
 class Paint:
-    """How a surface is coloured.
+    """Colours of a surface.
 
     Attributes
     ----------
-    values : (n,) per point, (m,) per face or None   what the colours mean
+    values : (n,) per point, (m,) per face or None   quantity shown by the colours
     limits : (low, high)                             values at the ends of the colour map
     cmap : str
-    edges : bool                                     whether element edges are drawn
+    edges : bool                                     True to draw element edges
     ghost : (k, 2, 3) or None                        segments of an undeformed outline [m]
     """
 
@@ -43,7 +43,7 @@ class Paint:
 
 
 def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
-    """Put the picture into the axes, whose data units become metres of the picture plane."""
+    """Draw the picture in the axes, whose data units become metres of the picture plane."""
     u0, u1, v0, v1 = camera.window
     ax.set(xlim=(u0, u1), ylim=(v0, v1), aspect="equal")
     ax.set_axis_off()
@@ -56,7 +56,7 @@ def draw(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
 
 
 def _photo(seen: Surface, camera: Camera, paint: Paint, width: int) -> np.ndarray:
-    """(height, width, 4) image by VTK."""
+    """Image (height, width, 4) by VTK."""
     import pyvista as pv
 
     width = max(64, min(width, 3200))
@@ -128,7 +128,7 @@ def _look(seen: Surface, paint: Paint, width: int) -> dict[str, Any]:
 
 
 def _line_look(seen: Surface, paint: Paint) -> dict[str, Any]:
-    """Lines take the colours of point values, else they are dark."""
+    """Options for lines: coloured by point values if there are any, else dark."""
     if paint.values is None or len(paint.values) != len(seen.points):
         return {"color": "#333333", "line_width": 4}
     values = np.asarray(paint.values, dtype=float)[seen.lines].ravel()
@@ -151,7 +151,7 @@ def _lamp(camera: Camera) -> np.ndarray:
 
 
 def _painted(ax: Axes, seen: Surface, camera: Camera, paint: Paint) -> None:
-    """Painter's algorithm: the farthest face first, Lambert shading, no library needed."""
+    """Paint by the painter's algorithm: farthest face first, Lambert shading, no library."""
     if len(seen.faces):
         polygons, colours, lines = _tiles(seen, camera, paint)
         style: dict[str, Any] = {"facecolors": colours, "edgecolors": lines, "linewidths": 0.35}
@@ -166,8 +166,8 @@ def _tiles(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Polygons (p, 4, 2), face colours and edge colours (p, 4), in the order of painting.
 
-    Values at points vary within a face: few large faces are cut into k by k tiles, the face's own
-    outline is painted over them.
+    Values at points vary within a face.  So few large faces are cut into k by k tiles, and the
+    outline of the face is painted over them.
     """
     corners, k = seen.points[seen.faces], _cuts(seen, paint)
     order = np.argsort(camera.depth(corners.mean(axis=1)))
@@ -185,14 +185,14 @@ def _tiles(
 
 
 def _shade(seen: Surface, camera: Camera) -> np.ndarray:
-    """Brightness of each face (m,), from both sides alike."""
+    """Brightness of each face (m,), equal from both sides."""
     n = seen.normals()
     lit = _KEY * np.abs(n @ _lamp(camera)) + (1 - _KEY) * np.abs(n @ camera.toward)
     return _AMBIENT + _DIFFUSE * lit
 
 
 def _cuts(seen: Surface, paint: Paint) -> int:
-    """Tiles along a side of a face: only values at points vary within it."""
+    """Number of tiles along a side of a face; one unless values are at points."""
     if paint.values is None or len(paint.values) != len(seen.points):
         return 1
     return int(np.clip(np.sqrt(_TILES / len(seen.faces)), 1, 5))
@@ -227,7 +227,7 @@ def _line_colours(seen: Surface, paint: Paint) -> Any:
 
 
 def _colours(seen: Surface, paint: Paint, k: int = 1) -> np.ndarray:
-    """(m, k², 3) colour of each tile of each face."""
+    """Colour of each tile of each face (m, k², 3)."""
     if paint.values is None:
         return np.tile(GREY, (len(seen.faces), 1, 1))
     values = np.asarray(paint.values, dtype=float)

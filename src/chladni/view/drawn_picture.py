@@ -1,4 +1,4 @@
-"""A picture in hand: a notebook shows it, a script writes it."""
+"""A picture in memory, which a notebook shows and a script saves."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ class DrawnPicture:
     png: bytes
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows (IPython's rich display protocol)."""
+        """The PNG for a notebook (IPython's rich display protocol)."""
         return self.png
 
     def save(self, path: Path | str) -> Path:

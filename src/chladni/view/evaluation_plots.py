@@ -19,7 +19,7 @@ def lines_over_frequency(
     what: str,
     limits: tuple[float, float] | None = None,
 ) -> Path:
-    """Real functions of frequency (n,) [Hz] by channel, in one picture."""
+    """Plot real functions of frequency (n,) [Hz] by channel, in one picture."""
     figure = Figure(figsize=(8.2, 3.2), layout="constrained")
     ax = figure.subplots()
     for k, (name, values) in enumerate(lines.items()):
@@ -35,7 +35,7 @@ def lines_over_frequency(
 def amplitude_dependence(
     path: Path | str, modes: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 ) -> Path:
-    """Frequency over that at the faintest level, and damping, against amplitude.
+    """Plot frequency relative to the lowest level, and damping, against amplitude.
 
     Parameters
     ----------

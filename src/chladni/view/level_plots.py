@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .paper import AFTER, BEFORE, LEGEND, TEST, TITLE, save
 
-Points = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, sd, foretold (nan: not held out)
+Points = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, sd, predicted (nan: not held out)
 
 
 def mode_over_levels(
@@ -24,12 +24,12 @@ def mode_over_levels(
     element: str = "",
     mean: tuple[float, float] | None = None,
 ) -> Path:
-    """Two panels over the amplitude.
+    """Plot frequency and damping in two panels over the amplitude.
 
     Parameters
     ----------
     amplitude : (k,) [m]
-    frequency, damping : measured, standard deviation, foretold, each (k,): [Hz]; of critical
+    frequency, damping : measured, standard deviation, predicted, each (k,): [Hz]; of critical
     curve : (n, 3) amplitude [m], frequency [Hz], damping of ``element``
     mean : frequency and damping of one linear model, where levels were held out
     """
@@ -58,7 +58,7 @@ def _panel(
     element: str,
     mean: float | None,
 ) -> None:
-    """Measured with two standard deviations, the fitted curve, and what was foretold."""
+    """Plot measured values with two standard deviations, the fitted curve and predictions."""
     value, sd, foretold = points
     ax.errorbar(
         amplitude, value, 2 * sd, fmt="o", ms=5, color=TEST, capsize=3, lw=1, label="measured"

@@ -1,4 +1,4 @@
-"""Pictures of an identification: orders and how steady they are, indicators, circles."""
+"""Pictures of an identification: stabilisation diagram, mode indicators, Nyquist circles."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from .paper import AFTER, BEFORE, LEGEND, TEST, save
 
-_CLASSES = {  # letter of a pole: (mark, colour, size, what it says)
+_CLASSES = {  # letter of a pole: (mark, colour, size, meaning)
     "o": (".", "#c9c9c9", 2, "new"),
     "f": ("x", "#9aa3ad", 3, "steady frequency"),
     "d": ("^", "#e69f00", 3.5, "and damping"),
@@ -27,7 +27,7 @@ def stabilisation_classes(
     indicator: tuple[np.ndarray, np.ndarray],
     unit: str = "",
 ) -> Path:
-    """Poles over model order by class, kept ones as lines, struck ones as dotted lines.
+    """Plot poles over model order by class, kept ones as lines, struck ones as dotted lines.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def mode_indicators(
     path: Path | str, frequency: np.ndarray, cmif: np.ndarray, mif: np.ndarray, kept: np.ndarray,
     unit: str = "",
 ) -> Path:  # fmt: skip
-    """Singular values of H (n_f, n_in) above, the share that moves in quadrature below (n_f,)."""
+    """Plot singular values of H (n_f, n_in) above, the share in quadrature below (n_f,)."""
     figure = Figure(figsize=(8.2, 4.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for k in range(cmif.shape[1]):
@@ -81,7 +81,7 @@ def nyquist_grid(
     columns: int = 5,
     wide: float = 1.75,
 ) -> Path:
-    """A small Nyquist picture of every mode: measured lines as dots, the identified model drawn.
+    """Plot a small Nyquist picture of every mode: measured lines as dots, the model as a curve.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a picture of paired modes shows."""
+"""Data of a picture of paired modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""How figures look and are saved: colours that survive grey print, no global state, no display."""
+"""Style and saving of figures: colours that survive grey print, no global state, no display."""
 
 import io
 from pathlib import Path
@@ -23,7 +23,7 @@ LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9}
 
 
 def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
-    """Write a PNG (or SVG, PDF by the suffix), by way of a temporary name."""
+    """Write a PNG (or SVG, PDF by the suffix) under a temporary name, then rename it."""
     FigureCanvasAgg(figure)
     _no_formulas(figure)
     with matplotlib.rc_context({"svg.fonttype": "path"}):
@@ -32,7 +32,7 @@ def save(figure: Figure, path: Path | str, dpi: int = 180) -> Path:
 
 
 def _no_formulas(figure: Figure) -> None:
-    """A name with two dollars in it is no formula; those of the axes' own numbers are."""
+    """Show dollar signs in names as text; numbers of axes may still be formulas."""
     for text in figure.findobj(Text):
         said = text.get_text()
         if "$" in said and r"\$" not in said and r"\mathdefault" not in said:
@@ -40,7 +40,7 @@ def _no_formulas(figure: Figure) -> None:
 
 
 def pixels(figure: Figure, dpi: int = 100) -> np.ndarray:
-    """(height, width, 3) bytes of a figure."""
+    """Pixels of a figure (height, width, 3), as bytes."""
     _no_formulas(figure)
     figure.set_facecolor("white")
     figure.set_dpi(dpi)
@@ -73,7 +73,7 @@ def colour_bar(
     text: str,
     extend: Literal["neither", "both", "min", "max"] = "neither",
 ) -> None:
-    """A bar beside the axes, 0.15 inches wide; pointed where values lie beyond its limits."""
+    """Draw a colour bar next to the axes, 0.15 inches wide; ``extend`` points its ends."""
     box, wide = ax.get_position(), figure.get_size_inches()[0]
     place = (box.x1 + 0.1 / wide, box.y0 + 0.1 * box.height, 0.15 / wide, 0.8 * box.height)
     side = figure.add_axes(place)
@@ -83,7 +83,7 @@ def colour_bar(
 
 
 def motion_bar(figure: Figure, left: float, low: float, width: float, cmap: str) -> None:
-    """A flat bar from 0 to 1 that says what the colours of a mode mean."""
+    """Draw a flat bar from 0 to 1 as the legend of the colours of a mode."""
     side = figure.add_axes((left, low, width, 0.09 / figure.get_size_inches()[1]))
     mapped = ScalarMappable(Normalize(0, 1), colormaps[cmap])
     figure.colorbar(mapped, cax=side, orientation="horizontal", ticks=[0, 0.5, 1])
@@ -92,7 +92,7 @@ def motion_bar(figure: Figure, left: float, low: float, width: float, cmap: str)
 
 
 def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str, size: float = 7.5) -> None:
-    """Text that can be read on any ground."""
+    """Draw text that is readable on any background."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=2.2, foreground="white")]
@@ -102,7 +102,7 @@ def halo_text(ax: Axes, place: np.ndarray, text: str, colour: str, size: float =
 
 
 def _whiten(frames: list[Any]) -> None:
-    """The ground (colour of the first pixel) becomes pure white; a palette only comes near it."""
+    """Make the background (colour of the first pixel) pure white, unlike the palette's."""
     ground = frames[0].getpixel((0, 0))
     for frame in frames:
         colours = frame.getpalette()

@@ -26,8 +26,8 @@ _STYLES: dict[str, dict[str, Any]] = {
     "identified": {"color": AFTER, "lw": 1.1, "zorder": 4},
     "model": {"color": AFTER, "lw": 1.3, "zorder": 4},
 }
-_WIDEST = 9.0  # inches of a row of bars: wider, a page shrinks it until no number can be read
-_TOLD = 40  # bars that have their numbers; of more every second one, or third
+_WIDEST = 9.0  # inches of a row of bars: a page would shrink a wider one until it is unreadable
+_TOLD = 40  # most bars with a number; above that every second or third bar has one
 _MORE = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 
 
@@ -39,7 +39,7 @@ def frf(
     fitted: Bands = (),
     excluded: Bands = (),
 ) -> Path:
-    """Log magnitude over phase of one channel; "test", "before", "after" have colours of their own.
+    """Plot log magnitude above phase of one channel; "test", "before", "after" have fixed colours.
 
     ``fitted`` bands are shaded blue, ``excluded`` ones grey [Hz].
     """
@@ -67,7 +67,7 @@ def frf_grid(
     excluded: Bands = (),
     columns: int = 2,
 ) -> Path:
-    """Magnitudes of many channels, one small picture each."""
+    """Plot magnitudes of many channels, one small picture each."""
     columns = min(columns, len(channels))
     rows = -(-len(channels) // columns)
     figure = Figure(figsize=(4.6 * columns, 2.2 * rows + 0.5), layout="constrained")
@@ -92,7 +92,7 @@ def frf_grid(
 
 
 def nyquist(path: Path | str, curves: Curves, title: str = "", unit: str = "") -> Path:
-    """Imaginary over real part: a mode is a circle."""
+    """Plot imaginary over real part, where a mode is a circle."""
     figure = Figure(figsize=(5.2, 5.0), layout="constrained")
     ax = figure.subplots()
     for k, (name, (_, H)) in enumerate(curves.items()):
@@ -108,7 +108,7 @@ def nyquist(path: Path | str, curves: Curves, title: str = "", unit: str = "") -
 def frequency_ladder(
     path: Path | str, test: np.ndarray, before: np.ndarray, after: np.ndarray | None = None
 ) -> Path:
-    """Deviation (f_model / f_test - 1) of each paired mode in per cent, as bars.
+    """Plot the deviation (f_model / f_test - 1) of each paired mode in per cent, as bars.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def mac_matrix(
     path: Path | str, mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str = "",
     pairs: Sequence[tuple[int, int]] = (),
 ) -> Path:  # fmt: skip
-    """MAC (r, c) in [0, 1] as shaded squares with their values; pairs (row, column) are framed."""
+    """Plot MAC (r, c) in [0, 1] as shaded squares with values; pairs (row, column) are framed."""
     if mac.shape != (len(rows), len(columns)):
         raise ShapeError(f"MAC is {mac.shape}, the labels say {(len(rows), len(columns))}")
     size = 0.42 * max(len(rows), len(columns)) + 1.9
@@ -160,7 +160,7 @@ def mac_matrix(
 
 
 def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | None = None) -> Path:
-    """Log evidence of every hypothesis relative to the best one, longest bar worst."""
+    """Plot log evidence of every hypothesis relative to the best one; the longest bar is worst."""
     ranked = sorted(evidence.items(), key=lambda item: -item[1])
     names = [name for name, _ in ranked]
     below = np.array([ranked[0][1] - value for _, value in ranked])
@@ -180,9 +180,9 @@ def evidence_bars(path: Path | str, evidence: Mapping[str, float], best: str | N
 
 
 def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, float]]) -> Path:
-    """Statistics of what is left, (value, median, low, high) each, as multiples of their median.
+    """Plot statistics of the residual, (value, median, low, high), as multiples of their median.
 
-    What is none at all stands at the left edge of the logarithmic axis.
+    A value of zero is drawn at the left edge of the logarithmic axis.
     """
     figure = Figure(figsize=(7.6, 0.42 * len(rows) + 1.1), layout="constrained")
     ax = figure.subplots()
@@ -205,7 +205,7 @@ def fit_test(path: Path | str, rows: Mapping[str, tuple[float, float, float, flo
 
 
 def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None = None) -> Path:
-    """Deviation Q from the nominal model down, step by step, with what repeats alone would give."""
+    """Plot the deviation Q from the nominal model, step by step, with the ``floor`` of repeats."""
     figure = Figure(figsize=(max(4.6, 1.5 * len(steps)), 3.2), layout="constrained")
     known = {name: value for name, value in steps.items() if np.isfinite(value)}
     ax, names, Q = figure.subplots(), list(known), np.array(list(known.values()), dtype=float)
@@ -227,7 +227,7 @@ def waterfall(path: Path | str, steps: Mapping[str, float], floor: float | None 
 def deviation_map(
     path: Path | str, Q: np.ndarray, channels: Sequence[str], bands: Sequence[str], title: str = ""
 ) -> Path:
-    """Deviation per channel (rows) and band (columns)."""
+    """Plot the deviation per channel (rows) and band (columns)."""
     figure = Figure(
         figsize=(0.7 * len(bands) + 2.4, 0.24 * len(channels) + 1.4), layout="constrained"
     )
@@ -249,7 +249,7 @@ def _curves(upper: Axes, lower: Axes | None, curves: Curves) -> None:
 
 
 def _style(name: str, k: int) -> dict[str, Any]:
-    """Of a name, else the k-th colour; later curves are thinner, so that none hides another."""
+    """Style of a known name, else the k-th colour; later curves are thinner and hide no other."""
     return _STYLES.get(name) or {"color": _MORE[k % len(_MORE)], "lw": max(0.8, 2.2 - 0.6 * k)}
 
 

@@ -1,7 +1,7 @@
-"""Which off-screen window VTK can open here: asked once, in a child, because it may crash.
+"""Search for an off-screen window that VTK can open, in a child process because it may crash.
 
-Where neither EGL nor OSMesa is installed VTK ends the process with a segmentation fault instead of
-raising, so the question is put to a child process and the answer is kept in the user's cache.
+Without EGL and OSMesa, VTK ends the process with a segmentation fault instead of raising. So a
+child process tries the windows once, and the result is kept in the user's cache.
 The environment variable ``CHLADNI_GRAPHICS`` overrides it: ``egl``, ``osmesa`` or ``matplotlib``.
 """
 
@@ -25,7 +25,7 @@ ADVICE = (
     "Pictures are drawn with matplotlib; for smoothly shaded ones install a graphics library "
     "(Debian, Ubuntu: apt-get install libosmesa6, or libegl1 libgl1-mesa-dri)."
 )
-ROOM = 1.5e9  # bytes of address space that VTK and its pictures take, with half as much to spare
+ROOM = 1.5e9  # bytes of address space that VTK and its pictures take, with half as much in reserve
 CRAMPED = (
     "Pictures are drawn with matplotlib: the limit on address space (ulimit -v) leaves VTK no room."
 )
@@ -40,7 +40,7 @@ raise SystemExit(0 if image.std() > 1 else 1)
 
 @cache
 def window() -> str | None:
-    """Name of the VTK window class to use, or None where pictures fall to matplotlib."""
+    """Name of the VTK window class to use, or None where matplotlib draws the pictures."""
     if wish := os.environ.get("CHLADNI_GRAPHICS", "").lower():
         if wish not in (*WINDOWS, "matplotlib"):
             raise FileError(
@@ -55,13 +55,13 @@ def window() -> str | None:
         try:
             known = {key: next(filter(opens, WINDOWS.values()), None)}
         except subprocess.TimeoutExpired:
-            return None  # a busy machine is no reason to remember "nothing works"
+            return None  # the machine may only be busy: do not remember the failure
         _keep(store, known)
     return known[key]
 
 
 def opens(window_class: str, seconds: float = 60.0) -> bool:
-    """Whether a child process with this window class draws a sphere and lives."""
+    """True where a child process with this window class draws a sphere without a crash."""
     environment = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": window_class}
     environment.pop("DISPLAY", None)
     command = [sys.executable, "-c", _CHILD]
@@ -70,7 +70,7 @@ def opens(window_class: str, seconds: float = 60.0) -> bool:
 
 
 def prepare() -> bool:
-    """Point VTK at the window class that works; False where matplotlib must do."""
+    """Set the working window class in VTK; False where matplotlib must draw."""
     found = window()
     if found is None:
         return False
@@ -79,7 +79,7 @@ def prepare() -> bool:
 
 
 def advice() -> list[str]:
-    """What would make for better pictures; nothing where VTK works or matplotlib was wished for."""
+    """Advice for better pictures; empty where VTK works or the user chose matplotlib."""
     if os.environ.get("CHLADNI_GRAPHICS") or window():
         return []
     return [CRAMPED if address_space_left() < ROOM else ADVICE]
@@ -103,7 +103,7 @@ def _user() -> int:
 
 
 def _machine() -> str:
-    """What the answer depends on; a library installed later changes it, so it is asked again."""
+    """Key of the cached result: system and libraries, so that a new library repeats the search."""
     libraries = [find_library(name) or "-" for name in ("OSMesa", "EGL", "GL")]
     versions = [platform.python_version(), _version("vtk"), _version("pyvista")]
     return " ".join([platform.node(), *versions, *libraries])
@@ -128,4 +128,4 @@ def _keep(store: Path, known: dict[str, str | None]) -> None:
     try:
         write_json(store, known)
     except OSError:
-        return  # asked again next time
+        return  # the search is repeated next time

@@ -1,7 +1,7 @@
 """Off-screen pictures of structures: modes, maps, sensors, places. No display, no window.
 
 Every function takes plain arrays (a :class:`~chladni.view.surface.Surface`), writes one PNG or GIF
-and returns its path. Lengths are in metres, the scale bar says so in the unit that reads best.
+and returns its path. Lengths are in metres; the scale bar uses the most readable unit.
 """
 
 from collections.abc import Sequence
@@ -22,18 +22,18 @@ from .surface import Surface
 
 _MOTION = "viridis"
 _SWING = 0.07  # largest displacement drawn, as a part of the structure's size
-_GHOST = 70.0  # degrees of a fold that the undeformed outline shows
+_GHOST = 70.0  # [degree] smallest fold that the undeformed outline shows
 _CORD = "#009e73"
 _LABEL = 1.5  # lengths of an arrow to the far end of its label
-_LONG = 0.35  # part of the structure's size that a line of that outline must reach
+_LONG = 0.35  # least length of a line of that outline, as a part of the structure's size
 _CLUTTER = 1500  # faces above which a small picture is clearer without element edges
-_MANY = 6000  # above so many faces element edges would only blacken the picture
+_MANY = 6000  # faces above which element edges would only blacken the picture
 
 
 def mode_shape(
     path: Path | str, seen: Surface, shape: np.ndarray, frequency: float, name: str = "mode"
 ) -> Path:
-    """Deformed surface coloured by displacement, with its undeformed outline.
+    """Draw the deformed surface coloured by displacement, with its undeformed outline.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def montage(
     numbers: Sequence[int] | None = None,
     columns: int = 4,
 ) -> Path:
-    """One small picture per mode; ``shapes`` is (n, 3, r), numbered from 1 if not told.
+    """Draw one small picture per mode; ``shapes`` is (n, 3, r), numbered from 1 by default.
 
     Each mode is seen from the side that shows more of its motion.
     """
@@ -89,7 +89,7 @@ def mode_gif(
     name: str = "mode",
     frames: int = 20,
 ) -> Path:
-    """One period Re(φ e^{iωt}) that loops without a jump."""
+    """Draw one period Re(φ e^{iωt}) as a GIF that loops without a jump."""
     seen, phi, images = seen.without_joints(), np.asarray(shape), []
     camera, _ = for_mode(seen, _real(phi))
     for angle in 2 * np.pi * np.arange(frames) / frames:
@@ -111,11 +111,11 @@ def scalar_map(
     limits: tuple[float, float] | None = None,
     where: tuple[np.ndarray, float] | None = None,
 ) -> Path:
-    """Colours by a value per face (m,) or per point (n,), with a colour bar.
+    """Draw colours by a value per face (m,) or per point (n,), with a colour bar.
 
-    A thickness, an energy, a difference; not-a-number is grey. ``where`` adds a circle (point,
-    radius) [m]. Where much is hidden the structure is shown from behind too; values beyond the
-    limits have the colour of the limit, and the bar is pointed there.
+    Values may be a thickness, an energy or a difference; not-a-number is grey. ``where`` adds a
+    circle (point, radius) [m]. A second view from behind is added where much is hidden. Values
+    beyond the limits have the colour of the limit, and the bar is pointed there.
     """
     seen, values = _sheets_of(seen, _fitting(seen, values))
     low, high = limits or _ends(values)
@@ -141,7 +141,7 @@ def _sheets_of(seen: Surface, values: np.ndarray) -> tuple[Surface, np.ndarray]:
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:
-    """The smallest and the largest value, a little apart."""
+    """The smallest and the largest value, made different where they are equal."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     if low == high:
@@ -156,7 +156,7 @@ def _beyond(values: np.ndarray, low: float, high: float) -> Any:
 
 
 def usual_limits(seen: Surface, values: np.ndarray, share: float = 0.02) -> tuple[float, float]:
-    """Limits that all but a share of the area of the faces (m,) lies within at either end."""
+    """Limits of the values of faces (m,), with a share of the area beyond each limit."""
     ok = np.isfinite(values)
     area, v = np.linalg.norm(seen.areas(), axis=1)[ok], values[ok]
     order = np.argsort(v)
@@ -166,7 +166,7 @@ def usual_limits(seen: Surface, values: np.ndarray, share: float = 0.02) -> tupl
 
 
 def thickness_map(path: Path | str, seen: Surface, thickness: np.ndarray) -> Path:
-    """Thickness [m] of every face in millimetres; small thick plates do not set the scale."""
+    """Draw the thickness [m] of every face in millimetres; small thick plates set no limit."""
     scale, unit = (1e3, "mm") if seen.unit == "m" else (1.0, seen.unit)
     t = scale * np.asarray(thickness)
     return scalar_map(path, seen, t, "thickness", unit, "YlGnBu", usual_limits(seen, t))
@@ -180,11 +180,11 @@ def sensors(
     cords: Sequence[Marker] = (),
     shaker: str = "shaker",
 ) -> Path:
-    """Where sensors (blue), shakers (orange) and cords (green) sit and which way they point.
+    """Draw places and directions of sensors (blue), shakers (orange) and cords (green).
 
     Parameters
     ----------
-    shaker : what the inputs are called
+    shaker : name of the inputs in the legend
     """
     drawn = (*outputs, *inputs, *cords)
     places = np.array([m.point for m in drawn]).reshape(-1, 3)
@@ -216,7 +216,7 @@ def location(
     text: str = "",
     faces: np.ndarray | None = None,
 ) -> Path:
-    """Places on the structure: a cross each, the circle of its uncertainty [m], a sentence.
+    """Draw places on the structure: a cross, a circle of its uncertainty [m], a sentence.
 
     ``point`` is (3,) or (k, 3); ``faces`` (m,) bool are coloured: the parts or elements meant.
     """
@@ -240,7 +240,7 @@ def location(
 def _sheets(
     cameras: Sequence[Camera], width: float = 7.0, bar: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with one view beside the other, and room for a title (and a colour bar)."""
+    """A figure with views side by side, and room for a title (and a colour bar)."""
     n, margin, beside = len(cameras), 0.14, 0.9 if bar else 0.0
     picture = width - 2 * margin - (beside if n == 1 else 0.0)
     picture = picture if n == 1 else 0.75 * width
@@ -270,7 +270,7 @@ def framed(seen: Surface, camera: Camera) -> Camera:
 def for_mode(seen: Surface, phi: np.ndarray) -> tuple[Camera, np.ndarray]:
     """The view that shows more of ∫ |u|² dA, and the sign that moves the larger part to the eye.
 
-    A sheet that moves away from the eye would vanish behind the one after it.
+    A sheet that moves away from the eye would vanish behind the next one.
     """
     front, back = (framed(seen, camera) for camera in both_views(seen))
     if not len(seen.faces):
@@ -290,7 +290,7 @@ def swung(
     peak: float | None = None,
     edges: bool = True,
 ) -> None:
-    """A surface displaced by a shape whose largest value becomes a set part of its size."""
+    """Draw a surface displaced by a shape, scaled to a fixed part of the structure's size."""
     peak = _peak(shape) if peak is None else peak
     moved = seen.moved(_SWING * seen.size / peak * shape)
     colours = Paint(

@@ -24,10 +24,10 @@ def section_plot(
     title: str,
     unit: str,
 ) -> Path:
-    """Walls (k, 4, 2) coloured by part (k,), outlines of solids (j, 2, 2) grey, to one scale.
+    """Draw walls (k, 4, 2) coloured by part (k,), outlines of solids (j, 2, 2) grey, to scale.
 
     ``axes`` are the names of the two axes of the plane, ``unit`` that of length. The longer extent
-    lies across the page.
+    is horizontal.
     """
     extent = np.ptp(np.concatenate([walls.reshape(-1, 2), solids.reshape(-1, 2)]), axis=0)
     if extent[1] > extent[0]:

@@ -1,4 +1,4 @@
-"""Modes of a test beside those of a model: what the sensors saw, and what the model says there."""
+"""Pictures of test modes next to model modes, at the sensors."""
 
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ _LONG = 0.12  # the longest arrow, as a part of the structure's size
 
 
 def shape_pairs(path: Path | str, seen: Surface, found: PairedShapes) -> Path:
-    """Two pictures a pair: arrows of the test on the sheet at rest, and of the model on its shape.
+    """Draw two pictures a pair: test arrows on the sheet at rest, model arrows on its shape.
 
-    Arrow and colour of a sensor are its share of the largest: orange along it, blue against it.
+    Length and colour of an arrow show the motion over the largest: orange along the direction of
+    the sensor, blue against it.
     """
     seen, count = seen.without_joints(), len(found.f_test)
     columns = 2 * min(_PAIRS_A_ROW, count)
@@ -49,7 +50,7 @@ def shape_pairs(path: Path | str, seen: Surface, found: PairedShapes) -> Path:
 def _arrows(
     ax: Axes, camera: Camera, seen: Surface, found: PairedShapes, value: np.ndarray
 ) -> None:
-    """An arrow at every sensor along its direction, as long as it moves."""
+    """Draw an arrow at every sensor along its direction, in proportion to its motion."""
     place = camera.project(found.points)
     tip = camera.project(found.directions * value[:, None]) * _LONG * seen.size
     for (x, y), (dx, dy), v in zip(place, tip, value, strict=True):

@@ -13,13 +13,13 @@ from ..errors import ShapeError
 from .paper import AFTER, BEFORE, TITLE, save
 
 _COLOURS = "viridis"
-_MOST = 1000  # lines of parallel coordinates; more are a grey block
+_MOST = 1000  # most lines of parallel coordinates; more would form a grey block
 
 
 def slope_map(
     path: Path | str, values: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str
 ) -> Path:
-    """Signed values (r, c) as coloured squares with their numbers, blue above zero, red below."""
+    """Draw signed values (r, c) as squares with their numbers, blue above zero, red below."""
     if values.shape != (len(rows), len(columns)):
         raise ShapeError(f"values are {values.shape}, labels say {(len(rows), len(columns))}")
     size = (1.0 * len(columns) + 2.6, 0.32 * len(rows) + 1.5)
@@ -30,7 +30,7 @@ def slope_map(
     for (i, j), value in np.ndenumerate(values):
         if np.isfinite(value):
             colour = "white" if abs(value) > 0.6 * most else "#333333"
-            text = f"{round(value, 2) + 0.0:.2f}"  # no sign before a zero
+            text = f"{round(value, 2) + 0.0:.2f}"  # avoids "-0.00"
             ax.text(j, i, text, ha="center", va="center", fontsize=8, color=colour)
     ax.set_xticks(range(len(columns)), columns, rotation=30, ha="right", fontsize=8)
     ax.set_yticks(range(len(rows)), rows, fontsize=8)
@@ -45,7 +45,7 @@ def parallel_coordinates(
     colour: str,
     logarithmic: Collection[str] = (),
 ) -> Path:
-    """Every sample a line across the axes, coloured by one of them.
+    """Draw every sample as a line across the axes, coloured by one of them.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def response_plots(
     nominal: Mapping[str, float],
     logarithmic: Collection[str] = (),
 ) -> Path:
-    """Every result (row) over every parameter (column), one dot per sample; lines: the deck's own.
+    """Plot every result (row) over every parameter (column); lines show the deck's own values.
 
     Parameters
     ----------

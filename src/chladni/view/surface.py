@@ -1,4 +1,4 @@
-"""What a picture shows: points, faces and lines, taken from plain arrays or from an assembly."""
+"""Surfaces for pictures: points, faces and lines, from plain arrays or from an assembly."""
 
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -30,7 +30,7 @@ class Surface:
     lines : (k, 2) int     beams, bars, springs
     part : (m,) int        part of each face; outlines are drawn where parts meet
     unit : str             "m"; "" where the deck's own unit of length is not known
-    joint : (m,) bool      faces of welds and adhesive, which lie between or in sheets
+    joint : (m,) bool      faces of welds and adhesive, which lie between or within sheets
     """
 
     points: np.ndarray
@@ -53,17 +53,17 @@ class Surface:
 
     @classmethod
     def of(cls, points: np.ndarray, quads: np.ndarray, tris: np.ndarray | None = None) -> Self:
-        """Quadrilaterals first, triangles after them."""
+        """Build a surface with quadrilaterals first, then triangles."""
         tris = np.zeros((0, 3), np.int64) if tris is None else np.asarray(tris)
         four = np.concatenate([np.asarray(quads).reshape(-1, 4), tris[:, [0, 1, 2, 2]]])
         return cls(np.asarray(points, dtype=float), four.astype(np.int64))
 
     def moved(self, displacement: np.ndarray) -> Self:
-        """The same faces over displaced points (n, 3) [m]."""
+        """The surface with its points displaced (n, 3) [m]."""
         return replace(self, points=self.points + displacement)
 
     def without_joints(self) -> Self:
-        """The sheets alone: the solids of joints lie in their surface and would shine through."""
+        """The sheets alone: solids of joints lie in the sheets' surface and would show through."""
         keep = ~np.asarray(self.joint)
         return replace(self, faces=self.faces[keep], part=np.asarray(self.part)[keep], joint=None)
 
@@ -75,7 +75,7 @@ class Surface:
 
     @property
     def used(self) -> np.ndarray:
-        """Rows of the points that any face or line needs."""
+        """Rows of the points that faces or lines use."""
         held = np.concatenate([self.faces.ravel(), self.lines.ravel()])
         return np.unique(held) if len(held) else np.arange(len(self.points))
 
@@ -88,7 +88,7 @@ class Surface:
         return cell_normals(self.points, self.faces)
 
     def outline(self, crease: float = 35.0, least: float = 0.0) -> np.ndarray:
-        """Edges (k, 2) that show the form: free, between parts, or folded by ``crease`` degrees.
+        """Edges (k, 2) of the form: free, between parts, or folded by ``crease`` degrees.
 
         Connected edges that reach less than ``least`` of the structure's size are left out.
         """
@@ -123,7 +123,7 @@ class Surface:
 
 
 def _carried(assembly: Assembly) -> np.ndarray:
-    """Which points (n,) are means of shells' points (RBE3): the corners of welds and adhesive."""
+    """Mask of points (n,) that are means of shells' points (RBE3), as corners of welds are."""
     means = [t.reference for t in assembly.rigid if isinstance(t, Average)]
     on = np.zeros(len(assembly.points), bool)
     on[means if len(assembly.shells) else []] = True
@@ -131,7 +131,7 @@ def _carried(assembly: Assembly) -> np.ndarray:
 
 
 def surface(assembly: Assembly, unit: str = "m") -> Surface:
-    """All that can be seen of an assembly: shells, skins of solids, beams, springs, bushes.
+    """The visible surface of an assembly: shells, skins of solids, beams, springs, bushes.
 
     The shells' faces come first and in the deck's order, so a value per shell is a value per face.
     """
