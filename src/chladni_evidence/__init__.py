@@ -1,1 +1,1 @@
-"""Concealed effects: cases made, diagnosed blindly, scored."""
+"""Blind evidence: make cases with concealed effects, diagnose them blindly, score them."""

@@ -1,4 +1,4 @@
-"""``python -m chladni_evidence``: evidence that does not flatter, made, diagnosed, scored."""
+"""``python -m chladni_evidence``: make, diagnose and score cases with concealed effects."""
 
 import argparse
 import math
@@ -26,7 +26,7 @@ from .thesis import regenerate
 
 
 def main(words: list[str] | None = None) -> int:
-    """Entry point; 0 (done), 1 (an injury did not end as due), 2 (bad input: one sentence)."""
+    """Entry point; 0 (done), 1 (an injured input ended wrongly), 2 (bad input: one sentence)."""
     asked = _parser().parse_args(words)
     try:
         return COMMANDS[asked.command](asked)
@@ -36,7 +36,7 @@ def main(words: list[str] | None = None) -> int:
 
 
 def _run(asked: argparse.Namespace) -> int:
-    """Cases made, diagnosed, scored: the three steps of ``chladni blind``."""
+    """Make, diagnose and score cases: the three steps of ``chladni blind``."""
     seeds = seed_range(asked.seeds)
     kinds, structures = (t.split(",") if t else [] for t in (asked.kinds, asked.structures))
     orders = [
@@ -49,7 +49,7 @@ def _run(asked: argparse.Namespace) -> int:
 
 
 def _screened(asked: argparse.Namespace) -> int:
-    """The table of the screening: outcomes by fault."""
+    """Print the table of the screening: outcomes by fault."""
     kinds = [k for k in FAULTS if not asked.faults or k in asked.faults.split(",")]
     for name, count in tally(_seeds(asked), kinds, _say, asked.long).items():
         _say(f"{name:24} " + ", ".join(f"{said} {n}" for said, n in sorted(count.items())))
@@ -57,7 +57,7 @@ def _screened(asked: argparse.Namespace) -> int:
 
 
 def _fuzzed(asked: argparse.Namespace) -> int:
-    """Injured inputs; 1 where any did not end as it is due."""
+    """Run injured inputs; return 1 where any ended wrongly."""
     kinds = asked.kinds.split(",") if asked.kinds else KINDS
     if unknown := [k for k in kinds if k not in KINDS]:
         raise LabelError(f"no kind {unknown[0]}; there are {', '.join(KINDS)}")
@@ -67,25 +67,25 @@ def _fuzzed(asked: argparse.Namespace) -> int:
 
 
 def _identified(asked: argparse.Namespace) -> int:
-    """Errors, coverage and inventions of identification, by kind of noise."""
+    """Print errors, coverage and invented poles of identification, by kind of noise."""
     table(_seeds(asked), asked.noise.split(";") if asked.noise else list(NOISES), _say)
     return 0
 
 
 def _thesis(asked: argparse.Namespace) -> int:
-    """Tables and figures of the thesis' test."""
+    """Write tables and figures of the thesis' test."""
     regenerate(asked.out, asked.seed, _say)
     return 0
 
 
 def _recorded(asked: argparse.Namespace) -> int:
-    """Cases diagnosed once, and the rows of their decisions kept."""
+    """Diagnose cases once, and keep the rows of their decisions."""
     record(asked.case, asked.out, _say)
     return 0
 
 
 def _replayed(asked: argparse.Namespace) -> int:
-    """Recorded cases decided again, as they are and without each of the rules."""
+    """Decide recorded cases again, with all rules and without each of them."""
     cases = [read_case(path) for path in asked.file]
     told = [*case_lines(cases), "", *rule_lines(cases)]
     if asked.noise != 1.0 or asked.floor is not None:
@@ -102,7 +102,7 @@ COMMANDS = {
 
 
 def _seeds(asked: argparse.Namespace) -> range:
-    """The seeds, and on the terminal what they are for."""
+    """The seeds; their purpose is printed on the terminal."""
     seeds = seed_range(asked.seeds)
     _say(MEANT[purpose(seeds)])
     return seeds

@@ -1,4 +1,4 @@
-"""Modes of an article at the few points that matter, by our elements or by CalculiX."""
+"""Modes of an article at selected points, by our elements or by CalculiX."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -19,18 +19,18 @@ from .calculix import calculix_modes
 
 Solver = Literal["chladni", "calculix"]
 ABOVE = 1.6  # our modes reach up to this many times the highest recorded frequency
-BY_CALCULIX = 70  # modes CalculiX is asked for
-_KEPT = "rigid at 0 Hz"  # what is in the cache; another word where that changes
+BY_CALCULIX = 70  # number of modes that CalculiX computes
+_KEPT = "rigid at 0 Hz"  # form of the cached modes; change the text with the form
 RIGID = 0.02  # below it a frequency of CalculiX is rounding [Hz]
 
 
 @dataclass(frozen=True, eq=False)
 class ArticleModes:
-    """Modes of an article, rigid ones first, those above the band as a static complement.
+    """Modes of an article, rigid ones first; modes above the band act as a static complement.
 
     Attributes
     ----------
-    frequency : (r,) Hz      0 of rigid ones
+    frequency : (r,) Hz      0 for rigid modes
     rows : (k,) int          rows of the article's points, increasing
     shapes : (k, 3, r)       motion of these points [1/√kg]
     loss : (r, r)            Φᵀ K_loss Φ of materials with losses [rad²/s²]
@@ -55,12 +55,12 @@ def article_modes(
     cache: Path | None = None,
     residual_bending: bool = True,
 ) -> ArticleModes:
-    """Modes at some points.
+    """Modes of an article at some points.
 
     Parameters
     ----------
-    rows : points whose motion is wanted
-    loaded : points forces act on: ours are exact for static loads there
+    rows : points whose motion is needed
+    loaded : points that forces act on: our modes are exact for static loads there
     f_max : highest frequency recorded [Hz]
     residual_bending : of our shells; False is another formulation
     """
@@ -74,7 +74,7 @@ def article_modes(
 def _kept(
     asked: tuple[Assembly, np.ndarray, np.ndarray, float, bool], cache: Path | None
 ) -> ArticleModes:
-    """Modes by our elements, from the cache where they are."""
+    """Modes by our elements, from the cache if it holds them."""
     kept = None if cache is None else cache / f"{fingerprint((asked, _KEPT))}.npz"
     if kept is not None and kept.exists():
         with np.load(kept, allow_pickle=False) as held:
@@ -89,9 +89,9 @@ def _kept(
 def _completed(
     frequency: np.ndarray, shapes: np.ndarray, ours: ArticleModes, f_max: float
 ) -> ArticleModes:
-    """CalculiX' modes, and in place of those it was not asked for our own above them.
+    """CalculiX' modes, completed by our own modes above them.
 
-    Without them the flexibility of the higher modes at the shaker would be missing.
+    Without these the flexibility of the higher modes at the shaker would be missing.
     """
     n = min(len(frequency), int((ours.frequency <= ABOVE * f_max).sum()))
     f = np.where(frequency < RIGID, 0.0, frequency)[:n]

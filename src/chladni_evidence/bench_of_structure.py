@@ -26,17 +26,17 @@ from chladni_specimens.tailgate.tailgate import tailgate
 from .footing import Spots
 
 ZETA = 0.007  # median damping ratio of an article
-FLAT = 0.999  # length of the mean normal of a point's shells where a sensor can be glued
-FINER = {"fine": 1.7, "calculix": 1.3}  # meshes of a form's articles against the deck's
-TAILGATE = {"16 mm": 0.016, "12 mm": 0.012, "calculix": 0.022}  # CalculiX halves them by itself
+FLAT = 0.999  # least length of the mean normal of a point's shells where a sensor can be glued
+FINER = {"fine": 1.7, "calculix": 1.3}  # refinement of a form's articles over the deck
+TAILGATE = {"16 mm": 0.016, "12 mm": 0.012, "calculix": 0.022}  # CalculiX' elements halve them
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """A small structure, how its articles are meshed, and how it is tested.
+    """A small structure with the meshes of its articles and its test.
 
-    ``build(times)`` makes the mesh of the deck (1) or one every element of which is cut (2),
-    ``unlike()`` a mesh with no point of the deck's.
+    ``build(times)`` makes the mesh of the deck (1) or one with every element divided (2).
+    ``unlike()`` makes a mesh that shares no point with the deck.
     """
 
     build: Callable[[int], Assembly]
@@ -47,12 +47,12 @@ class Specimen:
 
 
 def _plate(size: float, times: int = 1) -> Assembly:
-    """500 x 400 x 1.2 mm steel, hole of 100 mm off the middle."""
+    """Steel plate of 500 x 400 x 1.2 mm with a hole of 100 mm away from the middle."""
     return holed_plate(0.5, 0.4, (0.2, 0.22, 0.05), size, 1.2e-3, times=times)
 
 
 def _panel(size: float) -> Assembly:
-    """600 x 300 mm, 1 mm, bulging by 10 mm, long edges folded down."""
+    """Panel of 600 x 300 x 1 mm with a bulge of 10 mm and long edges folded down."""
     return folded_panel(0.6, 0.3, 0.04, 0.01, size, 1e-3)
 
 
@@ -67,7 +67,7 @@ SPECIMENS = {
 
 
 def _clamped(times: float) -> Assembly:
-    """300 x 200 x 2 mm steel, one short side in a clamp."""
+    """Steel plate of 300 x 200 x 2 mm with one short side in a clamp."""
     free = plate(0.3, 0.2, round(12 * times), round(8 * times), 2e-3)
     edge = np.flatnonzero(free.points[:, 0] == 0)
     return replace(free, supports=np.array([(row, c) for row in edge for c in range(1, 7)]))
@@ -80,7 +80,7 @@ CLAMPED = {
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """How a structure is tested.
+    """Test of a structure.
 
     Attributes
     ----------
@@ -112,12 +112,12 @@ class Bench:
 
     @property
     def held_sensors(self) -> int:
-        """A sixth of them, two at least."""
+        """Number of held-out sensors: a sixth of all, two at least."""
         return max(2, len(self.outputs) // 6)
 
 
 def form_bench(name: str, seed: int) -> Bench:
-    """A form of this seed: 8 to 30 sensors, a band of 10 to 15 elastic modes and four more."""
+    """Bench of a form, by seed: 8 to 30 sensors, a band of 10 to 15 elastic modes and four more."""
     form = FORMS[name]
     deck, rng = form.made(seed), np.random.default_rng([seed, 2, *name.encode()])
     built = structure(deck)
@@ -146,7 +146,7 @@ def form_bench(name: str, seed: int) -> Bench:
 
 
 def panel_bench(name: str, seed: int) -> Bench:
-    """The small plate or panel, free or in its clamp, its sensors laid out by the seed."""
+    """Bench of the small plate or panel, free or clamped, with sensors laid out by the seed."""
     spec, rng = {**SPECIMENS, **CLAMPED}[name], np.random.default_rng([seed, 3, *name.encode()])
     deck = spec.build(1)
     built = structure(deck)
@@ -173,7 +173,7 @@ def panel_bench(name: str, seed: int) -> Bench:
 
 @cache
 def tailgate_bench() -> Bench:
-    """The tailgate at 20 mm: sensors, shaker and cords as planned, the thesis' lines."""
+    """Bench of the tailgate at 20 mm: sensors, shaker and cords as planned, lines of the thesis."""
     deck = tailgate(TailgateDesign(size=0.020))
     found = plan(deck, PlanSettings(sensors=30))
     m = found.mounts
@@ -246,7 +246,7 @@ def _label(grid: int, direction: np.ndarray) -> str:
 
 
 def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Places far from each other, shaken a little by the seed."""
+    """Positions of places far from each other, varied a little by the seed."""
     noise = 0.02 * np.ptp(every.points, axis=0).max() * rng.normal(size=every.points.shape)
     return farthest_point_sample(every.points + noise, count)
 
@@ -254,7 +254,7 @@ def _spread(every: Spots, count: int, rng: np.random.Generator) -> np.ndarray:
 def _driven(
     deck: Assembly, every: Spots, moving: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Of thirty places drawn the one that drives the modes most evenly (geometric mean)."""
+    """The one of thirty drawn places that drives the modes most evenly (geometric mean)."""
     drawn = rng.choice(len(every), min(30, len(every)), replace=False)
     at = deck.rows(every.grids[drawn])
     phi = np.abs(np.einsum("kir,ki->kr", moving[at], every.directions[drawn]))

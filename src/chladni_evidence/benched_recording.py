@@ -1,9 +1,9 @@
-"""A recording of an article as the virtual bench makes it: cords, shaker, sensors, front end.
+"""A recording of an article on the virtual bench: cords, shaker, sensors, front end.
 
-In place of independent noise on every line the recording has what a lab's has: sensors a little
-beside their places and tilted, sensitivities a little off, cords (with rubber at their ends, as a
-lab that heard them ring tapes it there), a stinger, transients or leakage, noise of sensors and
-converter.
+Instead of independent noise on every line the recording has the errors of a laboratory. Sensors are
+tilted and a little off their places, and sensitivities are a little wrong. Cords have rubber at
+their ends, as a laboratory adds it against their resonances. A stinger, transients or leakage, and
+noise of sensors and converter act as well.
 """
 
 from dataclasses import dataclass, replace
@@ -34,18 +34,18 @@ Recorder = Literal["independent noise", "stepped-sine", "burst-random"]
 RECORDERS: tuple[Recorder, ...] = get_args(Recorder)
 PLAIN: Recorder = "independent noise"
 LINES = 1500  # of burst random over the band, at most: more take minutes to identify
-DELAY = 200.0  # cycles: of the transient of a mode of 0.4 % damping 0.7 % is left
+DELAY = 200.0  # cycles: 0.7 % of the transient remains for a mode of 0.4 % damping
 
 
 @dataclass(frozen=True, eq=False)
 class Benched:
-    """What the bench recorded, and what the lab knows of it.
+    """A recording of the bench, with the laboratory's knowledge of it.
 
     Attributes
     ----------
-    frf : FRF            at the places the user believes in
+    frf : FRF            at the places as the user states them
     averages : float
-    sensor_mass, gauge_mass : what each device adds to the article [kg]
+    sensor_mass, gauge_mass : mass that each device adds to the article [kg]
     """
 
     frf: FRF
@@ -55,7 +55,7 @@ class Benched:
 
 
 def can_be_benched(hidden: Hidden, modes: ArticleModes) -> bool:
-    """Whether its modes say all of it: nothing in it depends on frequency by a law of its own."""
+    """True where modes describe the article: no part of it has a law of frequency of its own."""
     return not hidden.couplings and not modes.loss.any()
 
 
@@ -63,7 +63,7 @@ def benched_recording(
     bench: Bench, whole: Assembly, hidden: Hidden, zeta: np.ndarray, by: Recorder, solver: Solver,
     residual_bending: bool, cache: Path | None, rng: np.random.Generator,
 ) -> Benched:  # fmt: skip
-    """The article with what is hidden in it, tested over the lines; ``whole`` is it before."""
+    """Test the article with its hidden effect over the lines; ``whole`` is it before hiding."""
     setup = BenchSetup(rubber=True)
     article = _article(
         bench, whole, hidden, zeta, setup.accelerometer, solver, residual_bending, cache, rng
@@ -89,7 +89,7 @@ def _article(
     bench: Bench, whole: Assembly, hidden: Hidden, zeta: np.ndarray, kind: AccelerometerType,
     solver: Solver, residual_bending: bool, cache: Path | None, rng: np.random.Generator,
 ) -> BenchArticle:  # fmt: skip
-    """Its modes at true places; of rotations at the shaker nothing is known, so none is held."""
+    """The article's modes at true places; rotations at the shaker are unknown, so none is held."""
     a = hidden.article
     true = true_places(bench.outputs, kind, rng)
     out, drive = still_there(a, whole, true), still_there(a, whole, bench.drive)
@@ -119,7 +119,7 @@ def _along(modes: ArticleModes, foot: Footing, way: np.ndarray) -> np.ndarray:
 
 
 def true_places(spots: Spots, kind: AccelerometerType, rng: np.random.Generator) -> Spots:
-    """Where sensors truly sit and which way they feel."""
+    """True places and directions of the sensors."""
     u, v = tangents(spots.directions)
     off, tilt = kind.place_sd * rng.normal(size=(2, len(spots))), rng.normal(size=(2, len(spots)))
     turned = spots.directions + kind.tilt_sd * (tilt[0][:, None] * u + tilt[1][:, None] * v)

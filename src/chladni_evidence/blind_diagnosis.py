@@ -1,7 +1,7 @@
-"""The one door to diagnosis and calibration: a case folder goes in, an answer comes out, blindly.
+"""The only interface to diagnosis and calibration: it turns a case folder into an answer, blindly.
 
-It calls the command line in a process of its own, so that seconds and memory are the user's and a
-crash is an answer too. Whatever the diagnosis becomes, only this file has to follow.
+It calls the command line in a process of its own, so that time and memory are those of a user and a
+crash counts as an answer. Only this file depends on the form of a diagnosis.
 """
 
 import json
@@ -14,19 +14,19 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-EVERY = 0.2  # how often the process is looked at [s]
+EVERY = 0.2  # interval between two checks of the process [s]
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What came of a diagnosis.
+    """Result of a diagnosis.
 
     Attributes
     ----------
     code : int         exit code of the command, negative where it was ended by a signal
     seconds, gigabytes : float   by the clock; highest resident memory
-    said : str         its last words
+    said : str         its last output
     result : dict      diagnosis.json; empty where none was written
     """
 
@@ -38,16 +38,16 @@ class Answer:
 
     @property
     def crashed(self) -> bool:
-        """Whether it ended otherwise than by an answer or a refusal in one sentence."""
+        """True unless it ended with an answer or a refusal in one sentence."""
         return self.code not in (0, 2, 3) or (self.code == 0 and not self.result)
 
 
 def answered(
     command: str, case: Path, out: Path, limit: float = 3600.0, stop: Event | None = None
 ) -> Answer:
-    """Diagnose (or ``calibrate``) a case into ``out`` with nothing but its folder.
+    """Diagnose (or ``calibrate``) a case into ``out``, from its folder alone.
 
-    Its words go to ``out``.log. It ends with this process, at ``stop``, and after ``limit`` s.
+    Output goes to ``out``.log. The run ends with this process, at ``stop``, and after ``limit`` s.
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     log, start = out.with_name(f"{out.name}.log"), time.monotonic()
@@ -69,7 +69,7 @@ def answered(
 
 
 def _ended(process: subprocess.Popen[bytes], deadline: float, stop: Event) -> tuple[int, int]:
-    """Exit code and highest resident memory [kB] of a process, which is ended at the deadline."""
+    """Exit code and highest resident memory [kB] of a process, which is killed at the deadline."""
     while True:
         pid, status, usage = os.wait4(process.pid, os.WNOHANG)
         if pid:

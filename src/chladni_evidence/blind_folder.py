@@ -1,7 +1,7 @@
 """The folder of a blind benchmark: cases, sealed truths, their published hashes, answers.
 
-``cases/NAME`` is all a diagnosis is given. ``sealed/NAME.json`` is the truth, ``seals.json`` its
-SHA-256 and that of the case's files, one line a case, written before any answer.
+A diagnosis receives ``cases/NAME`` alone. ``sealed/NAME.json`` is the truth. ``seals.json`` holds
+its SHA-256 and that of the case's files, one line a case, and is written before any answer.
 ``answers/NAME.json`` is the answer.
 """
 
@@ -20,24 +20,24 @@ from .evidence_sets import PURPOSES, REPORTING, Purpose
 
 @dataclass(frozen=True)
 class BlindFolder:
-    """Where everything is."""
+    """Paths within the folder of a benchmark."""
 
     out: Path
 
     def case(self, name: str) -> Path:
-        """What the diagnosis is given."""
+        """The case folder, which the diagnosis receives."""
         return self.out / "cases" / name
 
     def truth(self, name: str) -> Path:
-        """What is hidden in it; the making writes it, the score alone reads it."""
+        """The truth of a case, written when the case is made and read only by the score."""
         return self.out / "sealed" / f"{name}.json"
 
     def answer(self, name: str) -> Path:
-        """What was answered; there only once it is whole."""
+        """The answer to a case; the file exists only when it is complete."""
         return self.out / "answers" / f"{name}.json"
 
     def work(self, name: str, command: str) -> Path:
-        """Where a command leaves its deck, its page and its words."""
+        """The folder for a command's deck, page and output."""
         return self.out / "answers" / f"{name}.{command}"
 
     @property
@@ -47,20 +47,20 @@ class BlindFolder:
 
     @property
     def opened(self) -> Path:
-        """Hashes of the answers that were on disk when the truths were opened first."""
+        """Hashes of the answers on disk when the truths were first opened."""
         return self.out / "opened.json"
 
 
 @dataclass(frozen=True)
 class Seals:
-    """What was published before any answer.
+    """Hashes and settings that are published before any answer.
 
     Attributes
     ----------
     purpose : tune or report
-    set, seeds : of the cases, as they were asked for
-    version : of chladni that made them
-    failed : how many cases could not be made
+    set, seeds : of the cases, as they were requested
+    version : of the chladni that made them
+    failed : number of cases that could not be made
     truths, files : SHA-256 of each case's truth, and of its own files together
     """
 
@@ -73,7 +73,7 @@ class Seals:
     files: dict[str, str]
 
     def write(self, path: Path) -> None:
-        """One line a case."""
+        """Write the seals, one line a case."""
         head = {k: v for k, v in vars(self).items() if k not in ("truths", "files")}
         lines = {n: f"truth {self.truths[n]} files {self.files[n]}" for n in self.truths}
         write_json(path, {**head, "cases": lines})
@@ -85,7 +85,7 @@ def published(place: BlindFolder) -> Seals:
     Raises
     ------
     FileError
-        If there are none, or they are not of the form they are written in.
+        If there are none, or they have another format.
     """
     held = read_json(
         place.seals, "`chladni blind make` writes it once all cases are made, before any answer"
@@ -146,7 +146,7 @@ def opened_truth(place: BlindFolder, seals: Seals, name: str) -> dict[str, Any]:
     Raises
     ------
     AccuracyError
-        If it is not the one whose hash was published, or its seed is for another purpose.
+        If its hash is not the published one, or its seed is for another purpose.
     """
     path = place.truth(name)
     if hash_of(path) != seals.truths[name]:
@@ -166,7 +166,7 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
     Raises
     ------
     FileError
-        If there is none; ``made_by`` says where it comes from.
+        If there is none; the message uses ``made_by`` to say how to make it.
     """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

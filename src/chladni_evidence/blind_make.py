@@ -1,4 +1,4 @@
-"""Cases of a blind benchmark: made, their truths sealed, the hashes published before any answer."""
+"""Making of blind cases: truths are sealed, and their hashes published before any answer."""
 
 import hashlib
 import json
@@ -27,9 +27,9 @@ Say = Callable[[str], object]
 def make(
     chosen: Sequence[Order], out: Path, why: Purpose, set_name: str, workers: int, say: Say
 ) -> Seals:
-    """All cases on disk and the hashes of their truths published; what is there is kept.
+    """Make all cases and publish the hashes of their truths; existing cases are kept.
 
-    A case that cannot be made stops nothing; why it could not is sealed beside the truths.
+    A case that cannot be made does not stop the others; the reason is sealed with the truths.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def make(
 
 
 def _begun(place: BlindFolder, chosen: Sequence[Order]) -> dict[str, Order]:
-    """Which order has which name: drawn, so that a name does not say what is hidden."""
+    """Orders by name; names are drawn, so that they do not reveal the hidden effect."""
     told = json.dumps([vars(o) for o in chosen])
     mark = hashlib.sha256(told.encode())
     begun = place.out / "blind.json"
@@ -75,7 +75,7 @@ def _begun(place: BlindFolder, chosen: Sequence[Order]) -> dict[str, Order]:
 
 
 def _each(orders: dict[str, Order], place: BlindFolder, workers: int, say: Say) -> None:
-    """Each case made, and said to be."""
+    """Make each case and report it."""
     if workers == 1:
         for done, (name, order) in enumerate(orders.items(), 1):
             say(_said(name, _made(name, order, place), done, len(orders)))
@@ -102,11 +102,11 @@ def _said(name: str, made: bool, done: int, every: int) -> str:
 
 
 def _made(name: str, order: Order, place: BlindFolder) -> bool:
-    """A case folder and its truth, which is written last, so that a truth means a whole case."""
+    """Make a case folder and its truth, written last so that a truth means a whole case."""
     truth, cache = place.truth(name), place.out / "cache"
     if truth.exists():
         return True
-    shutil.rmtree(place.case(name), ignore_errors=True)  # half of it, of a run that was killed
+    shutil.rmtree(place.case(name), ignore_errors=True)  # remains of a run that was killed
     try:
         write_case(made_of(order, cache), place.case(name), truth)
     except Exception:  # noqa: BLE001  a maker that fails is counted, and the others go on
@@ -117,13 +117,13 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
 
 
 def made_of(order: Order, cache: Path | None = None) -> MadeCase:
-    """The case of an order, on one thread, so that it is the same on every machine's cores."""
+    """The case of an order, made on one thread so that it is the same on every machine."""
     with threadpool_limits(1):
         return made_case(order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder)
 
 
 def _why_not(place: BlindFolder, name: str) -> Path:
-    """Sealed, as it tells what was to be hidden."""
+    """Path of the reason for a failed case; sealed, because it reveals the hidden effect."""
     return place.truth(name).with_suffix(".failed.txt")
 
 

@@ -1,4 +1,4 @@
-"""Answers to the cases of a blind benchmark, from nothing but their folders."""
+"""Answers to the cases of a blind benchmark, from their folders alone."""
 
 import shutil
 from collections.abc import Callable, Sequence
@@ -19,16 +19,16 @@ Say = Callable[[str], object]
 def run(
     out: Path, workers: int, say: Say, limit: float = 3600.0, calibrated: bool = True
 ) -> list[str]:
-    """Every case without an answer is diagnosed; the names of those that were.
+    """Diagnose every case without an answer; return the names of these cases.
 
-    Killed at any instant, it goes on with the same call: an answer is there whole or not at all.
-    A case that is refused, crashes or takes too long has that as its answer.
+    After a kill at any instant the same call continues, because answers are written whole. A case
+    that is refused, crashes or takes too long has that as its answer.
 
     Parameters
     ----------
     workers : processes
     limit : seconds a diagnosis may take
-    calibrated : calibrate each case as well, to be held beside the diagnosis
+    calibrated : calibrate each case as well, for comparison with the diagnosis
 
     Raises
     ------
@@ -56,7 +56,7 @@ def run(
 
 
 def _each(names: Sequence[str], workers: int, one: Callable[[str, Event], str], say: Say) -> None:
-    """Each in turn or at once, said as they are; where this is ended, so are they."""
+    """Run all cases in turn or in parallel and report each; they end when this call ends."""
     stop = Event()
     with ThreadPoolExecutor(workers) as pool:
         jobs = {pool.submit(one, name, stop): name for name in names}
@@ -72,7 +72,7 @@ def _each(names: Sequence[str], workers: int, one: Callable[[str, Event], str], 
 def _one(
     place: BlindFolder, seals: Seals, name: str, commands: Sequence[str], limit: float, stop: Event
 ) -> str:
-    """Answer a case and write the answer with what it was given to; what it says in words."""
+    """Answer a case, write the answer with the hashes of its files; return it in words."""
     given = {
         "seals": hash_of(place.seals),
         "files": seals.files[name],
@@ -81,12 +81,12 @@ def _one(
     answers: dict[str, Any] = {}
     for command in commands:
         work = place.work(name, command)
-        shutil.rmtree(work, ignore_errors=True)  # half of it, of a run that was killed
+        shutil.rmtree(work, ignore_errors=True)  # remains of a run that was killed
         answer = answered(command, place.case(name), work, limit, stop)
         if stop.is_set():
             return "stopped"
         answers[command] = vars(answer)
-        if command != "diagnose":  # its pages are megabytes nobody asked for
+        if command != "diagnose":  # its pages take megabytes that are not needed
             shutil.rmtree(work, ignore_errors=True)
     write_json(place.answer(name), {**given, **answers})
     return in_words(Answer(**answers["diagnose"]))

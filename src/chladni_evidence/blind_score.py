@@ -1,4 +1,4 @@
-"""Answers held against their truths, which are opened only when every answer is on disk."""
+"""Comparison of answers with their truths, which are opened only when all answers are on disk."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ Say = Callable[[str], object]
 
 
 def score(outs: Sequence[Path], say: Say) -> list[Row]:
-    """Rows of all cases of one folder or several; ``score.json`` and ``table.txt`` in the first.
+    """Score all cases of some folders; ``score.json`` and ``table.txt`` go to the first.
 
     Raises
     ------
@@ -60,10 +60,10 @@ def score(outs: Sequence[Path], say: Say) -> list[Row]:
 
 
 def _answers_hold(place: BlindFolder, seals: Seals) -> None:
-    """Every case answered, after its seal and to the published files, and not since the opening.
+    """Check that every case was answered, from the published files, between sealing and opening.
 
-    An answer holds the hash of the seals, so it is no older than they are; the hashes of answers
-    are written down before the first truth is opened, so none is younger than that.
+    An answer holds the hash of the seals, so it is not older than the seals. The hashes of answers
+    are written before the first truth is opened, so no answer is newer than that.
     """
     unanswered = [n for n in seals.truths if not place.answer(n).exists()]
     if unanswered:
@@ -110,7 +110,7 @@ def _rows(place: BlindFolder, seals: Seals) -> list[Row]:
 
 
 def _answers(given: Row, path: Path) -> tuple[Answer, Answer | None]:
-    """Of the diagnosis, and of plain calibration where it was asked."""
+    """Answer of the diagnosis, and of plain calibration where it was run."""
     try:
         plain = given.get("calibrate")
         return Answer(**given["diagnose"]), Answer(**plain) if plain else None

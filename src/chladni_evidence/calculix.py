@@ -1,4 +1,4 @@
-"""Modes of an assembly by CalculiX, an independent code; what was solved once is kept on disk."""
+"""Modes of an assembly by CalculiX, an independent code; solutions are kept on disk."""
 
 import hashlib
 import os
@@ -22,7 +22,7 @@ _SECONDS = 7200  # a frequency step that takes longer hangs
 
 
 def installed() -> bool:
-    """Whether ``ccx`` can be called."""
+    """True where ``ccx`` can be called."""
     return shutil.which("ccx") is not None
 
 
@@ -40,7 +40,7 @@ def calculix_modes(
     FileError
         If ``ccx`` is not installed.
     AccuracyError
-        If CalculiX found no modes; the sentence holds its last words.
+        If CalculiX found no modes; the message quotes the end of its output.
     """
     text = deck(assembly, count, rows)
     kept = (
@@ -57,7 +57,7 @@ def calculix_modes(
 
 
 def _run(text: str, folder: Path) -> str:
-    """What ``ccx`` prints for this deck, on one thread."""
+    """Results that ``ccx`` prints for this deck, on one thread."""
     if not installed():
         raise FileError("CalculiX (ccx) is not installed")
     (folder / "job.inp").write_text(text, encoding="ascii")

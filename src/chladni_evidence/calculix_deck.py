@@ -1,9 +1,9 @@
-"""An assembly as CalculiX reads it: quadratic shells and beams on the same corners, own solids.
+"""CalculiX deck of an assembly: quadratic shells and beams on the same corners, linear solids.
 
 Every side of a shell and every beam gets a node in its middle (S8R, S6, B32R); solids keep theirs
-(C3D8I, C3D6, C3D4). A mean (RBE3) becomes equations with our weights, a spider (RBE2) a rigid body,
-a bar between two spiders part of it; a spring to ground leads to a held node a metre away.
-Dhondt, CalculiX CrunchiX User's Manual 2.20. What has no counterpart is refused.
+(C3D8I, C3D6, C3D4). A mean (RBE3) becomes equations with our weights. A spider (RBE2) becomes a
+rigid body, and a bar between two spiders a part of it. A spring to ground leads to a fixed node a
+metre away. Dhondt, CalculiX CrunchiX User's Manual 2.20. Elements without counterpart are refused.
 """
 
 from collections.abc import Iterator
@@ -17,15 +17,15 @@ from chladni.geometry.facets import cell_normals
 from chladni.model.assembly import Assembly, Average, Bushes, RigidBody
 from chladni.model.properties import BeamSection, Isotropic, Orthotropic, Part, ShellSection
 
-LEAST_DENSITY = 1e-6  # of welds without mass [kg/m³]: CalculiX wants a density
+LEAST_DENSITY = 1e-6  # of welds without mass [kg/m³]: CalculiX requires a density
 GRAIN = 0.03  # directions that differ by less share a card [rad]
-THROUGH = 0.3  # Poisson's ratio between axis 2 and the normal: a sheet hardly feels it
+THROUGH = 0.3  # Poisson's ratio between axis 2 and the normal: it hardly changes a sheet
 _ROUNDING = 1e-12
 
 
 @dataclass
 class _Numbers:
-    """Element and node numbers not yet used."""
+    """Unused element and node numbers."""
 
     element: int = 1
     node: int = 1
@@ -42,7 +42,7 @@ def deck(assembly: Assembly, count: int, rows: np.ndarray) -> str:
 
     Parameters
     ----------
-    count : modes wanted
+    count : number of modes
     rows : (k,) int   rows of points; their motion is printed mode by mode
     """
     a, edges, of = assembly, *_middles(assembly)
@@ -69,11 +69,11 @@ def _row(k: int, values: np.ndarray) -> str:
 
 
 def _middles(a: Assembly) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Sides (k, 2) that get a node, and those of every shell (m, 4) and beam (n,)."""
+    """Sides (k, 2) that get a node, and the sides of every shell (m, 4) and beam (n,)."""
     corners = a.shells.nodes
     pairs = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2)
     tri = a.shells.triangle
-    pairs[tri, 2] = pairs[tri, 3]  # a triangle's third side leads from its third corner home
+    pairs[tri, 2] = pairs[tri, 3]  # a triangle's third side joins its third and first corner
     both = np.sort(np.concatenate([pairs.reshape(-1, 2), a.beams.nodes]), axis=1)
     if not len(both):
         return np.zeros((0, 2), int), (np.zeros((0, 4), int), np.zeros(0, int))
@@ -142,7 +142,7 @@ def _by_grain(
 ) -> Iterator[tuple[str, np.ndarray, tuple[str, ...]]]:
     """(name, positions in ``at``, orientation card) of shells whose material axis 1 agrees.
 
-    The material we write is alike in all directions across axis 1, so axis 2 need not agree.
+    The written material is the same in all directions across axis 1, so axis 2 need not agree.
     """
     section = a.parts[p].section
     assert isinstance(section, ShellSection)
@@ -161,7 +161,7 @@ def _by_grain(
 
 
 def _refused(section: ShellSection, a: Assembly, at: np.ndarray) -> str:
-    """What of a shell section CalculiX has no card for; empty where all is well."""
+    """Property of a shell section without a card in CalculiX; empty where all have one."""
     if section.membrane is None or section.membrane != section.bending or section.coupling:
         return "different materials in membrane and bending"
     if section.bending_ratio != 1.0:
@@ -180,7 +180,7 @@ def _nodal_thickness(t: np.ndarray, nodes: np.ndarray) -> Iterator[tuple[int, fl
 
 
 def _axes(a: Assembly, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Material axes 1 and 2 of shells: the projection of ``axis`` and what is square to it."""
+    """Material axes 1 and 2 of shells: the projection of ``axis`` and its in-plane normal."""
     n = cell_normals(a.points, a.shells.nodes[at])
     e = a.shells.axis[at]
     e = e - np.einsum("ki,ki->k", e, n)[:, None] * n
@@ -205,7 +205,7 @@ def _material(p: int, material: object) -> Iterator[str]:
 
 
 def _beams(a: Assembly, p: int, at: np.ndarray, of: np.ndarray, numbers: _Numbers) -> Iterator[str]:
-    """B32R of one part; those whose orientation vectors agree share a section."""
+    """B32R of one part; beams with equal orientation vectors share a section."""
     ups, group = np.unique(a.beams.up[at].round(9), axis=0, return_inverse=True)
     kind = _profile(a.parts[p])
     for j, up in enumerate(ups):
@@ -235,13 +235,13 @@ def _profile(part: Part) -> str:
 
 
 def _between_spiders(a: Assembly) -> np.ndarray:
-    """Beams (n,) bool whose both ends are reference points of spiders: the shafts of screws."""
+    """Beams (n,) bool with reference points of spiders at both ends: the shafts of screws."""
     centres = [r.independent for r in a.rigid if isinstance(r, RigidBody)]
     return np.asarray(np.isin(a.beams.nodes, centres).all(axis=1))
 
 
 def _shaft_masses(a: Assembly) -> Iterator[tuple[int, float]]:
-    """Half a shaft's mass at either end."""
+    """Half of a shaft's mass at each end."""
     for k in np.flatnonzero(_between_spiders(a)):
         s, ends = _beam_section(a.parts[a.beams.part[k]]), a.beams.nodes[k]
         L = float(np.linalg.norm(np.diff(a.points[ends], axis=0)))
@@ -289,7 +289,7 @@ def _bush(a: Assembly, b: Bushes, k: int, numbers: _Numbers) -> Iterator[str]:
 
 
 def _equations(a: Assembly) -> Iterator[str]:
-    """u_ref - Σ G u = 0 for every RBE3, with our G."""
+    """Equations u_ref - Σ G u = 0 for every RBE3, with our G."""
     means = tuple(r for r in a.rigid if isinstance(r, Average))
     if not means:
         return

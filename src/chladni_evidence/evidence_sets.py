@@ -1,4 +1,4 @@
-"""Which cases a set of evidence consists of; which seeds tune and which report."""
+"""Cases of each set of evidence, and the seeds that tune or report."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ from .pair_kinds import HEMS, PAIRS
 SETS = ("tailgate", "panels", "forms", "frames", "outside", "joints", "pairs", "hems", "clamps")
 Purpose = Literal["tune", "report"]
 PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
-REPORTING = 600  # seeds below tune scales and code, those from here on report
+REPORTING = 600  # seeds below tune scales and code; seeds from here on report
 MESHES = ("fine", "calculix")
 ON_SHEETS = (
     "thickness-distribution", "orthotropic-material", "stiffness-patch", "mass-patch", "crack",
     "membrane-prestress",
 )  # fmt: skip
 OURS = ("crack", "membrane-prestress", "friction-joint")  # CalculiX has no card for them here
-HOMES = {  # structures of the set outside, by what is put into them
+HOMES = {  # structures of the set outside, by the hidden effect
     "rotor": ("lidded box", "ribbed plate", "curved shell", "panel"),
     "foam": ("panel", "curved shell", "bonded plates", "ribbed plate"),
     "local-resonator": ("tube frame", "lidded box", "plate", "ribbed plate"),
@@ -40,7 +40,7 @@ HOMES = {  # structures of the set outside, by what is put into them
     "friction-joint": ("lidded box", "bonded plates", "tube frame"),
     "duplicated-pair": ("panel", "bolted bracket", "bonded plates", "lidded box"),
 }
-JOINED = {  # structures of the set joints, by what is put into them
+JOINED = {  # structures of the set joints, by the hidden effect
     "nothing": ("bonded plates", "lidded box", "bolted bracket"),
     "weld-missing": ("lidded box", "bolted bracket"),
     "adhesive-stiffness": ("bonded plates", "tailgate"),
@@ -53,7 +53,7 @@ IN_CLAMP = ("nothing", "compliant-support", "shaker-restraint", "extra-support",
 
 @dataclass(frozen=True)
 class Order:
-    """One case to be made."""
+    """Order of one case."""
 
     structure: str
     kind: str
@@ -74,17 +74,17 @@ def orders(name: str, seeds: Sequence[int]) -> list[Order]:
     """All cases of a set.
 
     tailgate: every kind of the catalogue and both nulls, the meshes in turn.
-    panels: the same on plate and panel, our fine mesh and CalculiX in turn; and the effects of
-    installed packages, on our mesh.
+    panels: the kinds of ``tailgate`` on plate and panel, our fine mesh and CalculiX in turn; and
+    the effects of installed packages, on our mesh.
     forms: on each form a null and one other kind, the kinds in turn.
     frames: on the tube frame every kind of the catalogue that beams may have, and both nulls.
-    outside: every kind outside the catalogue, and those that came into it late, the structures in
+    outside: every kind outside the catalogue, and kinds that entered it late, the structures in
     turn.
-    joints: nothing, and every kind of joint at fault, on the structures that have it; our meshes.
+    joints: nothing, and every kind of faulty joint, on the structures that have it; our meshes.
     pairs: two or three effects at once on plate and panel, our fine mesh and CalculiX in turn.
     hems: a tailgate whose hem cannot slide, all round or along a stretch, with a thinner sheet and
-    sensors that weigh something; our mesh.
-    clamps: nothing, a clamp that gives and what looks like it, on a plate in a clamp; our mesh.
+    sensors with mass; our mesh.
+    clamps: nothing, a compliant clamp and similar effects, on a plate in a clamp; our mesh.
     """
     made = {
         "tailgate": _tailgate,
@@ -183,17 +183,17 @@ def _clamps(seed: int) -> Iterator[Order]:
 
 
 def _mesh(kind: str, mesh: str, meshes: Sequence[str] = MESHES) -> str:
-    """The mesh, or the first where CalculiX has no card for the kind."""
+    """The mesh, or the first one where CalculiX has no card for the kind."""
     return meshes[0] if kind in OURS and mesh == "calculix" else mesh
 
 
 def seed_range(text: str) -> range:
-    """Seeds of a text as '600-604' or '600', both ends included.
+    """Seeds of a text such as '600-604' or '600', both ends included.
 
     Raises
     ------
     LabelError
-        If it is no range, or one that ends before it begins.
+        If it is not a range, or ends before it begins.
 
     >>> list(seed_range("600-602"))
     [600, 601, 602]
@@ -206,7 +206,7 @@ def seed_range(text: str) -> range:
 
 
 def purpose(seeds: Sequence[int]) -> Purpose:
-    """What these seeds are for.
+    """Purpose of these seeds: tune or report.
 
     Raises
     ------

@@ -12,15 +12,15 @@ from chladni.model.assembly import Assembly
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Where something is measured, driven or attached.
+    """Places and directions where a structure is measured, driven or attached.
 
     Attributes
     ----------
     labels : tuple of str
-    grids : (k,) int         of the deck, 0 where the place is no grid
+    grids : (k,) int         of the deck, 0 where the place is not a grid
     points : (k, 3)          [m]
     directions : (k, 3)      unit vectors
-    parts : tuple of str     the part each is on
+    parts : tuple of str     the part of each place
     """
 
     labels: tuple[str, ...]
@@ -33,7 +33,7 @@ class Spots:
         return len(self.labels)
 
     def only(self, chosen: np.ndarray) -> "Spots":
-        """Some of them."""
+        """The chosen places."""
         pick = [int(k) for k in chosen]
         return Spots(
             tuple(self.labels[k] for k in pick),
@@ -53,7 +53,7 @@ class Footing:
 
 
 def footing(assembly: Assembly, spots: Spots) -> Footing:
-    """Where the spots are on this mesh."""
+    """The spots as weighted means of points of this mesh."""
     rows = np.zeros((len(spots), 3), dtype=np.int64)
     weights = np.zeros((len(spots), 3))
     for name in dict.fromkeys(spots.parts):
@@ -69,15 +69,15 @@ def footing(assembly: Assembly, spots: Spots) -> Footing:
 
 
 def still_there(article: Assembly, whole: Assembly, spots: Spots) -> Footing:
-    """Where the spots are on an article: at the points they had before something was hidden in it.
+    """The spots on an article, at the same points as before an effect was hidden in it.
 
-    What is hidden makes parts of its own out of a sheet, and a sensor that stands on one of them
-    is not on the nearest shell of what is left of the sheet.
+    A hidden effect may make new parts out of a sheet.  A sensor on such a part is not on the
+    nearest shell of the remaining sheet.
 
     Raises
     ------
     ModelError
-        If the points are others, so that no spot can be found again.
+        If the points have changed, so that no spot can be found again.
     """
     n = len(whole.points)
     if len(article.points) < n or not np.array_equal(article.points[:n], whole.points):

@@ -1,4 +1,4 @@
-"""Hidden effects of what holds and drives a structure: its clamp, its shaker."""
+"""Hidden effects at the clamp and the shaker of a structure."""
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from .hidden_kinds import Kind
 
 
 def compliant_support(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A clamp on springs across its sheet and about its line, each a few times m ω_1².
+    """A clamp on springs across its sheet and about its line, in terms of m ω_1².
 
-    Along 100 to 1000 times, about it 3 to 30 times what all of the mass at its distance has.
+    The translation spring has 100 to 1000 times that stiffness. The rotation spring has 3 to 30
+    times r² m ω_1², with r the rms distance of the points from the clamp.
     """
     a, held = site.article, clamps(site.article)
     if not held:

@@ -1,4 +1,4 @@
-"""What a kind of hidden effect may know of an article, and what it does to it."""
+"""Interface of hidden effects: the article before, and the article with the effect."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -20,14 +20,14 @@ Spoil = Callable[[np.ndarray], np.ndarray]  # recorded values (n_f, n_out, n_in)
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """An article before anything is hidden in it.
+    """An article before an effect is hidden in it.
 
     Attributes
     ----------
     article : Assembly     scattered, on a mesh of its own
-    outputs : Spots        where it is measured
+    outputs : Spots        measured places
     hangers : (k, 3)       places of the cords [m]
-    drive : Spots          where it is driven
+    drive : Spots          driven place
     mass : float           [kg]
     first, f_max : float   first elastic mode, highest frequency of the fitted band [Hz]
     sheets : tuple of str  parts an effect may sit on
@@ -47,16 +47,16 @@ class Site:
 
     @property
     def size(self) -> float:
-        """Diagonal of the box round it [m]."""
+        """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.article.points, axis=0)))
 
     @property
     def scale(self) -> float:
-        """Spring that carries the whole at its first elastic frequency, m ω² [N/m]."""
+        """Stiffness m ω² of a spring under the whole mass at the first elastic frequency [N/m]."""
         return self.mass * (2 * np.pi * self.first) ** 2
 
     def part(self, rng: np.random.Generator) -> str:
-        """A sheet, large ones more often."""
+        """Name of a random sheet, larger ones more often."""
         count = np.array([len(self.rows(name)) for name in self.sheets], dtype=float)
         return str(rng.choice(np.array(self.sheets), p=count / count.sum()))
 
@@ -65,11 +65,11 @@ class Site:
         return rows_of_part(self.article, self.article.part(name))
 
     def row(self, rng: np.random.Generator) -> int:
-        """A point of a sheet."""
+        """Row of a random point of a sheet."""
         return int(rng.choice(self.rows(self.part(rng))))
 
     def normal(self, row: int, rng: np.random.Generator | None = None) -> np.ndarray:
-        """Unit normal at a point; on a beam, a direction across it, any of them where drawn."""
+        """Unit normal at a point; on a beam a direction across it, random with ``rng``."""
         n = point_normals(self.article.points, self.article.shells.nodes)[row]
         if n.any():
             return np.asarray(n)
@@ -81,7 +81,7 @@ class Site:
         return np.cos(angle) * u + np.sin(angle) * v
 
     def up(self, row: int) -> np.ndarray:
-        """How a cord pulls at a point: along the normal of a sheet; a frame of tubes lies flat."""
+        """Direction of a cord at a point: the normal of a sheet; z for a frame, which lies flat."""
         return self.normal(row) if len(self.article.shells) else np.array([0.0, 0.0, 1.0])
 
 
@@ -95,10 +95,10 @@ class Hidden:
 
     Attributes
     ----------
-    article : Assembly      what is built of masses, springs and sections is in here
+    article : Assembly      with the masses, springs and sections of the effect
     truth : dict            value, point_m, channel ...: for the seal
-    couplings : tuple       what depends on frequency or is no symmetric matrix
-    spoil : Spoil           what happens to the recording
+    couplings : tuple       parts that depend on frequency or have no symmetric matrix
+    spoil : Spoil           change of the recording
     unweighed : float       mass that is on the article in the test, not on the balance [kg]
     law : Law or None       E(s)/E - 1 of the parts that have a loss factor (of 1, as a mark)
     """
@@ -135,7 +135,7 @@ def near_outputs(site: Site) -> np.ndarray:
 
 
 def around(site: Site, row: int, radius: float) -> np.ndarray:
-    """Rows of points of the same face within a radius of one (a dozen at least), itself first."""
+    """Rows of points (a dozen at least) of the same face within a radius of one, itself first."""
     a, n = site.article, point_normals(site.article.points, site.article.shells.nodes)
     part = a.shells.part[(a.shells.nodes == row).any(axis=1)][0]
     rows = rows_of_part(a, int(part))

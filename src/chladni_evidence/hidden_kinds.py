@@ -1,4 +1,4 @@
-"""Hidden effects the catalogue knows, of any size: what is drawn at size 1 is weak."""
+"""Hidden effects of the catalogue, of any size; effects of size 1 are weak."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,25 +20,25 @@ from .hidden import Hidden, Site, near_outputs, with_lumps
 from .part_scatter import scaled
 from .response_of_article import Coupling
 
-STEEP = 0.95  # cosine between normal and grain: beyond, a shell keeps an axis of its own
+STEEP = 0.95  # cosine between normal and material axis above which a shell keeps its own axis
 FEWEST, CRACKED = 6, 4  # shells of a patch and of a crack, at least
 Kind = Callable[[Site, np.random.Generator, float], Hidden]
 
 
 def nothing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """Scatter alone."""
+    """No effect: scatter alone."""
     return Hidden(site.article, {})
 
 
 def calibration(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """E of one part off by 6 to 12 % at size 1."""
+    """A change of E of one part by 6 to 12 % at size 1."""
     part = site.part(rng)
     factor = float(np.exp(rng.choice([-1, 1]) * rng.uniform(0.06, 0.12) * size))
     return Hidden(scaled(site.article, {part: {"E": factor}}), {"part": part, "value": factor})
 
 
 def point_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """1.5 to 3 % of the mass on one point."""
+    """A point mass of 1.5 to 3 % of the article's mass."""
     row, m = site.row(rng), float(rng.uniform(0.015, 0.03)) * site.mass * size
     truth = {"value": m, "point_m": site.article.points[row].tolist()}
     return Hidden(with_lumps(site.article, np.array([row]), m), truth)
@@ -53,7 +53,7 @@ def extra_support(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """All sensors together 2 to 4 % of the mass, none of it on the balance."""
+    """Sensors of together 2 to 4 % of the mass, none of it on the balance."""
     rows = near_outputs(site)
     m = float(rng.uniform(0.02, 0.04)) * site.mass * size / len(rows)
     return Hidden(with_lumps(site.article, rows, m), {"value": m}, unweighed=m * len(rows))
@@ -62,7 +62,7 @@ def sensor_mass(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 def suspension(site: Site, rng: np.random.Generator, size: float) -> Hidden:
     """A spring to ground across the sheet at every hanger, each 2 to 8 % of m ω_1².
 
-    Of a frame of tubes, which lies flat, they are along z.
+    On a frame of tubes, which lies flat, they act along z.
     """
     a = site.article
     every = np.arange(len(a.parts))
@@ -98,7 +98,7 @@ def thinning(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def orthotropic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """Sheets rolled: E1/E2 = e^±(0.12 to 0.3), G12 off by up to 15 %."""
+    """Rolled sheets: E1/E2 = e^±(0.12 to 0.3), G12 changed by up to 15 %."""
     a, rolled = site.article, [site.article.part(name) for name in site.rolled]
     ratio = float(rng.choice([-1, 1]) * rng.uniform(0.12, 0.3)) * min(size, 2.0)
     shear = float(np.exp(rng.uniform(-0.15, 0.15) * min(size, 2.0)))
@@ -146,7 +146,7 @@ def sensor_fault(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A lump on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
+    """A mass on a spring and a dashpot, m s² (k + cs)/(m s² + cs + k), tuned into the band."""
     row = site.row(rng)
     n = site.normal(row, rng)
     m = float(rng.uniform(0.005, 0.01)) * site.mass * size
@@ -162,7 +162,7 @@ def local_resonator(site: Site, rng: np.random.Generator, size: float) -> Hidden
 
 
 def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """E of a disc of a sheet times e^-(0.5 to 0.8), its mass as it was."""
+    """A disc of a sheet with E times e^-(0.5 to 0.8) and unchanged mass."""
     mine, truth = _disc(site, rng)
     factor = float(np.exp(-rng.uniform(0.5, 0.8) * min(size, 2.5)))
     article = _with_disc(site.article, mine, "E", factor)
@@ -170,7 +170,7 @@ def stiffness_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden
 
 
 def mass_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """2 to 4 % of the mass spread over a disc of a sheet, evenly."""
+    """An added mass of 2 to 4 %, spread evenly over a disc of a sheet."""
     mine, truth = _disc(site, rng)
     a, m = site.article, float(rng.uniform(0.02, 0.04)) * site.mass * size
     area, rho = cell_areas(a.points, a.shells.nodes), value(a.parts[a.part(truth["part"])], "rho")
@@ -179,7 +179,7 @@ def mass_patch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def _disc(site: Site, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
-    """Shells (m,) bool of one part round a point of it, ``FEWEST`` at least, and where."""
+    """Shells (m,) bool of one part round a point of it, ``FEWEST`` at least, and the place."""
     a, part = site.article, site.part(rng)
     of_part = a.shells.part == a.part(part)
     if not of_part.any():
@@ -201,9 +201,9 @@ def _with_disc(a: Assembly, mine: np.ndarray, quantity: str, factor: float) -> A
 
 
 def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A membrane force in a sheet, 0.2 to 0.45 of buckling at size 1, either sign, one way more.
+    """A membrane force in a sheet, 0.2 to 0.45 of buckling at size 1, of either sign.
 
-    Across it has 0 to 1 of what it has along, or the other way round.
+    The force in one direction is 0 to 1 times the force in the other.
     """
     a, name = site.article, site.part(rng)
     part = a.part(name)
@@ -220,9 +220,9 @@ def prestress(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """Shells along a line across the sheet lose most of their bending stiffness, no membrane.
+    """A line of shells across the sheet that lose most bending but no membrane stiffness.
 
-    Its place is the middle of these shells, for the sheet may end before the line does.
+    Its place is the middle of these shells, because the sheet may end before the line does.
     """
     a = site.article
     length = float(rng.uniform(0.12, 0.2)) * site.size * float(np.clip(size, 1.0, 3.0))
@@ -247,7 +247,7 @@ def crack(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.ndarray]:
-    """The part at a point, and its shells (m,) bool on a line through it across its length."""
+    """The part at a point; its shells (m,) bool on a line ``angle`` from the part's cross axis."""
     a, n = site.article, site.normal(row)
     p = int(a.shells.part[(a.shells.nodes == row).any(axis=1)][0])
     e = _longest(a.points[site.rows(a.parts[p].name)])
@@ -260,7 +260,7 @@ def _along(site: Site, row: int, angle: float, length: float) -> tuple[int, np.n
 
 
 def _longest(points: np.ndarray) -> np.ndarray:
-    """Direction in which points (n, 3) lie farthest apart."""
+    """Direction of the largest extent of points (n, 3)."""
     d = points - points.mean(axis=0)
     return np.asarray(np.linalg.eigh(d.T @ d)[1][:, -1])
 

@@ -1,8 +1,8 @@
-"""How well poles are found in recordings whose poles are known: errors, coverage, inventions.
+"""Test of identification on recordings with known poles: errors, coverage, invented poles.
 
-Fifteen modes between 22 and 190 Hz with the damping of a bare car body part (0.4 to 1.3 %), thirty
-outputs, one shaker, 900 lines at even steps of the logarithm; a suspension below the band and six
-modes above it, so that the band's ends are those of a structure and no residual term is exact.
+Fifteen modes between 22 and 190 Hz have the damping of a bare car body part (0.4 to 1.3 %). There
+are thirty outputs, one shaker and 900 lines at even steps of the logarithm. A suspension below the
+band and six modes above it make the band's ends realistic, so no residual term is exact.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,13 +31,13 @@ KINDS = {
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A structure whose poles are known: (r,) poles [rad/s], (n, r) shapes, driven at the first."""
+    """A structure with known poles (r,) [rad/s] and shapes (n, r), driven at the first output."""
 
     poles: np.ndarray
     shapes: np.ndarray
 
     def accelerance(self, f: np.ndarray) -> np.ndarray:
-        """-ω² Σ φ φ_d / (ω_r² - ω² + 2iζω_rω) (n_f, n)."""
+        """Accelerance -ω² Σ φ φ_d / (ω_r² - ω² + 2iζω_rω) (n_f, n)."""
         w, size = 2 * np.pi * f[:, None], np.abs(self.poles)
         h = -(w**2) / (size**2 - w**2 - 2j * self.poles.real * w)
         return h @ (self.shapes * self.shapes[0]).T
@@ -50,7 +50,7 @@ class Known:
 
 
 def structure(seed: int, inside: int = INSIDE, channels: int = CHANNELS) -> Known:
-    """Modes a random distance apart, random shapes that the shaker drives."""
+    """A structure of random modal spacing and random shapes, all driven by the shaker."""
     rng = np.random.default_rng(seed)
     step = np.log(190 / 22) / (inside - 1)
     f = 22 * np.exp(step * (np.arange(inside) + rng.uniform(-0.35, 0.35, inside)))
@@ -78,15 +78,15 @@ def recording(known: Known, kind: str, seed: int, lines: int = LINES) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """One recording against its truth, mode by mode of those a recording can show.
+    """Errors of one recording, mode by mode for modes that a recording can show.
 
     Attributes
     ----------
     frequency, damping : (k,)   relative errors of the modes found
     z_frequency, z_damping : (k,)   the same over their stated standard deviations
     bound : (k,)       Cramér-Rao standard deviation of the frequency over the frequency
-    visible, missed : int    modes that pay for themselves at the true poles; of those, not found
-    invented : int     poles called firm that are no mode
+    visible, missed : int    modes with significant χ² at the true poles; number of them not found
+    invented : int     poles called firm that are not modes
     """
 
     frequency: np.ndarray
@@ -100,7 +100,7 @@ class Found:
 
 
 def held_against(known: Known, frf: FRF, variance: np.ndarray, found: Identified) -> Found:
-    """Each pole belongs to the nearest true one within its half bandwidth, the nearest first."""
+    """Compare each pole with the nearest true one within its half bandwidth, nearest first."""
     due, (sd, pays) = known.inside, _cramer_rao(known, frf, variance)
     f, zeta = np.abs(due) / (2 * np.pi), -due.real / np.abs(due)
     gap = np.abs(found.poles[:, None] - due)
@@ -126,7 +126,7 @@ def held_against(known: Known, frf: FRF, variance: np.ndarray, found: Identified
 
 
 def _cramer_rao(known: Known, frf: FRF, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least sd of the frequencies [Hz], and which modes pay for themselves, at the true poles."""
+    """Least sd of the frequencies [Hz], and a mask of significant modes, at the true poles."""
     top = 2 * np.pi * BAND[1]
     w = np.sqrt(2 / variance[:, :, 0]) * top**2
     data = PoleData(2j * np.pi * frf.frequency / top, frf.values[:, :, 0] / top**2, w, 2)
@@ -143,12 +143,12 @@ def _cramer_rao(known: Known, frf: FRF, variance: np.ndarray) -> tuple[np.ndarra
 def table(
     seeds: Sequence[int], kinds: Sequence[str], say: Callable[[str], None]
 ) -> dict[str, list[Found]]:
-    """Every kind of noise over all seeds; a line each as soon as it is done.
+    """Results of every kind of noise over all seeds; each is reported when it is done.
 
     Raises
     ------
     LabelError
-        If a kind is none.
+        If a kind is unknown.
     """
     if unknown := sorted(set(kinds) - set(KINDS)):
         raise LabelError(f"no noise {unknown}; there are {', '.join(map(repr, KINDS))}")

@@ -1,4 +1,4 @@
-"""Hidden effects of joints, in structures that have these."""
+"""Hidden effects of joints, in structures that have such joints."""
 
 from dataclasses import replace
 
@@ -14,12 +14,12 @@ from .hidden import Hidden, Site
 from .hidden_kinds import Kind
 from .part_scatter import scaled
 
-SOFTEST = 20e9  # [Pa] of a weld: solids of less are adhesive
-REDRAWN = np.log(1.5)  # ln of the growth of a size: at every one another weld is drawn
+SOFTEST = 20e9  # [Pa] least E of a weld: softer solids are adhesive
+REDRAWN = np.log(1.5)  # ln of the growth of a size: another weld is drawn for every size
 
 
 def weld_missing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """One weld or screw is not there; where a size has to grow, it is another one."""
+    """A missing weld or screw; a larger size draws another one."""
     a = site.article
     order = rng.permutation(sum(len(rows) for _, rows in _welds(a)) + len(_screws(a)))
     k = int(order[round(float(np.log(size) / REDRAWN)) % len(order)])
@@ -40,7 +40,7 @@ def weld_missing(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def _welds(a: Assembly) -> list[tuple[int, np.ndarray]]:
-    """(group, rows) of solids of metal, each one a weld."""
+    """Group and rows of metal solids, for each weld."""
     hard = np.array([_modulus(p.section) >= SOFTEST for p in a.parts])
     return [(k, np.flatnonzero(hard[group.part])) for k, group in enumerate(a.solids)]
 
@@ -56,24 +56,24 @@ def _modulus(section: object) -> float:
 
 
 def adhesive(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The adhesive of one part softer or stiffer by e^3 to e^4 at size 1."""
+    """Adhesive of one part that is softer or stiffer by e^3 to e^4 at size 1."""
     a = site.article
     soft = [p.name for p in a.parts if 0 < _modulus(p.section) < SOFTEST]
     if not soft:
         raise ModelError("the article has no adhesive")
     name, way = str(rng.choice(soft)), float(rng.choice([-1, 1]))
     section = a.parts[a.part(name)].section
-    way = -1.0 if _modulus(section) > 1e9 else way  # a layer of epoxy could hardly hold more
+    way = -1.0 if _modulus(section) > 1e9 else way  # a stiffer epoxy layer would change little
     factor = float(np.exp(way * rng.uniform(3.0, 4.0) * size))
     made = scaled(a, {name: {"E": factor}})
     return Hidden(made, {"value": _modulus(section) * factor, "part": name})
 
 
 def viscoelastic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The adhesive of one part is a mastic, E_r (1 + Δ (sτ)^b / (1 + (sτ)^b)): Zener's, fractional.
+    """Mastic as adhesive of one part, E_r (1 + Δ (sτ)^b / (1 + (sτ)^b)): fractional Zener solid.
 
-    E of the bead falls by e^3 to e^4 at size 1 in the middle of the band, where it is told with its
-    loss factor; Δ, b and where in the band the loss is largest are drawn (Pritz 1996, J. Sound and
+    E of the bead falls by e^3 to e^4 at size 1 in the middle of the band. E and loss factor are
+    stated there.  Δ, b and the frequency of largest loss are drawn (Pritz 1996, J. Sound and
     Vibration 195, 103: four parameters for real polymers).
     """
     a = site.article
@@ -110,14 +110,14 @@ def viscoelastic(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def hem(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The sheets of a string do not slide anywhere along it, 1e9 to 1e10 N/m² at size 1."""
+    """A hem that does not slide anywhere along its string, 1e9 to 1e10 N/m² at size 1."""
     line, k = _line(site), _grip(rng) * size
     made = _gripped(site.article, line, np.ones(len(line), bool), k)
     return Hidden(made, {"value": k, "K": k})
 
 
 def hem_stretch(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """The same on a fifth to a half of the string; its place is the middle of the stretch."""
+    """A hem that does not slide on a fifth to a half of its string, placed at its middle."""
     line, k = _line(site), _grip(rng) * size
     middle, L = rng.uniform(0, line.length), line.length * float(rng.uniform(0.2, 0.5))
     d = np.abs(line.from_place(float(middle)))

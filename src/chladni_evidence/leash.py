@@ -1,6 +1,6 @@
-"""Processes that end when whoever started them does, however that ended.
+"""Processes that end when their parent process ends, for whatever reason.
 
-Without it a killed run leaves diagnoses behind that go on for minutes, in the way of the next.
+Otherwise a killed run leaves diagnoses that continue for minutes and disturb the next run.
 """
 
 import multiprocessing
@@ -14,7 +14,7 @@ from multiprocessing.connection import wait
 
 
 def leash_to_parent() -> None:
-    """Of a worker of a pool: watch the process that started it, which alone is interrupted."""
+    """Watch the parent process from a worker of a pool; only the parent is interrupted."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
@@ -23,7 +23,7 @@ def leash_to_parent() -> None:
 
 
 def main() -> None:
-    """``python -m chladni_evidence.leash``: chladni, until its standard input ends."""
+    """Run chladni until standard input ends, as ``python -m chladni_evidence.leash``."""
     _end_after(lambda: os.read(sys.stdin.fileno(), 1))
     runpy.run_module("chladni", run_name="__main__", alter_sys=True)
 

@@ -1,4 +1,4 @@
-"""One case: an article with something hidden, measured; a folder for the user, a seal beside it."""
+"""One case: a measured article with a hidden effect, a folder for the user and a sealed truth."""
 
 import hashlib
 import json
@@ -45,10 +45,10 @@ from .part_scatter import scattered
 from .response_of_article import accelerance, decades_apart, seen
 
 KINDS: dict[str, Kind] = {**CATALOGUED, **OUTSIDE, **JOINTS, **HELD}
-UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # as large as they are
-TWICE = 2.0  # an effect moves the responses at least this many times as far as the scatter does
+UNSIZED = ("nothing", "sensor-fault", "duplicated-pair")  # kinds without a size
+TWICE = 2.0  # least change of responses by an effect, over that by scatter
 FULL = 0.15  # scatter beyond which the measure saturates [rms decades]
-NOTHING = 0.02  # an effect that moves less is none: a bad draw [rms decades]
+NOTHING = 0.02  # an effect that changes less is a bad draw [rms decades]
 GROWTH, TRIES, COARSE = 1.5, 5, 250  # the size is found on about COARSE lines of the band
 CHAIN = MeasurementChain(noise=0.01, floor=0.001)
 DAMPING_SPREAD = 0.3  # of ln ζ between modes
@@ -57,9 +57,9 @@ LIGHT = 5e-4  # error of the balance, relative
 
 @dataclass(frozen=True, eq=False)
 class MadeCase:
-    """What the user has (bench, recording, weighed mass) and what is sealed.
+    """Data of the user (bench, recording, weighed mass) and the sealed truth.
 
-    ``benched`` is what the lab knows of a recording that the virtual bench made.
+    ``benched`` is the laboratory's knowledge of a recording of the virtual bench.
     """
 
     bench: Bench
@@ -74,8 +74,8 @@ class _Rig:
     """Solves articles of one case for their noiseless responses at the sensors."""
 
     bench: Bench
-    outputs: Spots  # where sensors truly sit and which way they feel
-    article: Assembly  # before anything is hidden in it
+    outputs: Spots  # true places and directions of the sensors
+    article: Assembly  # before an effect is hidden in it
     zeta: np.ndarray
     cache: Path | None
     residual_bending: bool
@@ -83,7 +83,7 @@ class _Rig:
     def responses(
         self, hidden: Hidden, lines: np.ndarray, solver: Solver = "chladni"
     ) -> tuple[np.ndarray, ArticleModes]:
-        """Accelerance (n_f, n_out, 1) and the modes it was made of."""
+        """Accelerance (n_f, n_out, 1) and its modes."""
         a = hidden.article
         out = still_there(a, self.article, self.outputs)
         drive = still_there(a, self.article, self.bench.drive)
@@ -108,22 +108,22 @@ def made_case(
     bench: Bench, kind: str, seed: int, mesh: str, cache: Path | None = None,
     recorder: Recorder = PLAIN,
 ) -> MadeCase:  # fmt: skip
-    """An article of one of the bench's meshes with part scatter and an effect, measured.
+    """Measure an article of one of the bench's meshes, with part scatter and an effect.
 
-    The effect grows (up to fivefold) until it moves the responses over the fitted band by twice
-    what the scatter moves them, or twice ``FULL`` where that is less; both figures (rms decades)
-    are in the truth. Of several at once each does so alone, and the figure is the least of them.
-    On CalculiX' mesh the size is found with our elements, the recording comes from CalculiX.
+    The effect grows (up to fivefold) until it changes the responses over the fitted band enough.
+    The limit is twice the change by scatter, or twice ``FULL`` where that is less.  Both figures
+    (rms decades) are in the truth. With several effects each does so alone, and the figure is the
+    least of them. On CalculiX' mesh our elements give the size, and CalculiX the recording.
 
     Parameters
     ----------
-    recorder : "independent noise" on every line, or a test on the virtual bench; what depends on
-        frequency by a law of its own (rotors, foam, friction, lumps) keeps the first
+    recorder : "independent noise" on every line, or a test on the virtual bench; effects with a law
+        of frequency of their own (rotors, foam, friction, lumps) always have the first
     """
     common = [seed, *bench.name.encode(), *mesh.encode()]
     rng, noise = np.random.default_rng(common), np.random.default_rng([*common, *kind.encode()])
     plain = bench.meshes[mesh]()
-    article, scales = scattered(plain, rng)  # one article a seed: whatever is hidden, it is in it
+    article, scales = scattered(plain, rng)  # one article a seed, for all hidden effects
     zeta = ZETA * np.exp(DAMPING_SPREAD * rng.normal(size=2000))
     bending = bool(rng.integers(2))
     kind_of_sensor = AccelerometerType()
@@ -171,9 +171,9 @@ def made_case(
 
 
 def _ordinary(deck: Assembly, article: Assembly) -> dict[str, Any]:
-    """E, rho, t [SI] and wall [of the deck's] of sheets and tubes, what each part weighs.
+    """E, rho, t [SI] and wall [of the deck's] of sheets and tubes, and the mass of each part.
 
-    The wall is what the area became.
+    The wall is given by the ratio of the areas.
     """
     known: dict[str, dict[str, float]] = {q: {} for q in ("E", "rho", "t", "wall")}
     weight = {}
@@ -214,7 +214,7 @@ def _sized(
     rig: _Rig, site: Site, kind: str, seed: list[int], own: np.ndarray, scatter: float,
     band: np.ndarray,
 ) -> tuple[Hidden, float, float]:  # fmt: skip
-    """The effect at the smallest size that does, how far it moves the responses, and the size."""
+    """The effect at the smallest sufficient size, its change of the responses, and the size."""
     size, hide = 1.0, KINDS.get(kind) or package_kinds()[kind]
     for _ in range(TRIES):
         hidden = hide(site, np.random.default_rng(seed), size)
@@ -237,7 +237,7 @@ def _spoiled(frf: FRF, hidden: Hidden) -> FRF:
 
 
 def write_case(case: MadeCase, folder: Path, sealed: Path) -> str:
-    """The case as a user would have it, elsewhere the truth; the hash of the sealed file."""
+    """Write the case as a user has it, and the truth elsewhere; return the hash of the truth."""
     folder.mkdir(parents=True, exist_ok=True)
     write_assembly(case.bench.deck, folder / "deck.bdf", units("mm-t-s"))
     title = stamp(case.benched.averages, 0.0) if case.benched else "NONE"
@@ -253,12 +253,12 @@ def seal_hash(sealed: Path) -> str:
 
 
 def opened(sealed: Path) -> dict[str, Any]:
-    """The truth."""
+    """The truth of a case."""
     return dict(json.loads(sealed.read_text(encoding="utf-8")))
 
 
 def _sensors(case: MadeCase) -> str:
-    """The table of sensors and the shaker, with their masses where the bench put them on."""
+    """Table of the sensors and the shaker, with their masses where the bench attached them."""
     bench, known = case.bench, case.benched
     masses = (known.sensor_mass, known.gauge_mass) if known else (0.0, 0.0)
     rows = ["label,grid,x,y,z,nx,ny,nz,role" + ",mass" * (known is not None)]

@@ -1,4 +1,4 @@
-"""Injuries to files as they happen to users: cut, doubled, misspelt, of the wrong kind, damaged."""
+"""Injuries to files, as users have them: cut, doubled, misspelt, of the wrong kind, damaged."""
 
 import io
 import random
@@ -15,7 +15,7 @@ WORDS = (
 
 
 def injured_text(data: bytes, rng: random.Random) -> bytes:
-    """One to three injuries to the lines of a text."""
+    """A text with one to three injuries to its lines."""
     for _ in range(rng.randint(1, 3)):
         lines = data.splitlines(keepends=True) or [b"\n"]
         kind = rng.choice(_TEXT)
@@ -52,21 +52,21 @@ def _byte(lines: Lines, k: int, rng: random.Random) -> Lines:
 
 
 def _letter(lines: Lines, k: int, rng: random.Random) -> Lines:
-    """A word misspelt."""
+    """Misspell a word."""
     line = lines[k]
     at = rng.randrange(len(line))
     return [*lines[:k], line[:at] + line[at : at + 1] + line[at:], *lines[k + 1 :]]
 
 
 def _field(lines: Lines, k: int, rng: random.Random) -> Lines:
-    """A field of eight columns is another word."""
+    """Replace a field of eight columns by another word."""
     line, at = lines[k], 8 * rng.randrange(1, 10)
     word = rng.choice(WORDS).encode()[:8].rjust(8)
     return [*lines[:k], line[:at].ljust(at) + word + line[at + 8 :], *lines[k + 1 :]]
 
 
 def _token(lines: Lines, k: int, rng: random.Random) -> Lines:
-    """A word between commas or blanks is another."""
+    """Replace a word between commas or blanks."""
     line = lines[k]
     mark = b"," if b"," in line else b" "
     tokens = line.rstrip(b"\r\n").split(mark)
@@ -75,7 +75,7 @@ def _token(lines: Lines, k: int, rng: random.Random) -> Lines:
 
 
 def _negated(lines: Lines, k: int, rng: random.Random) -> Lines:
-    """A number of another sign or size."""
+    """Change the sign or size of a number."""
     line = lines[k]
     digits = [i for i in range(len(line)) if line[i : i + 1].isdigit()]
     if not digits:
@@ -105,7 +105,7 @@ def injured_archive(data: bytes, rng: random.Random) -> bytes:
 
 
 def packed(arrays: dict[str, np.ndarray]) -> bytes:
-    """An NPZ, arrays of objects included, which no reader may unpickle."""
+    """Bytes of an NPZ, also with arrays of objects, which a reader must not unpickle."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, value in arrays.items():

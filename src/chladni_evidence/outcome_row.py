@@ -1,4 +1,4 @@
-"""An answer held against the opened truth: one row of the table."""
+"""Comparison of an answer with the opened truth: one row of the table."""
 
 import re
 from collections import Counter
@@ -22,7 +22,7 @@ ALSO = {  # names that are right as well
     "friction-joint": ("joint-friction", "viscoelastic-joint"),
     "foam": ("viscoelastic-joint", "compliant-support"),
 }
-KIN = (  # what changes the same operator: the right family, if not the right name
+KIN = (  # effects that change the same operator: the right family, if not the right name
     {"thickness-distribution", "orthotropic-material", "stiffness-patch", "crack",
      "membrane-prestress"},
     {"weld-missing", "weld-compliance", "adhesive-stiffness", "hem-contact", "contact-stiffness",
@@ -31,7 +31,7 @@ KIN = (  # what changes the same operator: the right family, if not the right na
     {"local-resonator", "suspension", "extra-support", "compliant-support", "shaker-restraint"},
     {"sensor-fault", "chain-delay", "duplicated-pair"},
 )  # fmt: skip
-NEAR = {"tailgate": 0.150}  # a place this far off is right [m]; else ``CLOSE``
+NEAR = {"tailgate": 0.150}  # largest distance of a right place [m]; else ``CLOSE``
 CLOSE = 0.060
 DRAWN_IN = 1.645 / 1.960  # intervals are written for 95 %, and scored for 90 %
 VETO = re.compile(
@@ -41,13 +41,13 @@ VETO = re.compile(
 
 
 def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
-    """One case.
+    """The row of one case.
 
-    ``outcome``: right, part (of several that were hidden some, and nothing else), wrong, none
-    (nothing named where something was hidden), admitted (it says it does not know), among (one of
-    several it cannot tell, the right one with them), refused, crash. ``by_evidence`` is the outcome
-    had the held-out data no veto. ``plain`` is what calibration alone answers, whose figures stand
-    beside those of the diagnosis.
+    ``outcome`` is one of: right; part (some of several hidden effects, and nothing else); wrong;
+    none (no name, though an effect was hidden); admitted (the answer is "not known"); among
+    (several indistinguishable names, one of them right); refused; crash. ``by_evidence`` is the
+    outcome without the veto of held-out data. ``plain`` is the answer of calibration alone, for
+    comparison.
     """
     d, kind = answer.result, truth["effect"]
     truth = {**truth, "effect": catalogued(kind)}
@@ -81,20 +81,20 @@ def row(answer: Answer, truth: Row, plain: Answer | None = None) -> Row:
 
 
 def called(d: Row) -> str:
-    """The names given, else the verdict."""
+    """The names in an answer, else its verdict."""
     if d.get("verdict") in NAMED and d.get("effects"):
         return AND.join(sorted(str(e["name"]) for e in d["effects"]))
     return str(d.get("verdict", ""))
 
 
 def _vetoed(d: Row) -> str | None:
-    """The effect that led in evidence and was refused for what it does to the held-out data."""
+    """The effect that led in evidence and was refused because of the held-out data."""
     found = [m[1] for note in d.get("notes") or [] if (m := VETO.match(note))]
     return found[0] if found else None
 
 
 def outcome_of(answer: Answer, name: str, truth: Row) -> str:
-    """What an answer that gives this name is, held against the truth."""
+    """Outcome of an answer with this name, compared with the truth."""
     if answer.crashed:
         return "crash"
     if answer.code == 2:
@@ -119,14 +119,14 @@ def _is(called: str, truth: Row) -> bool:
 
 
 def _kin(called: str, truth: Row) -> bool:
-    """Whether the name given is of the family of what was hidden."""
+    """True where the name belongs to the family of the hidden effect."""
     alike = any({called, truth["effect"]} <= family for family in KIN)
     null = called in PLAINLY and truth["effect"] in NULLS
     return _is(called, truth) or alike or null
 
 
 def _channel(d: Row, truth: Row) -> bool:
-    """A fault must be found in its channel (of a pair: in either)."""
+    """True where a fault is found in its channel (for a pair: in either)."""
     if "channel" not in truth or not d.get("effects"):
         return True
     return bool(
@@ -135,9 +135,10 @@ def _channel(d: Row, truth: Row) -> bool:
 
 
 def _place(d: Row, truth: Row) -> float | None:
-    """Distance of the place named from the true one [m]; of several the largest.
+    """Distance between the named and the true place [m]; the largest where there are several.
 
-    One effect is held against the truth whatever its name, one of several against its namesake.
+    A single effect is compared with the truth under any name.  One of several is compared with the
+    hidden effect of the same name.
     """
     hidden = truth.get("effects") or [{**truth, "effect": None}]
     away = [
@@ -149,14 +150,14 @@ def _place(d: Row, truth: Row) -> float | None:
 
 
 def _points(d: Row, name: str | None) -> list[list[float]]:
-    """Places that were named, of this effect, or of the first."""
+    """Named places of this effect, or of the first one without a name."""
     effects = d.get("effects") or []
     those = effects[:1] if name is None else [e for e in effects if e["name"] == name]
     return [e["where"]["point_m"] for e in those if e["where"].get("point_m")]
 
 
 def _gain(d: Row) -> float | None:
-    """How far the effect brings the held-out Q from plain calibration's to the floor."""
+    """Share of the way from plain calibration's held-out Q to the floor that the effect gains."""
     held = (d.get("fit") or {}).get("held_out") or {}
     before, after = held.get("Q_calibrated"), held.get("Q_with_effect")
     if before is None or after is None or not d.get("effects"):
@@ -166,7 +167,7 @@ def _gain(d: Row) -> float | None:
 
 
 def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
-    """{E, rho, t, wall, effect: [90 % intervals that hold the truth, intervals]}."""
+    """Numbers of 90 % intervals that hold the truth, and of all, for E, rho, t, wall, effect."""
     count = {name: [0, 0] for name in (*QUANTITIES, "effect")}
     of_effect = (("effect", entry, true) for entry, true in _named(d, truth))
     for name, entry, true in (*_ordinary(d, truth), *of_effect):
@@ -176,9 +177,9 @@ def _covered(d: Row, truth: Row) -> dict[str, list[int]]:
 
 
 def _holds(entry: Row, true: float) -> bool:
-    """Whether the 90 % interval within a written one of 95 % holds the truth.
+    """True where the 90 % interval within a written one of 95 % holds the truth.
 
-    Of positive numbers the ends are drawn in by their logarithms, as they were laid out.
+    Intervals of positive numbers are narrowed in the logarithm, in which they were computed.
     """
     value, ends = entry["value"], (entry["low"], entry["high"])
     if min(value, *ends) > 0:
@@ -189,7 +190,7 @@ def _holds(entry: Row, true: float) -> bool:
 
 
 def _ordinary(d: Row, truth: Row) -> Iterator[tuple[str, Row, float]]:
-    """(E, rho, t or wall, what was calibrated, the truth); of parts together their mean.
+    """Name (E, rho, t or wall), calibrated entry and truth; parts together have a mean truth.
 
     The mean is of logarithms, weighted with the parts' mass.
     """
@@ -204,9 +205,9 @@ def _ordinary(d: Row, truth: Row) -> Iterator[tuple[str, Row, float]]:
 
 
 def _named(d: Row, truth: Row) -> Iterator[tuple[Row, float]]:
-    """(what is said of an effect, the truth): by its name, or the first of it the value.
+    """Reported entry of an effect and its truth: by name, or the first entry for ``value``.
 
-    Two of one family are not told apart here.
+    Two effects of one family are not distinguished here.
     """
     hidden = Counter(members(truth["effect"]))
     if Counter(members(called(d))) != hidden:
@@ -224,7 +225,7 @@ def _is_estimate(entry: Row) -> bool:
 
 
 def _figures(d: Row, truth: Row) -> Row:
-    """How far off an answer is: mass, E, rho and t (mean |ln|), held-out Q and its floor."""
+    """Errors of an answer: mass, E, rho and t (mean |ln|), held-out Q and its floor."""
     off: Row = {"mass": _mass_off(d, truth)}
     for name in ("E", "rho", "t"):
         each = [abs(np.log(e["value"] / x)) for q, e, x in _ordinary(d, truth) if q == name]
@@ -237,7 +238,7 @@ def _figures(d: Row, truth: Row) -> Row:
 
 
 def _mass_off(d: Row, truth: Row) -> float | None:
-    """Of what the deck weighs without its sensors."""
+    """Error of the mass of the deck without its sensors."""
     model = (d.get("mass") or {}).get("model_kg")
     return None if model is None else float(abs(np.log(model / truth["mass_kg"])))
 
@@ -249,7 +250,7 @@ def _times(truth: Row) -> float | None:
 
 
 def line(r: Row) -> str:
-    """One case in a line."""
+    """A line of text for one case."""
     words = [f"{r['structure']}, {r['mesh']}, seed {r['seed']}: {r['effect']}"]
     if r["times_scatter"] is not None:
         words[0] += f" ({r['times_scatter']:.1f} x scatter)"

@@ -1,4 +1,4 @@
-"""Rows of a blind benchmark as tables: rates by what was hidden, confusion, all in a few lines."""
+"""Tables of a blind benchmark: rates by hidden effect, confusion matrix, overall rates."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -9,7 +9,7 @@ from .outcome_row import NULLS, QUANTITIES, Row
 from .outside_kinds import OUTSIDE
 
 OUTCOMES = ("right", "part", "among", "wrong", "none", "admitted", "refused", "crash")
-FIGURES = {  # of what is held beside plain calibration: what it is, its factor
+FIGURES = {  # figures compared with plain calibration: text and factor
     "mass": ("mass off, %", 100.0),
     "E": ("E off, %", 100.0),
     "rho": ("rho off, %", 100.0),
@@ -20,15 +20,15 @@ FIGURES = {  # of what is held beside plain calibration: what it is, its factor
 
 
 def tables(rows: Sequence[Row]) -> str:
-    """All that a score says."""
+    """All tables of a score."""
     return "\n\n".join([table(rows), confusion(rows), overall(rows), beside(rows)])
 
 
 def table(rows: Sequence[Row]) -> str:
-    """By hidden effect: how it came out, right family, right by evidence alone, place, gain.
+    """Table by hidden effect: outcomes, right family, right by evidence alone, place, gain.
 
-    ``near`` and ``gain>50%`` are of the right ones: how many were placed well, and how many went
-    half of the way from calibration's held-out Q to the floor.
+    ``near`` and ``gain>50%`` count right answers. ``near`` are those at the right place.
+    ``gain>50%`` are those that went half of the way from calibration's held-out Q to the floor.
     """
     wide = 2 + max([len(r["effect"]) for r in rows], default=6)
     heads = (*OUTCOMES, "family", "evidence", "near", "gain>50%")
@@ -46,7 +46,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def confusion(rows: Sequence[Row]) -> str:
-    """The confusion matrix: hidden effects down, names given across."""
+    """The confusion matrix: hidden effects in rows, names of the answers in columns."""
     names = sorted({r["effect"] for r in rows})
     given = sorted({_given(r) for r in rows})
     count = Counter((r["effect"], _given(r)) for r in rows)
@@ -60,12 +60,12 @@ def confusion(rows: Sequence[Row]) -> str:
 
 
 def _given(r: Row) -> str:
-    """The name or verdict given; where there is none, how it ended."""
+    """The name or verdict of an answer; the outcome where it has neither."""
     return str(r["outcome"] if r["outcome"] == "crash" else r["called"] or r["outcome"])
 
 
 def overall(rows: Sequence[Row]) -> str:
-    """Rates over all."""
+    """Rates over all cases."""
     return "\n".join([*_names(rows), *_figures(rows), *_costs(rows)])
 
 
@@ -113,7 +113,7 @@ def _costs(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def beside(rows: Sequence[Row]) -> str:
-    """Plain calibration and the diagnosis on the same cases: medians where something is hidden."""
+    """Plain calibration and the diagnosis on the same cases with effects: medians."""
     both = [
         (r["beside"]["calibration"], r["beside"]["diagnosis"])
         for r in rows

@@ -1,4 +1,4 @@
-"""Hidden effects no catalogue of ours has: the diagnosis should say that it does not know."""
+"""Hidden effects outside the catalogue, for which the diagnosis should report "not known"."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ PATCH = 0.06  # radius of rotors' feet and foam, of the structure's size
 
 
 def _patch(site: Site, rng: np.random.Generator) -> tuple[int, np.ndarray]:
-    """A point of a sheet and up to forty round it, in the same face and spread both ways."""
+    """A point of a sheet and up to forty around it, in the same face and in both directions."""
     for _ in range(200):
         row = site.row(rng)
         rows = around(site, row, PATCH * site.size)[:40]
@@ -30,9 +30,9 @@ def _patch(site: Site, rng: np.random.Generator) -> tuple[int, np.ndarray]:
 
 
 def rotor(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A spinning disc: torques h n x θ', which couple tilting about two axes (gyroscopic).
+    """A spinning disc: gyroscopic torques h n x θ', which couple tilting about two axes.
 
-    θ comes from the deflection round its foot by least squares.
+    θ follows from the deflection around its foot by least squares.
     """
     row, rows = _patch(site, rng)
     n = site.normal(row)
@@ -68,9 +68,10 @@ def foam(site: Site, rng: np.random.Generator, size: float) -> Hidden:
 
 
 def friction(site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """A joint that slips, as it looks at one level: softer, and with a loss factor of its own.
+    """A slipping joint, linearised at one level: softer, and with a loss factor of its own.
 
-    Of solids the fifth of all joints nearest to one of them; of beams those at one end of one.
+    With solids it is the fifth of all joints nearest to one joint.  With beams it is the beams at
+    one end of a beam.
     """
     a = site.article
     soft, eta = 0.2 / size**3, float(rng.uniform(0.4, 0.8))

@@ -1,4 +1,4 @@
-"""Hidden effects of installed packages: each by the ``conceal`` of its own family."""
+"""Hidden effects of installed packages, made by the ``conceal`` of their family."""
 
 from functools import partial
 
@@ -12,14 +12,14 @@ from .hidden_kinds import Kind
 
 
 def package_kinds() -> dict[str, Kind]:
-    """By name, those that act on any structure; ours are hidden by code of their own."""
+    """Kinds by name that act on any structure; our own effects have other code."""
     own = {family.name for family in registry.BUILT_IN}
     others = [f for f in registry.families() if f.name not in own and not f.needs]
     return {family.name: partial(_concealed, family) for family in others}
 
 
 def _concealed(family: Family, site: Site, rng: np.random.Generator, size: float) -> Hidden:
-    """As large as the family draws it, whatever ``size`` says."""
+    """The effect as the family draws it, regardless of ``size``."""
     a, outputs = site.article, near_outputs(site)
     distance = np.linalg.norm(a.points[:, None] - site.hangers, axis=2)
     hangers = a.ids[distance.argmin(axis=0)]

@@ -1,4 +1,4 @@
-"""Articles with two or three effects at once, each as large as it would be alone."""
+"""Articles with two or three effects at once, each as large as in an article of its own."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,8 +12,8 @@ from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED
 from .joint_kinds import JOINTS
 
-AND = " + "  # between the names of what is hidden
-APART = 0.25  # of the structure's size lie between two places, at least
+AND = " + "  # between the names of hidden effects
+APART = 0.25  # least distance between two places, over the structure's size
 DRAWS = 50
 PAIRS = (
     "sensor-mass + extra-support",
@@ -34,7 +34,7 @@ Sized = Callable[[str, list[int]], tuple[Hidden, float, float]]
 
 
 def members(kind: str) -> list[str]:
-    """Names of what a kind hides at once.
+    """Names of the effects that a kind hides together.
 
     >>> members("sensor-mass + extra-support")
     ['sensor-mass', 'extra-support']
@@ -43,7 +43,7 @@ def members(kind: str) -> list[str]:
 
 
 def catalogued(kind: str) -> str:
-    """A kind by the names that the catalogue has for what it hides.
+    """A kind in the catalogue's names of its effects.
 
     >>> catalogued("hem-stretch + sensor-mass")
     'hem-contact + sensor-mass'
@@ -54,16 +54,16 @@ def catalogued(kind: str) -> str:
 def together(
     site: Site, kind: str, seed: int, sized: Sized
 ) -> tuple[Hidden, list[dict[str, Any]], float]:
-    """All members in one article: the article, the truth of each, how far the least moves it.
+    """Hide all members in one article: the article, the truth of each, the least change by one.
 
     Parameters
     ----------
-    sized : a kind and its seed -> the effect alone, how far it moves the responses, its size
+    sized : a kind and its seed -> the effect alone, its change of the responses, its size
 
     Raises
     ------
     ModelError
-        If two of them find no places that lie apart.
+        If two of them find no separate places.
     """
     made, told, least = Hidden(site.article, {}), list[dict[str, Any]](), np.inf
     for k, name in enumerate(members(kind)):
@@ -84,14 +84,14 @@ def together(
 
 
 def _apart(site: Site, truth: dict[str, Any], others: list[dict[str, Any]]) -> bool:
-    """Whether a place, if there is one, is none that another one has."""
+    """True where an effect has no place, or one apart from the places of the others."""
     places = [t["point_m"] for t in others if "point_m" in t]
     away = [np.linalg.norm(np.subtract(truth.get("point_m", p), p)) for p in places]
     return "point_m" not in truth or all(d > APART * site.size for d in away)
 
 
 def _both(first: Hidden, then: Hidden) -> Hidden:
-    """What ``then`` hid in the article of ``first``, and all that ``first`` did beside it."""
+    """The article of ``then``, hidden in that of ``first``, with the other changes of both."""
     return Hidden(
         then.article, {}, (*first.couplings, *then.couplings),
         lambda values: then.spoil(first.spoil(values)), first.unweighed + then.unweighed,

@@ -1,4 +1,4 @@
-"""Scatter no two articles share: E and t of every part, adhesive, every single weld."""
+"""Scatter between articles: E and t of every part, adhesive, every single weld."""
 
 from dataclasses import replace
 
@@ -15,13 +15,13 @@ from chladni.model.properties import (
 )
 
 PART, ADHESIVE, WELD = 0.01, 0.1, 0.3  # standard deviations of ln E (and of ln t of sheets)
-WELDS = "spot welds"  # part whose every solid is a weld of its own
+WELDS = "spot welds"  # part in which every solid is a weld of its own
 
 Scales = dict[str, dict[str, float]]  # {part: {"E": factor, "t": factor}}
 
 
 def scattered(assembly: Assembly, rng: np.random.Generator) -> tuple[Assembly, Scales]:
-    """Another article of the same drawing, and the factor on E and t of every part (log-normal).
+    """Another article of the same drawing, and log-normal factors on E and t of every part.
 
     E and t of a sheet or tube vary by 1 %, E of adhesive by 10 %, of each weld by 30 %.
     """
@@ -84,7 +84,7 @@ def with_parts_of_solids(
 
 
 def _each_weld(assembly: Assembly, rng: np.random.Generator) -> Assembly:
-    """Every solid of the welds' part on a material of its own."""
+    """The assembly with a material of its own for every solid of the welds' part."""
     names = [p.name for p in assembly.parts]
     if WELDS not in names:
         return assembly

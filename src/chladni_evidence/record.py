@@ -1,4 +1,4 @@
-"""A case folder diagnosed once, and all that any decision may ask for kept in one file."""
+"""Recording of cases: diagnose a folder once, keep all that any decision may request."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -26,9 +26,9 @@ Say = Callable[[str], None]
 
 
 def record(folders: Sequence[Path], out: Path, say: Say) -> list[Path]:
-    """Record some cases, each into a file of its own; those that are there stay.
+    """Record some cases, each into a file of its own; existing files are kept.
 
-    A case that is refused is said and left out.
+    A refused case is reported and left out.
     """
     out.mkdir(parents=True, exist_ok=True)
     written = []
@@ -46,7 +46,7 @@ def record(folders: Sequence[Path], out: Path, say: Say) -> list[Path]:
 
 
 def recorded_case(folder: Path) -> RecordedCase:
-    """A case with the rows of its decision, and of that without each of the rules."""
+    """A case with the rows of its decision, and of its decisions without each of the rules."""
     with threadpool_limits(1):
         made = searched(with_natural_frequencies(load_case(folder)), True, lambda text, share: None)
         known = replace(begun(made.prepared, made.found), whole=True)
@@ -68,14 +68,14 @@ def kept(folder: Path, made: Searched, found: Decision, known: Measured) -> Reco
 
 
 def answered(made: Searched, known: Measured, rules: DecisionRules) -> tuple[Decision, Measured]:
-    """A decision by some rules, with every fit that it asks for."""
+    """A decision by some rules, with every fit that it requests."""
     while isinstance(found := decide(known.table, rules), Wanted):
         known = measured(made.prepared, made.found, made.renew, known, found)
     return found, known
 
 
 def truth_of(folder: Path) -> dict[str, Any]:
-    """What was hidden in a case of a blind folder whose truths tune; empty where none is there."""
+    """The truth of a case of a blind folder for tuning; empty where there is no truth."""
     sealed = folder.resolve().parents[1] / "sealed" / f"{folder.name}.json"
     if not sealed.exists():
         return {}
@@ -84,6 +84,6 @@ def truth_of(folder: Path) -> dict[str, Any]:
 
 
 def _name(folder: Path) -> str:
-    """Of the set and the case."""
+    """Name of a record, from the set and the case."""
     folder = folder.resolve()
     return f"{folder.parents[1].name}-{folder.name}" if truth_of(folder) else folder.name

@@ -1,6 +1,6 @@
-"""A case as a file: all rows of its decision and what was hidden, without any fit.
+"""Files of recorded cases: all rows of a decision and the truth, without any fit.
 
-One compressed ``.npz``: arrays, and a JSON text for numbers and names. Nothing is pickled.
+A file is a compressed ``.npz``: arrays, and a JSON text for numbers and names. Nothing is pickled.
 """
 
 import json
@@ -28,13 +28,13 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class RecordedCase:
-    """What a case left behind.
+    """Record of a case.
 
     Attributes
     ----------
     name : of its folder
-    truth : what was hidden; empty where nobody knows
-    table : of all hypotheses, with what any rule may ask for
+    truth : the hidden effects; empty where unknown
+    table : of all hypotheses, with all numbers that any rule may request
     verdict, names, one_of : of the decision when it was recorded
     arrays : of the reduced problem, by name
     """
@@ -67,7 +67,7 @@ def read_case(path: Path) -> RecordedCase:
     Raises
     ------
     FileError
-        If it is none.
+        If the file is not a recorded case.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -83,7 +83,7 @@ def read_case(path: Path) -> RecordedCase:
 
 
 def _plain(value: object) -> object:
-    """A number of numpy, or the name of an enum."""
+    """A plain value of a numpy number, or the name of an enum."""
     return value.name if isinstance(value, Enum) else np.asarray(value).tolist()
 
 

@@ -1,8 +1,8 @@
 """The reduced problem of a recorded case, row by row, and its evidence under another likelihood.
 
-A row is its responses, what the model leaves of them (∂ by all parameters beside it), and what is
-known of the parameters without them. Evidence has the parameters linear about the fit that is
-there, as :mod:`chladni.updating.held_out_evidence` has it; no fit is made again.
+A row holds the deviations of its responses with their slopes, and the prior information on the
+parameters. Evidence takes the parameters as linear about the existing fit, as in
+:mod:`chladni.updating.held_out_evidence`; nothing is fitted again.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -27,7 +27,7 @@ from chladni.updating.sensor_errors import SensorErrors, Side
 Arrays = dict[str, np.ndarray]
 Likelihood = Callable[[Responses], Responses]
 KEPT = {c.__name__: c for c in (Responses, State, SensorErrors, Side, Dissipated)}
-LEFT_OUT = {"error", "known", "bent"}  # made anew from the state that errors spread from
+LEFT_OUT = {"error", "known", "bent"}  # computed again from the state that errors spread from
 CLASS = "class"
 
 
@@ -39,9 +39,9 @@ class RecordedRow:
     ----------
     deviation : (n_f, n_out, n_in) complex        log10 of model over test
     slopes : (n_p, n_f, n_out, n_in) complex      by the parameters
-    r0, J0 : what is known of the parameters beside the data
+    r0, J0 : residuals and slopes of the information on the parameters besides the data
     constants : of -2 ln evidence
-    data : of calibration alone: all rows are compared with the errors of form that spread from it
+    data : of calibration alone, whose state gives the errors of form for all rows
     """
 
     deviation: np.ndarray
@@ -52,7 +52,7 @@ class RecordedRow:
     data: Responses | None = None
 
     def neg2_log_evidence(self, data: Responses) -> float:
-        """-2 ln evidence of some data, with the errors of the model's form in them."""
+        """-2 ln evidence of some data, which include the errors of the model's form."""
         assert data.error is not None
         sd = data.std()
         r = data.stacked(self.deviation[None] / sd)[:, 0]
@@ -60,7 +60,7 @@ class RecordedRow:
         return learned(data.error, r, J, self.r0, self.J0).neg2_log_evidence + self.constants
 
     def spread(self, likelihood: Likelihood = lambda data: data) -> Responses:
-        """The data under a likelihood, errors of form spreading from calibration alone."""
+        """The data under a likelihood, with errors of form from calibration alone."""
         assert self.data is not None
         assert self.data.about is not None
         return likelihood(self.data).allowing_errors(self.data.about)
@@ -69,9 +69,10 @@ class RecordedRow:
 def rows_kept(
     known: Measured, found: Diagnosis, mass: MassMeasurement | None, null: str
 ) -> Iterator[tuple[str, RecordedRow]]:
-    """The rows of responses; natural frequencies have none.
+    """The rows of a decision on responses; natural frequencies have none.
 
-    Nor has a family far behind that gave up its model, where the common one cannot hold its effect.
+    A family far behind keeps no model of its own.  It has no row where the common model cannot
+    represent its effect.
     """
     for key, hypothesis in {null: found.null, **known.fits}.items():
         data = hypothesis.data
@@ -84,7 +85,7 @@ def _row(hypothesis: HypothesisFit, data: Responses, mass: MassMeasurement | Non
     fit = hypothesis.fit
     bare = replace(data, outputs=None, inputs=None)
     state = evaluate(hypothesis.model, fit.effects, fit.x)
-    # of unit spread, unwhitened and on every line, so that any likelihood can be laid over them
+    # unit standard deviation, unwhitened, every line: any likelihood can be applied later
     plain = replace(data.exactly(), use=np.ones_like(data.use))
     sd = plain.std()
     J = plain.scaled(state, True)[1]
@@ -116,7 +117,7 @@ def _pack(path: str, value: Any, out: Arrays) -> None:
             if f.name not in LEFT_OUT and not f.name.startswith("_"):
                 _pack(f"{path}{f.name}/", getattr(value, f.name), out)
     elif isinstance(value, tuple) and value and sp.issparse(value[0]):
-        out[f"{path}{CLASS}"] = np.array("()")  # rows of the structure: the basis has them
+        out[f"{path}{CLASS}"] = np.array("()")  # rows of the structure are in the basis
 
 
 def unpacked(arrays: Mapping[str, np.ndarray]) -> dict[str, RecordedRow]:

@@ -1,4 +1,4 @@
-"""Recorded cases decided again, with every rule in turn switched off: what each one is worth."""
+"""Replay of recorded decisions, also with each rule switched off, to measure its worth."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -23,14 +23,14 @@ RIGHT = ("right", "part", "among")
 
 @dataclass(frozen=True)
 class Replayed:
-    """What one decision says of a case.
+    """Result of one decision on a case.
 
     Attributes
     ----------
     said : the name, or the verdict
-    one_of : what it cannot tell apart
-    outcome : held against the truth; "" where nobody knows it
-    wanted : what it asks for that was not recorded
+    one_of : names that it cannot distinguish
+    outcome : compared with the truth; "" where that is unknown
+    wanted : the request that was not recorded
     """
 
     said: str
@@ -41,12 +41,12 @@ class Replayed:
 
 @dataclass(frozen=True)
 class RuleWorth:
-    """What a rule changes, by switching it off.
+    """Effect of a rule, measured by switching it off.
 
     Attributes
     ----------
     name, why : of the rule
-    changed : cases whose verdict it changes
+    changed : cases with another verdict without it
     saves, spoils : cases that are right only with it, and only without it
     open : cases where the answer without it needs a fit that was not recorded
     """
@@ -60,7 +60,7 @@ class RuleWorth:
 
 
 def replayed(case: RecordedCase, decided: Decide = decide) -> Replayed:
-    """A recorded case decided again."""
+    """Decide a recorded case again."""
     found = decided(case.table)
     if isinstance(found, Wanted):
         return Replayed("", wanted=f"{found.ask.value}, of {found.key}")
@@ -69,7 +69,7 @@ def replayed(case: RecordedCase, decided: Decide = decide) -> Replayed:
 
 
 def recorded(case: RecordedCase) -> Replayed:
-    """What was said when the case was recorded."""
+    """The decision at the time of recording."""
     return _scored(case, case.verdict, case.names, case.one_of)
 
 
@@ -88,7 +88,7 @@ def _scored(
 
 
 def ablated(cases: Sequence[RecordedCase]) -> list[RuleWorth]:
-    """Every rule switched off in turn; most cases changed first."""
+    """Worth of every rule, switched off in turn; most changed cases first."""
     before = [replayed(case) for case in cases]
     every = [_worth(f.name, cases, before) for f in fields(DecisionRules)]
     return sorted(every, key=lambda w: (-len(w.changed), w.name))
@@ -113,12 +113,12 @@ def _names(each: Iterable[tuple[str, bool]]) -> tuple[str, ...]:
 
 
 def is_right(answer: Replayed) -> bool:
-    """Whether an answer is right, or has the truth among what it cannot tell apart."""
+    """True for an answer that is right, or has the truth among its indistinguishable names."""
     return answer.outcome in RIGHT
 
 
 def case_lines(cases: Sequence[RecordedCase]) -> list[str]:
-    """A line a case: what was hidden, what was said when it was recorded, and what is said now."""
+    """Lines, one a case: hidden effects, recorded answer, present answer."""
     head = f"{'case':22} {'hidden':26} {'recorded':40} now"
     return [head, *(_line(case) for case in cases)]
 
@@ -136,7 +136,7 @@ def _text(answer: Replayed) -> str:
 
 
 def rule_lines(cases: Sequence[RecordedCase]) -> list[str]:
-    """A line a rule: verdicts changed without it, right to wrong, wrong to right, not recorded."""
+    """Lines, one a rule: verdicts changed without it, right to wrong, wrong to right, unknown."""
     head = f"{'rule switched off':22} changed  right->wrong  wrong->right  not recorded"
     return [
         head,
@@ -151,9 +151,9 @@ def rule_lines(cases: Sequence[RecordedCase]) -> list[str]:
 def another_likelihood(case: RecordedCase, likelihood: Likelihood) -> RecordedCase:
     """The case with the evidence of its rows under another likelihood.
 
-    What was measured of them otherwise (tests, votes, Q) stays as it was recorded. A family far
-    behind lost vectors of its basis before it was kept, so differences of evidence are taken, to
-    that of calibration alone, for widths of the data are in none.
+    Other numbers of the rows (tests, votes, Q) stay as recorded. A family far behind lost vectors
+    of its basis before it was kept.  So differences of evidence to calibration alone are taken, in
+    which the widths of the data cancel.
     """
     kept, rows = unpacked(case.arrays), {}
     if not kept:
@@ -179,7 +179,7 @@ def narrower(noise: float, floor: float | None) -> Likelihood:
 
 
 def likelihood_lines(cases: Sequence[RecordedCase], likelihood: Likelihood) -> list[str]:
-    """A line a case: the gain of its leader and the answer, as recorded and under a likelihood."""
+    """Lines, one a case: gain of its leader and answer, as recorded and under a likelihood."""
     head = f"{'case':22} {'hidden':26} {'gain':>8} {'then':>8}  recorded -> then"
     return [head, *(_shadow(case, another_likelihood(case, likelihood)) for case in cases)]
 

@@ -1,4 +1,4 @@
-"""Responses of an article with things attached to it, and how far two responses are apart."""
+"""Responses of an article with attached couplings, and the distance between two responses."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ Law = Callable[[np.ndarray], np.ndarray]  # complex (n_f,) of s (n_f,) [rad/s]
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Something on the article that answers its motion q = W u with the force -D(s) q.
+    """A coupling on the article with the force -D(s) q under its motion q = W u.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ def accelerance(
     ----------
     phi_out, phi_in : (n_out, r), (n_in, r)
     zeta : (r,)
-    law : e(s) of what has losses; i where it is not given
+    law : e(s) of the parts with losses; i where it is not given
     """
     s = 2j * np.pi * frequency
     w = 2 * np.pi * modes.frequency

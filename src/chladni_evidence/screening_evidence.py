@@ -1,7 +1,7 @@
-"""Recordings without a fault, of articles on other meshes: what the screening is tried on.
+"""Recordings without a fault, of articles on other meshes, to test the screening.
 
-Noise 0.5 to 3 % of every line, damping 0.2 to 3 %, another article of another mesh of each
-structure; the model is the deck as it is given. Seeds below 600 tune, those from 600 on report.
+Noise is 0.5 to 3 % of every line, damping 0.2 to 3 %. Each structure has another article of another
+mesh, and the model is the deck as given. Seeds below 600 tune, seeds from 600 on report.
 """
 
 from collections.abc import Callable
@@ -31,12 +31,12 @@ from .response_of_article import accelerance, seen
 STRUCTURES = ("plate", "panel", "ribbed plate", "curved shell", "lidded box", "bonded plates")
 DAMPING, NOISE = (0.002, 0.03), (0.005, 0.03)
 PER_HALF_BANDWIDTH = 2.0
-TIMES = 20  # the lines, of a long recording
+TIMES = 20  # lines of a long recording over those of a usual one
 
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """A recording without a fault, what made it, and the model it is screened against."""
+    """A recording without a fault, its article, and the model it is screened against."""
 
     bench: Bench
     frf: FRF
@@ -52,16 +52,16 @@ class Sound:
     places: np.ndarray  # (k, 3) [m], of these
 
     def foot_of(self, i: int) -> Footing:
-        """Of one output."""
+        """Footing of one output."""
         return Footing(self.foot.rows[[i]], self.foot.weights[[i]])
 
     def measured(self, values: np.ndarray, rng: np.random.Generator) -> FRF:
-        """Noiseless accelerances as the front end gives them."""
+        """Noiseless accelerances as the front end records them, with noise."""
         f = self.frf
         return recorded(values, f.frequency, self.chain, rng, f.outputs, f.inputs)
 
     def accelerance(self, phi_out: np.ndarray) -> np.ndarray:
-        """Of the article at other shapes (k, r)."""
+        """Accelerance of the article at places of other shapes (k, r)."""
         return accelerance(self.modes, phi_out, self.phi_in, self.zeta, self.frf.frequency)
 
 
@@ -96,7 +96,7 @@ def sound(structure: str, seed: int, long: bool = False) -> Sound:
 
 
 def _places(bench: Bench, spots: Spots, rng: np.random.Generator) -> Spots:
-    """Thirty places where a sensor can be glued and none is."""
+    """Thirty places where a sensor can be glued but none is."""
     every = glue_candidates(bench.deck)
     unused = np.flatnonzero(~np.isin(every.grids, spots.grids))
     return every.only(rng.choice(unused, min(30, len(unused)), replace=False))
@@ -127,7 +127,7 @@ def _joined(a: Spots, b: Spots) -> Spots:
 
 
 def measured_at(spots: Spots) -> MeasuredDofs:
-    """Places as a case resolves them."""
+    """Measured dofs of places, as a case resolves them."""
     n = len(spots)
     return MeasuredDofs(
         spots.labels, spots.grids, spots.points, spots.directions, np.zeros(n), np.zeros(n)
@@ -135,7 +135,7 @@ def measured_at(spots: Spots) -> MeasuredDofs:
 
 
 def screening_of(made: Sound, frf: FRF) -> Screening:
-    """What the screening says of a recording, with the model: as ``chladni check`` has it."""
+    """Screening of a recording with the model, as in ``chladni check``."""
     use = screening_lines(frf)
     found = identify(frf, use=use)
     outputs, inputs = measured_at(made.outputs), measured_at(made.bench.drive)

@@ -1,4 +1,4 @@
-"""Faults put into sound recordings, and how often the screening names them."""
+"""Faults put into sound recordings, and the rates at which the screening names them."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -15,8 +15,8 @@ from .response_of_article import seen
 from .screening_evidence import STRUCTURES, Sound, screening_of, sound
 
 Spoilt = tuple[FRF, tuple[str, ...]]  # the recording, and the channels at fault
-AWAY = 0.15  # of the length of the structure: a sensor that sits elsewhere
-SEEN = 0.15  # of a typical motion across the sheet: what a turned sensor must still see
+AWAY = 0.15  # least displacement of a misplaced sensor, over the length of the structure
+SEEN = 0.15  # least motion at a turned sensor, over a typical motion across the sheet
 
 
 def _channel(made: Sound, rng: np.random.Generator) -> int:
@@ -34,7 +34,7 @@ def _times(made: Sound, i: int, factor: float) -> Spoilt:
 
 
 def gain(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """One channel half, 0.7, 1.4 times or twice as large."""
+    """One channel times 0.5, 0.7, 1.4 or 2."""
     return _times(made, _channel(made, rng), float(rng.choice([0.5, 0.7, 1.4, 2.0])))
 
 
@@ -53,7 +53,7 @@ def swapped(made: Sound, rng: np.random.Generator) -> Spoilt:
 
 
 def dead(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """A cable off: the noise of the front end alone."""
+    """A disconnected cable: the noise of the front end alone."""
     i = _channel(made, rng)
     values = made.frf.values.copy()
     size = 10 ** rng.uniform(-4, -1) * np.sqrt((np.abs(values) ** 2).mean())
@@ -67,7 +67,7 @@ def dead(made: Sound, rng: np.random.Generator) -> Spoilt:
 
 
 def copied(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """One signal recorded twice, noise and all."""
+    """One signal recorded twice, with the same noise."""
     i, j = rng.choice(len(made.frf.outputs), 2, replace=False)
     values = made.frf.values.copy()
     values[:, j] = values[:, i]
@@ -100,7 +100,7 @@ def _with_row(made: Sound, i: int, phi: np.ndarray, rng: np.random.Generator) ->
 
 
 def turned(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """A sensor along another axis, in which its place moves as well."""
+    """A sensor along another axis, in which its place also moves."""
     typical = np.sqrt((np.abs(made.clean) ** 2).mean())
     for i in rng.permutation(len(made.frf.outputs)):
         for axis in rng.permutation(3):
@@ -115,7 +115,7 @@ def turned(made: Sound, rng: np.random.Generator) -> Spoilt:
 
 
 def misplaced(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """A sensor at the place of nobody, a seventh of the structure away and more."""
+    """A sensor at an unlisted place, a seventh of the structure away or more."""
     i = _channel(made, rng)
     apart = np.linalg.norm(made.places - made.outputs.points[i], axis=1)
     far = np.flatnonzero(apart > AWAY * np.ptp(made.places, axis=0).max())
@@ -131,13 +131,13 @@ def delay(made: Sound, rng: np.random.Generator) -> Spoilt:
 
 
 def quantity(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """Receptance or mobility that calls itself accelerance."""
+    """Receptance or mobility that is labelled accelerance."""
     other = made.frf.to(str(rng.choice(["receptance", "mobility"])))  # type: ignore[arg-type]
     return replace(other, quantity="accelerance"), ()
 
 
 def units(made: Sound, rng: np.random.Generator) -> Spoilt:
-    """A factor of 9.81 or 4.448, either way."""
+    """A factor of 9.81 or 4.448, or its inverse."""
     factor = 1 / float(rng.choice(list(FACTORS)[:4]))
     variance = made.frf.variance
     variance = None if variance is None else variance * factor**2
@@ -151,7 +151,7 @@ def polarity(made: Sound, rng: np.random.Generator) -> Spoilt:
 
 @dataclass(frozen=True)
 class FaultKind:
-    """How a fault is made, and the kinds of finding that name it."""
+    """Maker of a fault, and the kinds of finding that name it."""
 
     make: Callable[[Sound, np.random.Generator], Spoilt]
     kinds: tuple[str, ...]
@@ -174,7 +174,7 @@ FAULTS = {
 
 
 def outcome(screening: Screening, kind: FaultKind, channels: Sequence[str]) -> str:
-    """named: the fault and its channels; seen: another name or more beside; missed."""
+    """Outcome: named (the fault and its channels), seen (another name, or further ones), missed."""
     named = [f for f in screening.findings if f.kind in kind.kinds]
     if any(not channels or set(f.channels) & set(channels) for f in named):
         exact = any(not channels or set(f.channels) == set(channels) for f in named)
@@ -185,15 +185,15 @@ def outcome(screening: Screening, kind: FaultKind, channels: Sequence[str]) -> s
 def tally(
     seeds: Sequence[int], kinds: Sequence[str], say: Callable[[str], None], long: bool = False
 ) -> dict[str, Counter[str]]:
-    """Outcomes of every fault over seeds, the structures in turn; findings of sound recordings.
+    """Outcomes of every fault over seeds, the structures in turn; findings on sound recordings.
 
     Parameters
     ----------
-    long : recordings of so many lines that screening leaves out most of them
+    long : use recordings of so many lines that screening leaves out most of them
     """
     counts: dict[str, Counter[str]] = {k: Counter() for k in ("sound", *kinds)}
     for seed in seeds:
-        for name in (STRUCTURES[seed % 6], STRUCTURES[(seed + 3) % 6]):  # two sound ones a seed
+        for name in (STRUCTURES[seed % 6], STRUCTURES[(seed + 3) % 6]):  # two recordings a seed
             made = sound(name, seed, long)
             found = screening_of(made, made.frf)
             counts["sound"]["clean" if not found.findings else "alarm"] += 1

@@ -20,7 +20,7 @@ from .thesis_page import numbers, thesis_page
 
 
 def regenerate(out: Path, seed: int, say: Callable[[str], None]) -> None:
-    """Test, identify, draw, write: the page, its numbers and the recordings."""
+    """Test, identify, draw, and write the page, its numbers and the recordings."""
     rng = np.random.default_rng([seed, 9])
     with run_folder(out, "thesis") as folder:
         say("the tailgate: modes, sensors, cords")
@@ -32,7 +32,7 @@ def regenerate(out: Path, seed: int, say: Callable[[str], None]) -> None:
 
 
 def written(folder: Path, subject: Subject, test: ThesisTest, say: Callable[[str], None]) -> str:
-    """Identify what was recorded, and write all of it into the folder; the result in words."""
+    """Identify the recordings and write all results into the folder; return a summary in words."""
     rings = np.concatenate([test.tapped, test.along], axis=1)
     identified = []
     for recording, ring in zip(test.stepped, rings, strict=True):
@@ -49,7 +49,7 @@ def written(folder: Path, subject: Subject, test: ThesisTest, say: Callable[[str
 
 
 def _recordings(folder: Path, subject: Subject, test: ThesisTest) -> list[tuple[str, str]]:
-    """A, B and C by both excitations as universal files."""
+    """Write A, B and C by both excitations as universal files."""
     files = []
     for kind, recordings in (("sine", test.stepped), ("burst", test.bursts)):
         for r in recordings:

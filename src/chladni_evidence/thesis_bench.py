@@ -1,7 +1,7 @@
 """The test of Echaniz Granado (2015) on the virtual bench: three tailgates, two excitations.
 
-Sections 4.2 and 4.3: stepped sine with table 3's schedule and burst random on tailgates A, B and C,
-A at half and at twice the level, and the cords free, held by hand and with rubber.
+Sections 4.2 and 4.3: stepped sine with table 3's schedule and burst random on tailgates A, B and C.
+A is also tested at half and at twice the level.  Cords are free, held by hand, or with rubber.
 """
 
 from collections.abc import Sequence
@@ -44,21 +44,21 @@ from .footing import Spots, rows_of_part
 ARTICLE = TailgateDesign(size=0.020, hem="real")  # first mode at 28.4 Hz; that of the test: 28.2
 HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis hung it (figure 17)
 CORD_SD = 0.01  # of a cord's frequency from article to article: figure 19 shows a few tenths of Hz
-HELD = 0.1  # of a cord's length that hands at its lowest part leave free
+HELD = 0.1  # share of a cord's length that stays free when hands hold its lowest part
 CORD_BAND = (18.0, 34.0)  # [Hz], about the cords' resonances and the first mode
-FACTORS = (0.5, 2.0)  # of the level, beside the level itself (figure 24)
+FACTORS = (0.5, 2.0)  # further levels over the level itself (figure 24)
 Held = Literal["free", "held", "rubber"]
 WAYS: tuple[Held, ...] = ("free", "held", "rubber")
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is tested, before three articles of it differ.
+    """The tested structure, before its three articles differ.
 
     Attributes
     ----------
     article : BenchArticle
-    drive : row of the output beside the shaker
+    drive : row of the output next to the shaker
     at_cord : row of the output nearest to a cord
     nodes : {node: (3,)}  places by the number of a label [m]
     """
@@ -76,12 +76,12 @@ class ThesisTest:
     Attributes
     ----------
     subject : Subject
-    stages, articles : the schedule, A, B and C
-    stepped, bursts : of A, B and C
-    levels : of A by stepped sine, one for each of ``FACTORS``
+    stages, articles : the schedule; A, B and C
+    stepped, bursts : recordings of A, B and C
+    levels : recordings of A by stepped sine, one for each of ``FACTORS``
     cords : {free, held, rubber: recordings of A, B and C about the cords' resonances}
-    tapped, along : (3, k)   what each article's cords ring at, across and along them [Hz]
-    poles : of A's FRFs, sensors, gauge and cords with it (m,) [rad/s]
+    tapped, along : (3, k)   resonances of each article's cords, across and along them [Hz]
+    poles : of A's FRFs, with sensors, gauge and cords (m,) [rad/s]
     """
 
     subject: Subject
@@ -100,7 +100,7 @@ def tailgate_subject(rng: np.random.Generator, f_max: float = 400.0) -> Subject:
     """The open tailgate with a hem that holds, hung from its upper holes, sensors as planned.
 
     Its first fourteen modes have the damping of the thesis' table 6 (mean of three articles, by
-    rank), the others draw theirs from the scatter of that table.
+    rank). The damping of the others is drawn from the scatter of that table.
     """
     plan = tailgate_bench()
     assembly = tailgate(ARTICLE)
@@ -169,7 +169,7 @@ def _about_cords(
     articles: Sequence[BenchArticle], rings: np.ndarray, way: Held, stages: Sequence[Stage],
     level: float, rng: np.random.Generator, channels: Channels,
 ) -> tuple[BenchRecording, ...]:  # fmt: skip
-    """A short sweep of every article about the cords' resonances."""
+    """Short sweeps of all articles about the cords' resonances."""
     lines = dwells_of(stages, CORD_BAND)
     test = BenchTest("stepped-sine", CORD_BAND, level)
     return tuple(
@@ -179,7 +179,7 @@ def _about_cords(
 
 
 def rig_on_cords(article: BenchArticle, rings: np.ndarray, way: Held = "free") -> BenchRig:
-    """The article on its cords, which ring at ``rings`` [Hz] when tapped."""
+    """The article on its cords, which have the resonances ``rings`` [Hz]."""
     cords = tuple(_touched(c, way) for c in _cords(article, rings))
     return bench_rig(article, BenchSetup(cords=cords))
 
@@ -190,14 +190,14 @@ def _cords(article: BenchArticle, rings: np.ndarray) -> list[Cord]:
 
 
 def _along(article: BenchArticle, rings: np.ndarray) -> list[float]:
-    """First resonance of each cord along itself, √(k/m) / 2 of a bar held at both ends [Hz]."""
+    """First longitudinal resonance √(k/m) / 2 of each cord, a bar held at both ends [Hz]."""
     return [float(np.sqrt(c.stiffness / c.mass) / 2) for c in _cords(article, rings)]
 
 
 def frf_poles(measured: PoleModel) -> np.ndarray:
     """Poles of accelerations over the force, the first output: zeros of that force (m,) [rad/s].
 
-    The shaker is not among them, what hangs on the article is.
+    They exclude the shaker and include everything attached to the article.
     """
     p = np.r_[measured.poles, measured.poles.conj()]
     n = len(p)
@@ -213,7 +213,7 @@ def frf_poles(measured: PoleModel) -> np.ndarray:
 
 
 def _touched(one: Cord, way: Held) -> Cord:
-    """A cord as it hangs, with rubber taped to its end, or held by hand close to the article."""
+    """A cord that hangs free, has rubber taped to its end, or is held by hand near the article."""
     if way == "rubber":
         return replace(one, damping=RUBBER)
     if way == "held":
@@ -233,7 +233,7 @@ def _hangers(assembly: Assembly) -> list[int]:
 
 
 def _dofs(spots: Spots) -> MeasuredDofs:
-    """Places of the plan as points on the nearest shell, whatever the mesh."""
+    """Places of the plan as points on the nearest shell of any mesh."""
     n = len(spots)
     none = np.zeros(n, dtype=np.int64)
     return MeasuredDofs(
@@ -242,7 +242,7 @@ def _dofs(spots: Spots) -> MeasuredDofs:
 
 
 def _joined(a: MeasuredDofs, b: MeasuredDofs) -> MeasuredDofs:
-    """Both, one after the other."""
+    """Both sets of dofs, one after the other."""
     return MeasuredDofs(
         a.labels + b.labels, np.r_[a.grids, b.grids], np.r_[a.points, b.points],
         np.r_[a.directions, b.directions], np.r_[a.sd, b.sd], np.r_[a.mass, b.mass],

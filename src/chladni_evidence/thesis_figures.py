@@ -14,7 +14,7 @@ from .thesis_findings import means
 from .thesis_modes import BAND, CORDS, ArticleIdentified
 
 ACCELERANCE = UNIT["accelerance"]
-_DENSE = 30_000  # lines of a drawn model: a circle of 0.4 % damping is round
+_DENSE = 30_000  # lines of a drawn model, so that a circle of 0.4 % damping is round
 _LEVELS = {0.5: "half the level", 2.0: "twice the level"}
 Curve = tuple[np.ndarray, np.ndarray]
 
@@ -22,7 +22,7 @@ Curve = tuple[np.ndarray, np.ndarray]
 def drawn(
     folder: Path, test: ThesisTest, identified: tuple[ArticleIdentified, ...]
 ) -> dict[str, Path]:
-    """All figures: path by number of the thesis."""
+    """Draw all figures; return their paths by figure number of the thesis."""
     first = identified[0]
     return {
         "19": _cords(folder / "figure_19.png", test),
@@ -36,14 +36,14 @@ def drawn(
 
 
 def _typical(test: ThesisTest, share: float = 0.5) -> int:
-    """Row of the output that so many are weaker than, the one at the shaker aside."""
+    """Row of the output at this quantile of strength, without the one at the shaker."""
     size = np.abs(test.stepped[0].frf.values[:, :, 0]).mean(axis=0)
     order = [int(k) for k in np.argsort(size) if k != test.subject.drive]
     return order[int(share * (len(order) - 1))]
 
 
 def _of(recording: BenchRecording, row: int) -> Curve:
-    """A channel's lines and values."""
+    """Lines and values of a channel."""
     return recording.frf.frequency, recording.frf.values[:, row, 0]
 
 
@@ -54,7 +54,7 @@ def _named(test: ThesisTest, row: int) -> str:
 
 
 def _cords(path: Path, test: ThesisTest) -> Path:
-    """Free, held and with rubber at the sensor nearest to a cord, article by article."""
+    """Draw free, held and with rubber at the sensor nearest to a cord, article by article."""
     at = test.subject.at_cord
     channels = {
         f"tailgate {a.name}, {test.stepped[0].frf.outputs[at]}": {
@@ -66,7 +66,7 @@ def _cords(path: Path, test: ThesisTest) -> Path:
 
 
 def _circles(path: Path, test: ThesisTest, first: ArticleIdentified) -> Path:
-    """Mobility of two channels of A, 10 to 195 Hz: lines as dots, the identified model drawn."""
+    """Draw the mobility of two channels of A, 10 to 195 Hz: lines as dots, the model as a curve."""
     dense = np.geomspace(*BAND, _DENSE)
     dense = dense[(dense < CORDS[0]) | (dense > CORDS[1])]
     model, raw = realised(first.whole, "mobility").frf(dense), first.raw.to("mobility")
@@ -76,7 +76,7 @@ def _circles(path: Path, test: ThesisTest, first: ArticleIdentified) -> Path:
 
 
 def _levels(path: Path, test: ThesisTest) -> Path:
-    """A at the level, at half of it and at twice."""
+    """Draw A at the level, at half of it and at twice."""
     recordings = {"the level": test.stepped[0]}
     recordings |= {_LEVELS[k]: r for k, r in zip(FACTORS, test.levels, strict=True)}
     channels = {
@@ -87,14 +87,14 @@ def _levels(path: Path, test: ThesisTest) -> Path:
 
 
 def _articles(path: Path, test: ThesisTest) -> Path:
-    """A, B and C by stepped sine, four channels."""
+    """Draw A, B and C by stepped sine, four channels."""
     rows = (test.subject.drive, *(_typical(test, share) for share in (0.25, 0.5, 0.75)))
     channels = {_named(test, row): {r.article: _of(r, row) for r in test.stepped} for row in rows}
     return plots.frf_grid(path, channels, ACCELERANCE)
 
 
 def _excitations(path: Path, test: ThesisTest) -> Path:
-    """Means of A, B and C by both excitations: at the shaker, rms of all channels, two others."""
+    """Draw means of A, B and C by both excitations: shaker, rms of all channels, two others."""
     both = {"burst random": test.bursts, "stepped sine": test.stepped}
     mean = {name: (r[0].frf.frequency, means(r)) for name, r in both.items()}
     channels = {
@@ -109,7 +109,7 @@ def _excitations(path: Path, test: ThesisTest) -> Path:
 
 
 def _state_space(path: Path, row: int, first: ArticleIdentified) -> Path:
-    """One channel of A with the identified state space."""
+    """Draw one channel of A with the identified state space."""
     f = np.geomspace(*BAND, _DENSE)
     model = realised(first.whole, "accelerance").frf(f)
     frf = first.frf.sel(band=BAND)

@@ -1,4 +1,4 @@
-"""What the thesis' tables and figures say, as numbers of our own recordings."""
+"""Numbers of the thesis' tables and figures from our own recordings."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from .thesis_modes import ArticleIdentified, ModesOfArticles, errors, paired, sp
 
 BANDS = ((10.0, 100.0), (100.0, 200.0), (220.0, 280.0), (280.0, 320.0), (340.0, 400.0))  # fig. 25
 FIRST = (26.0, 34.0)  # [Hz] the first elastic mode, above the cords
-OUTER = 0.25  # share of the lines, the faintest or the strongest, of a channel
+OUTER = 0.25  # share of the weakest or the strongest lines of a channel
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +27,9 @@ class StageRun:
     Attributes
     ----------
     stage : Stage
-    lines : how many
-    per_octave : as they turned out
-    transient : median over lines of the largest transient left, over all channels, A
+    lines : number of lines
+    per_octave : actual lines per octave
+    transient : median over lines of the largest remaining transient, over all channels of A
     """
 
     stage: Stage
@@ -46,7 +46,7 @@ class CordReading:
     ----------
     tapped : (k,)          [Hz]
     height : (k,)          |H| at them over that with the cords held
-    rubber : (k,)          the same with rubber
+    rubber : (k,)          |H| at them with rubber, over that with the cords held
     first : (3,)           peak of the first mode, free, held, with rubber [Hz]
     """
 
@@ -63,7 +63,7 @@ class ThesisFindings:
     Attributes
     ----------
     schedule : rows of table 3
-    minutes : of all its sweeps
+    minutes : duration of all its sweeps
     weights : (3,) [kg]
     identified : of A, B and C
     modes : their modes, paired
@@ -73,9 +73,9 @@ class ThesisFindings:
     lines : (r,)           of A's modes, lines between their half-power points
     levels : homogeneity of A at half the level and at twice, each against the level itself
     between_articles, between_excitations : (bands,)  rms of 20 log|H| about the mean [dB]
-    faint, strong : the same between excitations at the faintest and strongest quarter of the lines
+    faint, strong : rms between excitations at the weakest and strongest quarter of the lines [dB]
     state_space : deviation of the state space from A's recording
-    states : its order
+    states : order of the state space
     """
 
     schedule: tuple[StageRun, ...]
@@ -99,11 +99,11 @@ class ThesisFindings:
 def findings(
     test: ThesisTest, identified: tuple[ArticleIdentified, ...], thesis: np.ndarray
 ) -> ThesisFindings:
-    """All of it.
+    """All findings of a test.
 
     Parameters
     ----------
-    thesis : (articles, modes)   frequencies of its table 5 [Hz]
+    thesis : (articles, modes)   frequencies of the thesis' table 5 [Hz]
     """
     first = identified[0]
     modes = paired(identified)
@@ -139,7 +139,7 @@ def _stage_run(test: ThesisTest, stage: Stage) -> StageRun:
 
 
 def _seconds(test: ThesisTest, stage: Stage) -> float:
-    """Of one sweep over the stage [s]."""
+    """Duration of one sweep over the stage [s]."""
     f = test.stepped[0].frf.frequency
     last = stage is test.stages[-1]
     mine = f[(stage.low <= f) & ((f < stage.high) | last)]
@@ -147,7 +147,7 @@ def _seconds(test: ThesisTest, stage: Stage) -> float:
 
 
 def _cord_reading(test: ThesisTest, k: int) -> CordReading:
-    """Of article k, at the sensor nearest to a cord."""
+    """Reading of article k at the sensor nearest to a cord."""
     at = test.subject.at_cord
     curves = {way: np.abs(r[k].frf.values[:, at, 0]) for way, r in test.cords.items()}
     f = test.cords["free"][k].frf.frequency
@@ -160,12 +160,12 @@ def _cord_reading(test: ThesisTest, k: int) -> CordReading:
 
 
 def _about(ratio: np.ndarray, n: int) -> float:
-    """Largest of a ratio over the lines about one."""
+    """Largest value of a ratio over the lines around one line."""
     return float(ratio[max(n - 4, 0) : n + 5].max())
 
 
 def _peak(f: np.ndarray, H: np.ndarray) -> float:
-    """Top of the parabola through the three highest lines of ln H over ln f [Hz]."""
+    """Vertex of the parabola through the three highest lines of ln H over ln f [Hz]."""
     n = int(np.clip(H.argmax(), 1, len(H) - 2))
     x, y = np.log(f[n - 1 : n + 2] / f[n]), np.log(H[n - 1 : n + 2])
     a, b, _ = np.polyfit(x, y, 2)
@@ -204,7 +204,7 @@ def _between(test: ThesisTest) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _by_strength(test: ThesisTest) -> tuple[float, float]:
-    """Rms between excitations at the faintest and at the strongest lines of every channel [dB]."""
+    """Rms between excitations at the weakest and at the strongest lines of every channel [dB]."""
     half, size = decibels(test) / 2, np.abs(means(test.stepped))
     order = np.argsort(size, axis=0)
     n = max(1, int(OUTER * len(size)))
@@ -213,11 +213,11 @@ def _by_strength(test: ThesisTest) -> tuple[float, float]:
 
 
 def _rms(x: np.ndarray) -> float:
-    """√ mean x², 0 of nothing."""
+    """Root mean square √ mean x²; 0 for no values."""
     return float(np.sqrt((x**2).mean())) if x.size else 0.0
 
 
 def dispersion(x: np.ndarray) -> float:
-    """Highest difference of the rows that all articles have; nan where there is none."""
+    """Largest relative difference of the rows that all articles have; nan without such rows."""
     whole = x[np.isfinite(x).all(axis=1)]
     return float(spread(whole).max()) if len(whole) else float("nan")

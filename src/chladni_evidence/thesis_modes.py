@@ -1,4 +1,4 @@
-"""Modes of the three articles as chapter 5.1 of the thesis identified them, and who is who."""
+"""Modes of the three articles, identified as in chapter 5.1 of the thesis, and their pairing."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,8 @@ from chladni.ema.stabilisation import ghosts, stabilisation
 from chladni.workflows.identify import firm
 
 BAND = (10.0, 195.0)  # [Hz], section 5.1
-CORDS = (23.0, 27.5)  # [Hz] taken out, section 5.1.1
-NEAR, CORD_DAMPING = 0.01, 0.014  # a pole of the cords: so near to their ring, damped by more
+CORDS = (23.0, 27.5)  # [Hz] excluded, section 5.1.1
+NEAR, CORD_DAMPING = 0.01, 0.014  # a cord's pole: this near to its resonance and damped by more
 SAME = 0.9  # MAC of a pole with a stronger one in whose bandwidth it lies: the same mode twice
 
 
@@ -26,10 +26,10 @@ class ArticleIdentified:
     Attributes
     ----------
     frf : FRF             of the recording
-    use : (n_f,) bool     its lines that were identified from
-    whole : Identified    with the poles that no peak confirms and those beside the band
-    modes : Identified    those within the band that are the article's own
-    doubles : (k,)        poles beside one of them with the same shape, or with no peak [Hz]
+    use : (n_f,) bool     lines of the identification
+    whole : Identified    with poles that no peak confirms and poles outside the band
+    modes : Identified    the article's own modes within the band
+    doubles : (k,)        poles next to a mode with the same shape, or without a peak [Hz]
     cords : (l,)          poles of the cords [Hz]
     """
 
@@ -42,13 +42,13 @@ class ArticleIdentified:
 
     @property
     def raw(self) -> FRF:
-        """The lines it was identified from."""
+        """The recording on the lines of the identification."""
         f = self.frf
         return FRF(f.values[self.use], f.frequency[self.use], f.outputs, f.inputs, f.quantity)
 
 
 def used_lines(frequency: np.ndarray) -> np.ndarray:
-    """Lines of the band without the cords' (n_f,) bool."""
+    """Mask of lines of the band without the cords' band (n_f,) bool."""
     inside = (BAND[0] <= frequency) & (frequency <= BAND[1])
     return inside & ((frequency < CORDS[0]) | (frequency > CORDS[1]))
 
@@ -58,7 +58,7 @@ def article_identified(recording: BenchRecording, rings: np.ndarray) -> ArticleI
 
     Parameters
     ----------
-    rings : what the cords are known to ring at [Hz]
+    rings : known resonances of the cords [Hz]
     """
     frf = recording.frf
     use = used_lines(frf.frequency)
@@ -85,7 +85,7 @@ def doubled(found: Identified) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ModesOfArticles:
-    """Modes of A with their partners in B and C; a mode has one at least.
+    """Modes of A with their partners in B and C; every mode has at least one partner.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class ModesOfArticles:
 
 
 def paired(found: tuple[ArticleIdentified, ...]) -> ModesOfArticles:
-    """Modes of A beside those of the other articles that look alike."""
+    """Pair modes of A with the modes of similar shape of the other articles."""
     first = found[0].modes
     f, zeta = (np.full((first.order, len(found)), np.nan) for _ in range(2))
     alike = np.full((first.order, len(found) - 1), np.nan)
@@ -125,7 +125,7 @@ def spread(x: np.ndarray) -> np.ndarray:
 
 
 def errors(found: Identified, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of frequency and of damping ratio against the nearest of the true poles, relative (r,)."""
+    """Relative errors of frequency and of damping ratio against the nearest true pole (r,)."""
     near = poles[np.abs(found.poles[:, None] - poles).argmin(axis=1)]
     zeta = -near.real / np.abs(near)
     return np.abs(found.poles / near).real - 1, found.damping / zeta - 1

@@ -1,4 +1,4 @@
-"""The page of the thesis' chapter: every table and figure of it beside our own."""
+"""The page of the thesis' chapter: every table and figure of it next to our own."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ def thesis_page(pictures: dict[str, Path], test: ThesisTest, found: ThesisFindin
 
 
 def numbers(test: ThesisTest, found: ThesisFindings) -> dict[str, Any]:
-    """``thesis.json``: what the page's tables hold, in SI."""
+    """Content of ``thesis.json``: the numbers of the page's tables, in SI."""
     return {
         "table_3": [vars(row) | {"stage": vars(row.stage)} for row in found.schedule],
         "minutes": found.minutes,
@@ -130,7 +130,7 @@ def _masses(found: ThesisFindings) -> list[Block]:
 
 
 def _rows(found: ThesisFindings, ours: np.ndarray, thesis: np.ndarray, f: Any) -> list[list[str]]:
-    """Our modes with the thesis' nearest ones, and its modes that have none of ours."""
+    """Our modes with the nearest ones of the thesis, and its modes without partner."""
     rows, theirs_of = [], [int(p) for p in found.partner]
     apart = 100 * spread(ours)
     for k, x in enumerate(ours):
