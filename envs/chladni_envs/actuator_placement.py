@@ -1,4 +1,4 @@
-"""Actuator placement: shakers are chosen one a step; those that would rattle are vetoed."""
+"""Actuator placement: shakers are chosen one a step; places that would rattle are vetoed."""
 
 from typing import Any
 
@@ -14,22 +14,22 @@ from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step, of_case
 from .small_specimens import ModalSpecimen, plate
 
-WORST = 1e6  # condition numbers beyond this are no worse than useless
+WORST = 1e6  # limit of the condition number: places beyond it are equally useless
 
 
 class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
-    """Choose ``n_actuators`` places to shake so that every mode is driven about alike.
+    """Choose ``n_actuators`` shaker places so that all modes are driven about equally.
 
     Observation
-        (n,) in [0, 1]: least over greatest Hankel value if the candidate joined those chosen,
-        modes taken one by one (Gregory 1984); 0 where it may not be chosen.
+        (n,) in [0, 1]: least over greatest Hankel value with the candidate added to the chosen ones
+        and modes taken one by one (Gregory 1984). It is 0 for illegal candidates.
     Action
-        Position of the next actuator; ``action_masks()`` and ``info["action_mask"]`` say which are
-        legal: not chosen yet, accessible, without rattle. An illegal action changes nothing.
+        Position of the next actuator. ``action_masks()`` and ``info["action_mask"]`` give the legal
+        ones: not chosen yet, accessible, without rattle. An illegal action changes nothing.
     Reward
-        Change of -log10 κ, κ the condition number of the Hankel values (Echaniz Granado 2015, table
-        2) cut at 1e6; at the first step -log10 κ itself. The rewards add up to ``info["score"]``
-        = -log10 κ.
+        Change of -log10 κ, with κ the condition number of the Hankel values (Echaniz Granado 2015,
+        table 2), limited to 1e6; at the first step -log10 κ itself. The rewards add up to
+        ``info["score"]`` = -log10 κ.
     End
         Terminated with ``n_actuators`` chosen, truncated after four times as many steps.
 
@@ -38,14 +38,14 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     specimen : modes at the candidates; a plate by default
     n_actuators : int
     sensors : (m,) int        positions of the sensors among the candidates; EFI by default
-    access : (n,) bool        where a shaker can be mounted
+    access : (n,) bool        True where a shaker can be mounted
     gap_shapes : (g, r)       relative motion across each gap [1/√kg]
     clearance : (g,)          [m]; access and gaps are found on the mesh of a case
     force : amplitude for which nothing may rattle [N]
-    quantity : what the sensors measure
-    case : folder or deck     whose mesh gives candidates and modes
+    quantity : quantity that the sensors measure
+    case : folder or deck     its mesh gives candidates and modes
     modes : int               number of target modes of a case
-    units : str               unit system of a bare deck, as mm-t-s; a case says its own
+    units : str               unit system of a bare deck, as mm-t-s; a case states its own
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -92,7 +92,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n,), dtype=np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Reset:
-        """No actuator yet."""
+        """Start without actuators."""
         super().reset(seed=seed)
         self.chosen, self.steps, self.score = np.zeros(len(self.allowed), bool), 0, 0.0
         return self._observation(), self._info()
@@ -110,14 +110,14 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         return self._observation(), self.score - before, terminated, truncated, self._info()
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (n,) bool; known from the first reset on."""
+        """Mask of legal actions (n,) bool, known from the first reset on."""
         refuse_before_reset(self, "chosen", "action_masks()")
         if self.chosen.sum() == self.n_actuators:
             return np.zeros_like(self.allowed)
         return self.allowed & ~self.chosen
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """The places as a picture (height, width, 3) uint8."""
+        """Draw the places as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
         refuse_before_reset(self, "chosen", "render()")
@@ -127,7 +127,7 @@ class ActuatorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         return drawing.layout(xy, self.chosen, self.action_masks(), title, lines)
 
     def _observation(self) -> np.ndarray:
-        """σ_min/σ_max of each candidate with those chosen, σ² = diag W_c diag W_o."""
+        """Ratio σ_min/σ_max of each candidate with the chosen ones, σ² = diag W_c diag W_o."""
         squares = self._drive + self._drive[self.chosen].sum(axis=0)
         with np.errstate(invalid="ignore"):
             ratio = np.sqrt(squares.min(axis=1) / squares.max(axis=1))

@@ -1,8 +1,8 @@
-"""Agents, functions ``(observation, info) -> action``: the known methods as players.
+"""Agents, functions ``(observation, info) -> action``, that play the known methods.
 
-``efi`` and ``greedy`` read the observation alone. The searches see the whole problem, work out a
-layout first and then walk to it: they are made for one environment by a call, ``exchange(env)``,
-after its reset where that changes the candidates.
+``efi`` and ``greedy`` read the observation alone. The searches see the whole problem, compute a
+layout first and then walk to it. A call such as ``exchange(env)`` makes them for one environment,
+after its reset where a reset changes the candidates.
 """
 
 from collections.abc import Callable
@@ -23,17 +23,17 @@ Agent = Callable[[np.ndarray, dict[str, Any]], Any]
 
 
 def efi(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
-    """Kammer's: delete the least independent candidate."""
+    """Kammer's method: delete the least independent candidate."""
     return np.int64(pretest.first_min(np.where(info["action_mask"] == 1, observation, np.inf)))
 
 
 def greedy(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
-    """Add the candidate that is worth most now."""
+    """Add the candidate of largest present worth."""
     return np.int64(pretest.first_max(np.where(info["action_mask"] == 1, observation, -np.inf)))
 
 
 def at_random(seed: int = 0) -> Agent:
-    """An agent that takes any legal action."""
+    """An agent that takes random legal actions."""
     rng = np.random.default_rng(seed)
 
     def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
@@ -85,7 +85,7 @@ def genetic(env: gym.Env[Any, Any], *, seed: int = 0, generations: int = 60) -> 
 
 
 def best_actuators(env: gym.Env[Any, Any]) -> Agent:
-    """The actuators of the lowest condition number together."""
+    """The actuators of the lowest joint condition number."""
     inner = env.unwrapped
     if not isinstance(inner, ActuatorPlacementEnv):
         raise ShapeError("this agent places actuators; make it for ActuatorPlacement-v0")
@@ -93,7 +93,7 @@ def best_actuators(env: gym.Env[Any, Any]) -> Agent:
 
 
 def held_back(threshold: float = 0.1) -> Agent:
-    """Free the parameter that explains most of the misfit, while it explains more than a share."""
+    """Free the parameter that explains most of the misfit, if more than a threshold share."""
 
     def agent(observation: np.ndarray, info: dict[str, Any]) -> np.int64:
         explained = np.where(info["action_mask"][:-1] == 1, observation[2], -np.inf)
@@ -127,7 +127,7 @@ def gauss_newton(env: gym.Env[Any, Any], *, damping: float = 1e-3) -> Agent:
 
 
 def play(env: gym.Env[Any, Any], agent: Agent, *, seed: int | None = None) -> dict[str, Any]:
-    """One episode; the last info, with the sum of rewards as ``return``."""
+    """Play one episode; return the last info, with the sum of rewards as ``return``."""
     observation, info = env.reset(seed=seed)
     total, over = 0.0, False
     while not over:

@@ -10,18 +10,18 @@ from .calibration_questions import CalibrationQuestion, plate_question
 from .reset_first import refuse_before_reset
 from .sensor_placement import Reset, Step
 
-DONE = 1e-5  # Q at which model and recording are one
+DONE = 1e-5  # Q at which model and recording agree
 STRIDE = 0.2  # greatest step, in units in which the bounds are -1 and 1
 
 
 class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
-    """Walk through parameter space until Q falls.
+    """Move parameters until Q falls below its limit.
 
     Observation
         (p + 1 + bands n_out,) in [-1, 1]: the parameters; log10 Q / 5; the mean of
-        log10 |H_model / H_recorded| over each of ``bands`` bands and output.
+        log10 |H_model / H_recorded| for each band and output.
     Action
-        (p,) in [-1, 1]: step of each parameter in units of 0.2 of half its range; the parameters
+        (p,) in [-1, 1]: step of each parameter in units of 0.2 of half its range. The parameters
         stay within their bounds.
     Reward
         log10 Q_before/Q_after, Q = mean |log10(H_model / H_recorded)|² with wrapped phase
@@ -34,8 +34,8 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
     ----------
     question : model and recording; by default a simply supported plate with unknown E, ρ, a mass
                and a spring, the truth drawn at every reset
-    case : folder              a case with FRFs: its ordinary parameters within two prior standard
-                               deviations, its fitted lines and channels, damping equalised
+    case : folder              a case with FRFs: its calibration parameters within two prior
+                               standard deviations, its fitted lines and channels, damping equalised
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -63,7 +63,7 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         self.observation_space = gym.spaces.Box(-1.0, 1.0, (size,), dtype=np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Reset:
-        """Back to the nominal model; a new truth unless a recording was given."""
+        """Return to the nominal model; draw a new truth unless a recording was given."""
         super().reset(seed=seed)
         self.x, self.steps = np.zeros(self.p), 0
         if self.question.recorded is None:
@@ -86,16 +86,16 @@ class CalibrationEnv(gym.Env[np.ndarray, np.ndarray]):
         return self._observation(), reward, terminated, truncated, self._info()
 
     def deviation(self, x: np.ndarray) -> np.ndarray:
-        """δ = log10(H_model / H_recorded) (n_f, n_out) complex."""
+        """Deviation δ = log10(H_model / H_recorded) (n_f, n_out) complex."""
         return np.log(self.question.predict(x) / self.recorded) / np.log(10)
 
     def _judge(self) -> None:
-        """δ at the present x, and Q = mean |δ|², floored at 1e-12."""
+        """Compute δ at the present x, and Q = mean |δ|², at least 1e-12."""
         self.delta = self.deviation(self.x)
         self.Q = max(float(np.vdot(self.delta, self.delta).real / self.delta.size), 1e-12)
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """Recording and model at the first output (height, width, 3) uint8."""
+        """Draw recording and model at the first output (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
         refuse_before_reset(self, "delta", "render()")

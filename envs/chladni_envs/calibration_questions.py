@@ -1,4 +1,4 @@
-"""What a calibration environment asks: a model over parameters and what was recorded."""
+"""Problems of a calibration environment: a model over parameters and a recording."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from .small_specimens import plate
 
 @dataclass(frozen=True, eq=False)
 class CalibrationQuestion:
-    """A model over parameters in [-1, 1] and what was recorded.
+    """A model over parameters in [-1, 1] and a recording.
 
     Attributes
     ----------
     names : tuple of str
     frequency : (n_f,)                       [Hz]
     predict : x (p,) -> (n_f, n_out) complex
-    recorded : (n_f, n_out) complex, or None: drawn anew at each reset, x uniform within ±0.8
+    recorded : (n_f, n_out) complex, or None: drawn at each reset, x uniform within ±0.8
     """
 
     names: tuple[str, ...]
@@ -27,7 +27,7 @@ class CalibrationQuestion:
 
 
 def plate_question(modes: int = 8, lines: int = 96) -> CalibrationQuestion:
-    """Mobility of a simply supported plate with E and ρ off by up to 20 %, a mass, a spring.
+    """Mobility of a simply supported plate with E and ρ wrong by up to 20 %, a mass, a spring.
 
     In its nominal modes K = E/E_0 diag ω² + k φ_s φ_sᵀ and M = ρ/ρ_0 I + m φ_m φ_mᵀ.
     """

@@ -1,4 +1,4 @@
-"""Effects of the catalogue as choices on a recorded case: linear for agents, fitted if asked."""
+"""Effects of the catalogue as choices on a recorded case: linear for agents, or fitted."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -25,8 +25,8 @@ class CatalogueChoices:
 
     Attributes
     ----------
-    problem : with errors of the model's form as they spread from the null
-    null : the fit of ordinary parameters and nuisances alone
+    problem : with errors of the model's form from the state of the null
+    null : the fit of calibration parameters and nuisances alone
     candidates : effects, each with the values at which it scored best
     fits : best fits made so far, by the choices in them
     """
@@ -38,22 +38,22 @@ class CatalogueChoices:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each is and where it begins."""
+        """Name of each choice with its starting values."""
         each = ((c.effect, c.effect.location(c.start)) for c in self.candidates)
         return tuple(f"{e.name} {at.text}".rstrip() for e, at in each)
 
     def linearised(self, score: Responses, held: np.ndarray, own: int) -> Linearised:
-        """Fitted and held-out residuals about the deck and their changes, ordinary ones first.
+        """Fitted and held-out residuals about the deck, with columns for parameters and effects.
 
-        An ordinary parameter enters by its slope, an effect by all that it changes at the values
-        at which it scored best (θ = 1).  The nuisances are free in every fit: with the model's
-        error they are whitened out of what is fitted.
+        A calibration parameter enters by its slope.  An effect enters by its whole change at the
+        values at which it scored best (θ = 1).  The nuisances are free in every fit: with the
+        model's error they are whitened out of the fitted data.
 
         Parameters
         ----------
-        score : what held-out data are compared on
+        score : data on which held-out samples are compared
         held : (n_f, n_out) bool     the held-out samples of it
-        own : how many parameters of the base are ordinary and come first
+        own : number of calibration parameters, which come first in the base
         """
         problem, x = self.problem, self.problem.mean()
         fitted, unseen = problem.data, score.only(held)
@@ -73,17 +73,17 @@ class CatalogueChoices:
     def _changes(
         self, candidate: Candidate, data: Iterable[Responses], x: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """Residuals with the candidate where it begins, beside the deck's own parameters."""
+        """Residuals with the candidate at its starting values, added to the deck's parameters."""
         model = self.problem.reduced.model_for(candidate.effect, candidate.start)
         effects = [*self.problem.base, candidate.effect]
         state = evaluate(model, effects, np.concatenate([x, candidate.start]), False)
         return tuple(d.over(model).residual(state, False)[0] for d in data)
 
     def gain(self, chosen: Iterable[int]) -> float:
-        """Gain of a set in -2 ln evidence over the null, less what each of it has to bring.
+        """Gain of a set in -2 ln evidence over the null, less the price of each member.
 
-        Positive: the set would be named before the data that no fit saw are asked.  Every set is
-        fitted once, -inf where no structure is left.
+        If it is positive, the fitted data alone would name the set.  Every set is fitted once; the
+        gain is -inf where no physical structure is left.
         """
         chosen = frozenset(chosen)
         if not chosen:
@@ -94,7 +94,7 @@ class CatalogueChoices:
             return float("-inf")
 
     def beyond_price(self, hypothesis: HypothesisFit) -> float:
-        """What a hypothesis gains over the null, less what each of its effects has to bring."""
+        """Gain of a hypothesis over the null, less the price of each of its effects."""
         due = threshold(self.null.data, len({c.effect.name for c in self.candidates}))
         asked = sum(price(due, size) for size in range(1, len(hypothesis.effects) + 1))
         return self.null.neg2_log_evidence - hypothesis.neg2_log_evidence - asked
@@ -110,6 +110,6 @@ class CatalogueChoices:
 
 
 def catalogue_choices(prepared: Prepared) -> CatalogueChoices:
-    """The choices of a case that was made ready for updating."""
+    """The choices of a case that was prepared for updating."""
     problem, null = without_effects(prepared.problem)
     return CatalogueChoices(problem, null, tuple(candidates(problem, null)))

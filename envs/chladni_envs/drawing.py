@@ -8,10 +8,10 @@ import numpy as np
 def places(
     n: int, points: np.ndarray | None, outline: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where to draw (n, 2) and the structure's edges (k, 2, 2) behind.
+    """Positions in the picture (n, 2) and the structure's edges (k, 2, 2) behind them.
 
-    Points in space are seen along the axis in which they spread least; without points they stand
-    in a circle.
+    Points in space are seen along the axis of their least extent.  Without points the positions
+    form a circle.
     """
     if points is None:
         angle = 2 * np.pi * np.arange(n) / n
@@ -30,7 +30,7 @@ def layout(
     lines: np.ndarray,
     size: float = 4.0,
 ) -> np.ndarray:
-    """Dots on the structure's edges: chosen ones filled, legal ones outlined (h, w, 3) uint8."""
+    """Draw dots on the structure: chosen ones filled, legal ones outlined (h, w, 3) uint8."""
     from matplotlib.collections import LineCollection
 
     figure, ax = _sheet(size, title)
@@ -44,7 +44,7 @@ def layout(
 
 
 def bars(values: np.ndarray, marked: np.ndarray, title: str, size: float = 4.0) -> np.ndarray:
-    """Values as bars, the marked ones dark (h, w, 3) uint8."""
+    """Draw values as bars, marked ones dark (h, w, 3) uint8."""
     figure, ax = _sheet(size, title)
     colours = ["#1f4e79" if m else "0.75" for m in marked]
     ax.bar(np.arange(len(values)), values, color=colours)
@@ -54,7 +54,7 @@ def bars(values: np.ndarray, marked: np.ndarray, title: str, size: float = 4.0) 
 
 
 def curves(x: np.ndarray, pairs: list[tuple[np.ndarray, str]], title: str) -> np.ndarray:
-    """Curves over a frequency axis [Hz], logarithmic magnitude (h, w, 3) uint8."""
+    """Draw curves of logarithmic magnitude over frequency [Hz] (h, w, 3) uint8."""
     figure, ax = _sheet(4.0, title)
     for (y, label), style in zip(pairs, ("0.3", "#b5432a"), strict=False):
         ax.semilogy(x, y, color=style, label=label, linewidth=1.2)

@@ -1,4 +1,4 @@
-"""A case folder or deck as the problem of an environment."""
+"""Problems of an environment from a case folder or deck."""
 
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from .calibration_questions import CalibrationQuestion
 from .catalogue_choices import CatalogueChoices, catalogue_choices
 from .small_specimens import ModalSpecimen
 
-REACH = 2.0  # prior standard deviations at which a calibration environment has its bounds
+REACH = 2.0  # bounds of a calibration environment, in prior standard deviations
 
 
 def specimen(
@@ -28,14 +28,14 @@ def specimen(
 ) -> ModalSpecimen:
     """Flat, reachable places found on the mesh and the first flexible modes along their normals.
 
-    With them goes what decides where to shake: a straight way to the place, and the clearances of
-    the mesh (:mod:`chladni.planning.rattle`).
+    The choice of a shaker place also needs two properties, which are included.  They are a free
+    line to the place and the clearances of the mesh (:mod:`chladni.planning.rattle`).
 
     Parameters
     ----------
     case : folder with a case.toml, that file, or a bare deck
     modes : int          target modes, fewer if the model has fewer
-    candidates : int     places at most
+    candidates : int     largest number of places
     units : str          unit system of a bare deck
     """
     model = load_model(Path(case), units)
@@ -58,13 +58,13 @@ def specimen(
 
 
 class Recorded:
-    """A case with FRFs, made ready for updating: residuals over x/sd of its ordinary effects.
+    """A case with FRFs, prepared for updating: residuals over x/sd of its calibration parameters.
 
     Attributes
     ----------
     names : tuple of str      parameters, as "E of inner"
     effects : tuple of Effect
-    score : Responses         what is compared, damping equalised
+    score : Responses         the compared data, damping equalised
     """
 
     def __init__(self, case: str) -> None:
@@ -89,14 +89,14 @@ class Recorded:
 
     @cached_property
     def catalogue(self) -> CatalogueChoices:
-        """What the search of a diagnosis would try on this case; a scan of some seconds."""
+        """Effects that the search of a diagnosis would try on this case; it takes some seconds."""
         return catalogue_choices(self.prepared)
 
     def linearised(self, effects: bool = False) -> Linearised:
         """Fitted and held-out residuals and their slopes at the prior mean.
 
-        With ``effects`` those of the catalogue follow the ordinary parameters, and the fitted
-        residuals allow for what a model may be wrong by.
+        With ``effects``, effects of the catalogue follow the calibration parameters, and the fitted
+        residuals allow for errors of the model's form.
         """
         if effects:
             return self.catalogue.linearised(self.score, self.prepared.held, len(self.names))

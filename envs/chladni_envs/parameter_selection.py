@@ -1,4 +1,4 @@
-"""Parameter selection: which effects to free in a calibration, judged on data it never saw."""
+"""Parameter selection: effects to free in a calibration, judged on held-out data."""
 
 from typing import Any
 
@@ -17,32 +17,32 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
     """Free parameters one by one, or stop.
 
     Observation
-        (4, p) in [-1, 1]: freed or not (0, 1); posterior standard deviation over the prior's, once
-        it is freed (1: the data say nothing of it); share of the fitted misfit that freeing it
-        would take away; greatest correlation of its column with those freed.
+        (4, p) in [-1, 1]. Row 1: freed or not (0, 1). Row 2: posterior over prior standard
+        deviation, once it is freed (1: the data do not inform it). Row 3: share of the fitted
+        misfit that freeing it would remove. Row 4: greatest correlation with the freed columns.
     Action
         0 ... p - 1 frees that parameter, p stops. A parameter already free is illegal and changes
         nothing.
     Reward
         Change of the score: log10 Q_nominal/Q_fitted of the **held-out** data (decades gained) less
-        ``cost`` times Σ s_k², the number of freed parameters the data say nothing of. The rewards
-        add up to ``info["score"]``.
+        ``cost`` times Σ s_k², the effective number of freed parameters that the data do not inform.
+        The rewards add up to ``info["score"]``.
     End
         Terminated by stop, or with all freed; truncated after 4 p steps.
 
     Parameters
     ----------
-    problem : Linearised       residuals and sensitivities; by default one is drawn anew at every
-                               reset: p parameters of which one to three are off, two of them
-                               nearly twins
-    case : folder              a case with FRFs: its ordinary parameters, linearised at the deck
-    effects : bool             of a case, the effects of the catalogue too: every candidate that a
-                               diagnosis would try is a choice, at the place and of the size at
-                               which it scored best. ``names`` says what each choice is, and
-                               ``gain(kept)`` what a set is worth when it is fitted as a diagnosis
-                               fits it: seconds, where a step takes microseconds
+    problem : Linearised       residuals and sensitivities; by default one is drawn at every reset:
+                               p parameters of which one to three are wrong, two of them nearly
+                               equal in effect
+    case : folder              a case with FRFs: its calibration parameters, linearised at the deck
+    effects : bool             for a case, also the effects of the catalogue: every candidate that a
+                               diagnosis would try is a choice, at the place and of the size of
+                               its best score. ``names`` describes each choice. ``gain(kept)`` is
+                               the worth of a set fitted as in a diagnosis: it takes seconds, where
+                               a step takes microseconds
     p : int                    parameters of the drawn problems
-    cost : float               decades a parameter that is not learned costs
+    cost : float               decades that an uninformed parameter costs
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
@@ -75,7 +75,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         self.observation_space = gym.spaces.Box(-1.0, 1.0, (4, self.p), dtype=np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Reset:
-        """Nothing freed; a new problem unless one was given."""
+        """Start without freed parameters; draw a new problem unless one was given."""
         super().reset(seed=seed)
         self.problem = self.given or drawn(self.np_random, self.p)
         J = self.problem.jacobian
@@ -95,15 +95,15 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         return self._observation(), self.score - before, self.over, truncated, self._info()
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (p + 1,) bool; known from the first reset on."""
+        """Mask of legal actions (p + 1,) bool, known from the first reset on."""
         refuse_before_reset(self, "over", "action_masks()")
         return np.zeros(self.p + 1, bool) if self.over else np.r_[~self.freed, True]
 
     def gain(self, kept: np.ndarray) -> float:
-        """What the effects in a selection gain together in -2 ln evidence, less their price.
+        """Joint gain of the effects in a selection in -2 ln evidence, less their price.
 
-        Above 0 a diagnosis would name them all, had the data that no fit saw no say; ordinary
-        parameters are free in every such fit.
+        Above 0 a diagnosis would name them all if held-out data had no vote. Calibration parameters
+        are free in every such fit.
 
         Raises
         ------
@@ -117,7 +117,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         return self.catalogue.gain(np.flatnonzero(kept[self.own :]).tolist())
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """Estimates of the parameters as bars (height, width, 3) uint8."""
+        """Draw estimates of the parameters as bars (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
         refuse_before_reset(self, "over", "render()")
@@ -125,7 +125,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
         return drawing.bars(self.problem.fitted(self.freed), self.freed, title)
 
     def score_of(self, freed: np.ndarray) -> float:
-        """Score of any selection (p,) bool: decades gained less what is not learned."""
+        """Score of any selection (p,) bool: decades gained less the cost of uninformed ones."""
         return self.problem.improvement(freed) - self.cost * self.problem.unlearned(freed)
 
     def _observation(self) -> np.ndarray:
@@ -148,7 +148,7 @@ class ParameterSelectionEnv(gym.Env[np.ndarray, np.int64]):
 
 
 def drawn(rng: np.random.Generator, p: int, m: int = 60) -> Linearised:
-    """A problem r = J (θ - θ*) + noise with one to three θ* of several prior deviations."""
+    """A problem r = J (θ - θ*) + noise, with one to three θ* several prior sd from the mean."""
     truth = np.zeros(p)
     wrong = rng.permutation(p)[: rng.integers(1, 4)]
     truth[wrong] = rng.choice([-1.0, 1.0], len(wrong)) * rng.uniform(1.5, 3.0, len(wrong))

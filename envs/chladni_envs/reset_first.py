@@ -1,4 +1,4 @@
-"""Whoever asks an environment for its state before there is one is told so in a sentence."""
+"""Error for a request of an environment's state before its first reset."""
 
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
@@ -10,7 +10,7 @@ def refuse_before_reset(env: gym.Env, state: str, asked: str) -> None:
     Raises
     ------
     ResetNeeded
-        It names what was asked and the call that is due.
+        It names the request and the call that is needed first.
     """
     if not hasattr(env, state):
         raise ResetNeeded(f"{asked}: call reset() first; there is no state to tell of before")

@@ -19,28 +19,29 @@ Step = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 
 def of_case(case: str, modes: int, units: str | None = None) -> ModalSpecimen:
     """Candidates and target modes of a case folder or deck (see :mod:`.environment_cases`)."""
-    from .environment_cases import specimen  # loads the finite element part of the package only now
+    from .environment_cases import specimen  # the finite element part is loaded only here
 
     return specimen(case, modes, units=units)
 
 
 class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
-    """Reach a layout of ``n_sensors`` that tells the modes (or parameters) apart.
+    """Reach a layout of ``n_sensors`` that distinguishes the modes (or parameters).
 
     Observation
-        (n,) in [0, 1]: with moves = "delete" the effective independence of the candidates left,
-        with "add" the growth of log det F that each other would bring, over 30; 0 elsewhere.
+        (n,) in [0, 1]. With moves = "delete" it is the effective independence of the remaining
+        candidates. With "add" it is the growth of log det F by each further candidate, over 30. It
+        is 0 elsewhere.
     Action
         Position of the candidate to delete (or to add). ``action_masks()`` and
-        ``info["action_mask"]`` say which are legal: rules are obeyed, no mode is lost. An illegal
+        ``info["action_mask"]`` give the legal ones: rules are obeyed, no mode is lost. An illegal
         action changes nothing.
     Reward
         Change of log det F. The rewards of an episode add up to the score ``info["score"]``: log
         det of the layout less that of the start (all candidates, or the faint prior). Layouts
         compare by ``info["log_det"]``.
     End
-        Terminated with ``n_sensors`` kept (or nothing legal left); truncated after four times as
-        many steps as are needed.
+        Terminated with ``n_sensors`` kept (or without a legal action); truncated after four times
+        the number of steps needed.
 
     Parameters
     ----------
@@ -50,11 +51,10 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
     moves : "delete" or "add"
     points : (n, 2) or (n, 3)     places [m], for pictures
     noise, prior, rules : as in :func:`chladni.planning.effective_independence`
-    unusable : float              share of candidates that, drawn anew at each reset, turn out
-                                  not to be usable
-    case : folder or deck         whose mesh gives candidates and modes (phi is then None)
+    unusable : float              share of candidates that are unusable, drawn at each reset
+    case : folder or deck         its mesh gives candidates and modes (phi is then None)
     modes : int                   number of target modes of a case
-    units : str                   unit system of a bare deck, as mm-t-s; a case says its own
+    units : str                   unit system of a bare deck, as mm-t-s; a case states its own
 
     A frame of ``render_mode="rgb_array"`` is 256 pixels high and 320 wide.
     """
@@ -89,7 +89,7 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
             raise LabelError(f"moves {moves!r}; there are delete and add")
         self.grow, self.rules, self.unusable = moves == "add", rules or Rules(), unusable
         self.points, self.render_mode = points, render_mode
-        self.walk = self._walk(np.zeros(n, bool))  # refuses an impossible request at once
+        self.walk = self._walk(np.zeros(n, bool))  # an impossible request raises here
         self.action_space = gym.spaces.Discrete(n)
         self.observation_space = gym.spaces.Box(0.0, 1.0, (n,), dtype=np.float64)
 
@@ -117,12 +117,12 @@ class SensorPlacementEnv(gym.Env[np.ndarray, np.int64]):
         return self.walk.worth.copy(), float(reward), bool(terminated), bool(truncated), info
 
     def action_masks(self) -> np.ndarray:
-        """Legal actions (n,) bool; known from the first reset on."""
+        """Mask of legal actions (n,) bool, known from the first reset on."""
         refuse_before_reset(self, "mask", "action_masks()")
         return self.mask.copy()
 
     def render(self) -> np.ndarray | None:  # type: ignore[override]
-        """The layout as a picture (height, width, 3) uint8."""
+        """Draw the layout as a picture (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return None
         refuse_before_reset(self, "mask", "render()")

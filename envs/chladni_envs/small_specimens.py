@@ -1,4 +1,4 @@
-"""What the environments play on when no case is given: small structures with known modes."""
+"""Default problems of the environments: small structures with known modes."""
 
 from dataclasses import dataclass
 
@@ -7,18 +7,18 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class ModalSpecimen:
-    """Modes at places where something may be mounted.
+    """Modes at places where a sensor or shaker may be mounted.
 
     Attributes
     ----------
     points : (n, 2) or (n, 3)  places [m]
     phi : (n, r)               mass-normalised shapes along each place's direction [1/√kg]
     frequency, damping : (r,)  [Hz], fraction of critical
-    labels : tuple of str      what the places are called
+    labels : tuple of str      labels of the places
     outline : (k, 2, 3)        edges of the structure, for pictures [m]
-    access : (n,) bool         a shaker's rod leads straight to the place
+    access : (n,) bool         True where a free line leads to the place, for a shaker's rod
     gap_shapes : (g, r)        opening of gaps between sheets [1/√kg]
-    clearance : (g,)           of these [m]
+    clearance : (g,)           of these gaps [m]
     """
 
     points: np.ndarray
