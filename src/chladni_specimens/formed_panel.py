@@ -1,4 +1,4 @@
-"""Thickness of the folded panel after forming: thin at its two folds, a little where it bulges."""
+"""Thickness of the folded panel after forming: thin at its two folds, slightly at the bulge."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from chladni.geometry.formed_mesh import FormedMesh
 from .mesher.forming import COARSEST, FormedSheet, Forming, formed_mesh, pressed
 from .plates import bulge, grid
 
-STRENGTH = 0.21  # as of the tailgate's outer upper panel
+STRENGTH = 0.21  # equal to the tailgate's outer upper panel
 FINEST = 5.5e-3  # size of the forming mesh across the folds [m]
 
 
@@ -27,7 +27,7 @@ def formed_panel(
     """
 
     def places(plan: np.ndarray) -> np.ndarray:
-        """From x, the developed width s and the height above the plane (n, 3)."""
+        """Places (n, 3) from x, the developed width s and the height above the plane (n, 3)."""
         x, s, z = plan.T
         y = np.clip(s, 0, width)
         return np.column_stack([x, y, z - np.abs(s - y)])

@@ -25,7 +25,7 @@ def holed_plate(
     ----------
     length, width, h, t : [m]
     hole : (x, y, radius) [m]
-    times : int         every element of the mesh of size h cut this many times along each side
+    times : int         number of pieces along each side of an element of the mesh of size h
     """
     x, y, r = hole
     a = 1.8 * r  # half side of the box

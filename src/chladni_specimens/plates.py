@@ -86,7 +86,7 @@ def box(
     t: float = 1e-3,
     material: Material = STEEL,
 ) -> Assembly:
-    """A closed box of six plates, one part a pair of walls: "x walls", "y walls", "z walls"."""
+    """A closed box of six plates, one part per pair of walls: "x walls", "y walls", "z walls"."""
     size = (length, width, height)
     counts = [max(1, round(edge / h)) for edge in size]
     patches: list[np.ndarray] = []
@@ -117,7 +117,7 @@ def sheet(
     names: tuple[str, ...] = ("plate",),
     supports: np.ndarray | None = None,
 ) -> Assembly:
-    """Shells of one material over given points; points no shell uses are dropped.
+    """Shells of one material over given points; points without shells are dropped.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def grid(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def merged(points: np.ndarray, nodes: np.ndarray, within: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same cells with points that coincide within a distance made one."""
+    """Merge points that coincide within a distance; the cells keep their order."""
     key = np.round(points / within).astype(np.int64)
     _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return points[first], back.reshape(-1)[nodes]

@@ -1,4 +1,4 @@
-"""A form: the ranges its dimensions are drawn from, how it is meshed, which way it is rolled."""
+"""A form: ranges of its random dimensions, its mesher, and its direction of rolling."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class DrawnForm:
     ranges : {name: (low, high)}   each dimension is drawn between them [m, rad, share]
     build : (dimensions, element size) -> Assembly
     size : element size of the deck [m]
-    material_axis : direction a sheet may be rolled in, normal to none of the parts in ``rolled``
+    material_axis : direction of rolling of a sheet, normal to no part in ``rolled``
     rolled : names of these parts; empty where there is no sheet
     """
 
@@ -33,7 +33,7 @@ class DrawnForm:
     rolled: tuple[str, ...] = ()
 
     def dimensions(self, seed: int) -> dict[str, float]:
-        """The dimensions of one seed, the same on every mesh."""
+        """The dimensions of one seed, equal on every mesh."""
         rng = np.random.default_rng([seed, *self.name.encode()])
         return {name: float(rng.uniform(*ends)) for name, ends in self.ranges.items()}
 

@@ -1,4 +1,4 @@
-"""Structured pieces of sheet put together: points that coincide are one."""
+"""Structured pieces of sheet, joined where their points coincide."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -20,7 +20,7 @@ Numbers = Mapping[str, float]
 
 
 def bolted_bracket(d: Numbers, h: float) -> Assembly:
-    """A plate and an angle, its lower leg over the plate's end, held by four screws."""
+    """A plate and an angle bracket, with its lower leg over the plate's end and four screws."""
     L, W, leg, rise, gap = (d[k] for k in ("length", "width", "leg", "rise", "gap"))
     y = stops([0.0, W], h)
     pieces = [
@@ -68,7 +68,7 @@ def _round_the_rim(d: Numbers) -> np.ndarray:
 
 
 def ribbed_plate(d: Numbers, h: float) -> Assembly:
-    """A plate with three upright ribs along it and one across, all of one piece."""
+    """A plate with three upright ribs along it and one across, in one piece."""
     L, W, H = d["length"], d["width"], d["rib"]
     across, along = d["along"] * L, [f * W for f in (d["first"], 0.5, d["last"])]
     x, y = stops([0.0, across, L], h), stops([0.0, *along, W], h)
@@ -109,7 +109,7 @@ def curved_shell(d: Numbers, h: float) -> Assembly:
 
 
 def bonded_plates(d: Numbers, h: float) -> Assembly:
-    """Two plates, the one over the end of the other, with a layer of adhesive of solids between."""
+    """Two overlapping plates with a layer of adhesive solids between them."""
     L1, L2, W1, W2, lap = (d[k] for k in ("length 1", "length 2", "width 1", "width 2", "lap"))
     t1, t2, glue = d["t 1"], d["t 2"], d["glue"]
     z = (t1 + t2) / 2 + glue

@@ -24,9 +24,9 @@ def pipe(outer: float, t: float, material: Isotropic = STEEL) -> BeamSection:
 
 
 def tube_frame(d: Mapping[str, float], h: float) -> Assembly:
-    """A flat ladder of two rails and three cross members, a bow over its one end, two struts.
+    """A flat ladder of two rails and three cross members, a bow over one end, two struts.
 
-    A finer mesh splits the elements of the coarse one, so that all have the grids of that.
+    A finer mesh splits the elements of the coarse one, so all meshes have its grids.
     """
     split = max(1, round(COARSE / h))
     L, W, H, bay = d["length"], d["width"], d["height"], d["bay"]

@@ -42,8 +42,8 @@ def free_edges(nodes: np.ndarray) -> np.ndarray:
 def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
     """Rows of the points round a hole: its rim, else free edges within `radius`, else a shell's.
 
-    A hole is a closed free edge no wider than four radii whose middle is within two radii. Where a
-    mesh does not resolve a bolt hole, the nearest shell stands for it.
+    A hole is a closed free edge no wider than four radii whose middle is within two radii. The
+    nearest shell replaces a bolt hole that the mesh does not resolve.
     """
     sides = free_edges(surface.nodes)
     if len(loop := _loop(surface.points, sides, place, radius)):
@@ -56,7 +56,7 @@ def rim(surface: ShellSurface, place: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _loop(points: np.ndarray, sides: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
-    """Rows of the small closed edge nearest to a place; none if there is none."""
+    """Rows of the small closed edge nearest to a place; empty without such an edge."""
     near = sides[np.linalg.norm(points[sides[:, 0]] - place, axis=1) <= 6 * radius]
     if not len(near):
         return np.zeros(0, int)
@@ -89,9 +89,10 @@ def screw(
     reach: float = REACH,
     name: str = "screws",
 ) -> Joined:
-    """A bar between the rims of two holes (RBE2), its mass half at either end.
+    """A bar between the rims of two holes (RBE2), with half of the mass at each end.
 
-    The bar weighs little over the millimetre between two sheets; head and nut make up the rest.
+    The bar itself has little mass over the millimetre between two sheets; head and nut have the
+    rest.
     """
     place = np.asarray(place, dtype=float)
     surfaces = tuple(ShellSurface.of(assembly, s) for s in sheets)
@@ -126,7 +127,7 @@ def _ends(a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 
 def _round_bar(material: Isotropic, d: float) -> BeamSection:
-    """A = π d²/4, I = π d⁴/64, J = 2 I."""
+    """Section of a round bar: A = π d²/4, I = π d⁴/64, J = 2 I."""
     I = np.pi * d**4 / 64
     return BeamSection(material, np.pi * d**2 / 4, I, I, 0.0, 2 * I)
 
@@ -175,7 +176,7 @@ def tied_hole(
     radius: float = 0.006,
     reach: float = REACH,
 ) -> Joined:
-    """The rims of an empty hole in all its sheets on one RBE2, which reality does not have."""
+    """One RBE2 over the rims of an empty hole in all its sheets, which has no real counterpart."""
     place = np.asarray(place, dtype=float)
     surfaces = [ShellSurface.of(assembly, s) for s in sheets]
     feet = [s.feet(place[None]) for s in surfaces]
@@ -204,7 +205,7 @@ def grip(
 ) -> Joined:
     """Springs k (u_a - u_b)·e between two sheets at one point each, so that rigid motion is free.
 
-    Both ends are RBE3 grids at the same place: a spring over a gap would hold rotations.
+    Both ends are RBE3 grids at the same place, because a spring over a gap would resist rotation.
 
     Parameters
     ----------
@@ -240,7 +241,7 @@ def _frames(directions: np.ndarray) -> np.ndarray:
 
 
 def along_line(line: np.ndarray, per_length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Unit tangents (k, 3) of a polyline and what of `per_length` each of its points stands for."""
+    """Unit tangents (k, 3) of a polyline and the share of `per_length` at each of its points."""
     t = np.gradient(line, axis=0)
     length = np.linalg.norm(t, axis=1)
     return t / length[:, None], per_length * length
@@ -260,7 +261,7 @@ def hem(
     reach: float = REACH,
     name: str = "hem adhesive",
 ) -> Joined:
-    """A string of adhesive beside the inner sheet's edge, and a grip against sliding along it.
+    """A string of adhesive along the inner sheet's edge, and springs against sliding along it.
 
     Parameters
     ----------
@@ -291,7 +292,7 @@ def hem(
 
 
 def _inboard(surface: ShellSurface, edge: np.ndarray, inset: float) -> np.ndarray:
-    """The edge moved into the sheet along its surface, on the side where the sheet is."""
+    """The edge moved into the sheet along its surface."""
     tangent, _ = along_line(edge, 1.0)
     side = np.cross(surface.feet(edge).normal, tangent)
     side /= np.linalg.norm(side, axis=1, keepdims=True)

@@ -1,9 +1,9 @@
 """Joint builders: spot welds, adhesive beads, hems, screws, masses, on any assembly.
 
-Welds and adhesive are solids whose corners follow the nearest shells (RBE3), screws are bars
+Welds and adhesive are solids whose corners follow the nearest shells (RBE3).  Screws are bars
 between rigid spiders (RBE2), as in Echaniz Granado (2015), section 2.3. Every builder finds its
-faces itself, refuses what it cannot connect with the place and the distance, and reports what it
-connected.
+faces itself and reports its connections. Its error for a failed connection names place and
+distance.
 """
 
 from collections.abc import Sequence
@@ -28,13 +28,13 @@ SOFT_ADHESIVE = Isotropic(6e6, 0.4, 1000.0, id=2)
 
 @dataclass(frozen=True)
 class Joint:
-    """What a builder connected.
+    """A connection made by a builder.
 
     Attributes
     ----------
     kind : str              "spot weld", "adhesive", "screw", "hem", "tied hole", "grip"
     place : (3,)            middle [m]
-    sheets : (str, str)     names of what was joined
+    sheets : (str, str)     names of the joined sheets
     elements : tuple of int ids of the solids, bars or springs
     distance : float        farthest corner from its sheet [m]
     """
@@ -50,7 +50,7 @@ Joined = tuple[Assembly, tuple[Joint, ...]]
 
 
 def with_part(assembly: Assembly, name: str, section: Section) -> tuple[Assembly, int]:
-    """The assembly with this part, and its position; a part of that name is used again."""
+    """The assembly with this part, and its position; an existing part of that name is reused."""
     for k, part in enumerate(assembly.parts):
         if part.name == name:
             return assembly, k
@@ -59,7 +59,7 @@ def with_part(assembly: Assembly, name: str, section: Section) -> tuple[Assembly
 
 
 def _with_hexahedra(assembly: Assembly, ids: np.ndarray, nodes: np.ndarray, part: int) -> Assembly:
-    """The hexahedra joined to those there are, one family."""
+    """The assembly with these hexahedra added to its own, as one family."""
     new = (ids, nodes, np.full(len(ids), part))
     old = [s for s in assembly.solids if s.nodes.shape[1] == 8]
     rest = tuple(s for s in assembly.solids if s.nodes.shape[1] != 8)
@@ -71,7 +71,7 @@ def _with_hexahedra(assembly: Assembly, ids: np.ndarray, nodes: np.ndarray, part
 def averages(
     first: int, references: np.ndarray, carriers: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> tuple[Average, ...]:
-    """One RBE3 per reference: its translations are the weighted rigid motion of the carriers'."""
+    """One RBE3 per reference, which translates with the weighted rigid motion of its carriers."""
     T = (1, 2, 3)
     return tuple(
         Average(
@@ -155,7 +155,7 @@ def _carriers(
     corners: np.ndarray,
     owner: np.ndarray,
 ) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """(rows, weights) that carry each corner, and its distance from its sheet."""
+    """Rows and weights that carry each corner, and its distance from its sheet."""
     out: list = [None] * len(places)
     far = np.zeros(len(places))
     for k, surface in enumerate(sheets):
@@ -186,7 +186,7 @@ def _facing(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Feet on a, unit axes from a to b and the distances (k,) of the sheets there.
 
-    Sheets that touch leave no distance: then the axis is the normal of a, and the distance half
+    Sheets that touch have no distance.  The axis is then the normal of a, and the distance half
     the sum of the thicknesses.
     """
     foot = a.feet(places)
@@ -209,7 +209,7 @@ def _facing(
 def _centred(
     start: np.ndarray, axis: np.ndarray, distance: np.ndarray, height: float | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The axes cut to a height in the middle of the distance; None leaves all of it."""
+    """The axes, cut to a height in the middle of the distance; None keeps the whole distance."""
     h = distance if height is None else np.full(len(start), height)
     return start + axis * ((distance - h) / 2)[:, None], axis, h
 
@@ -230,8 +230,8 @@ def spot_welds(
 
     With `height` the solid has that height in the middle of the distance: spots of mastic.
 
-    Without `sheets` each place joins the two parts nearest to it. `patch` holds the sheets over a
-    disc of that radius instead of over the nearest shell, which makes the weld's stiffness
+    Without `sheets` each place joins the two parts nearest to it. With `patch` the weld holds the
+    sheets over a disc of that radius instead of the nearest shell.  Its stiffness is then
     independent of the mesh.
     """
     places = np.atleast_2d(np.asarray(places, dtype=float))
@@ -311,7 +311,7 @@ def adhesive_bead(
 
 
 def followed(line: np.ndarray, pitch: float | None) -> np.ndarray:
-    """The polyline (k, 3) at even pitch, or as it is."""
+    """The polyline (k, 3) at even pitch, or unchanged without a pitch."""
     if len(line) < 2:
         raise ModelError(f"a bead needs a line of two points or more, {len(line)} given")
     if pitch is None:

@@ -1,7 +1,7 @@
 """A base surface: a centre line in the plane y = 0, swept with a crown across.
 
-P(y, s, d) = C(s) - c(s) y² e(s) - d n(y, s) with e = (cos φ, 0, sin φ) the line's normal; a point
-of a pressing lies the depth d below the surface along its outward normal n.
+P(y, s, d) = C(s) - c(s) y² e(s) - d n(y, s), where e = (cos φ, 0, sin φ) is the line's normal. A
+point of a pressing lies the depth d below the surface along its outward normal n.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from chladni.arrays import readonly
 
 
 def ramp(x: np.ndarray) -> np.ndarray:
-    """min(max(x, 0), 1)."""
+    """Ramp min(max(x, 0), 1)."""
     return np.clip(x, 0.0, 1.0)
 
 

@@ -1,8 +1,8 @@
 """Quad-dominant meshes of flat regions: strips along borders, grids, and the rest filled.
 
-The filler keeps the border's points, places points along feature lines, in rings parallel to
-the border and on a square grid, joins them by Delaunay triangulation (Bowyer, Watson 1981),
-pairs the triangles into quadrilaterals and smooths. It knows the plane only; a pressing is the
+The filler keeps the border's points.  It adds points along feature lines, in rings parallel to the
+border and on a square grid. Delaunay triangulation (Bowyer, Watson 1981) joins them; the triangles
+are then paired into quadrilaterals and smoothed. The filler works in the plane; a pressing is the
 image of its plane mesh under a height field.
 """
 
@@ -33,11 +33,11 @@ def fill(
 
     Parameters
     ----------
-    outer, holes : closed lines (k, 2), their points are kept and come first
+    outer, holes : closed lines (k, 2); their points are kept and come first
     size : mesh size [m]
     lines : polylines of feature points (folds); cell edges follow them
-    rings : rows of points parallel to the borders before the square grid takes over
-    closest : feature points farther apart than this are kept though the size is larger [m]
+    rings : rows of points parallel to the borders before the square grid begins
+    closest : feature points farther apart than this are kept even in a coarser mesh [m]
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _away(line: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _lattice(outer: np.ndarray, size: float) -> np.ndarray:
-    """Square grid over the bounding box, symmetric to its middle."""
+    """Square grid over the bounding box, symmetric about its middle."""
     low, high = outer.min(axis=0), outer.max(axis=0)
     axes = []
     for a, b in zip(low, high, strict=True):
@@ -156,7 +156,7 @@ def _refuse_lost_borders(
 
 
 def _compact(points: np.ndarray, quads: np.ndarray, fixed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points that carry a cell (the first `fixed` always stay in place) and renumbered quads."""
+    """Points that a cell uses (the first `fixed` always stay) and renumbered quads."""
     used = np.zeros(len(points), bool)
     used[quads] = True
     row = np.cumsum(used) - 1

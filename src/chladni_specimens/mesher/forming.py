@@ -1,8 +1,8 @@
-"""Thickness as forming leaves it: thin where the sheet was bent and stretched.
+"""Thickness after forming: thin where the sheet was bent and stretched.
 
-Stands in for a forming simulation. A pressing's curvature κ and its stretch ε against the plain
-skin give an indicator, t = t₀ (1 - min(a i, 0.38)) with i = 0.95 (κ/(κ+40))^1.35 + 0.05 ε/0.35
-and a strength a of the part. Values are kept on a regular grid of the planform.
+This replaces a forming simulation. The thickness is t = t₀ (1 - min(a i, 0.38)) with the strength a
+of the part and the indicator i = 0.95 (κ/(κ+40))^1.35 + 0.05 ε/0.35. κ is the curvature of the
+pressing, ε its stretch against the plain skin. Values are kept on a regular grid of the planform.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,10 +20,10 @@ from .quads_from_triangles import paired
 Places = Callable[[np.ndarray], np.ndarray]  # planform and depth (n, 3) -> places (n, 3) [m]
 
 STEP = 2.5e-3  # of the grid on which curvature is taken [m]
-BENT, STRETCHED = 40.0, 0.35  # κ [1/m] and stretch that count as much
+BENT, STRETCHED = 40.0, 0.35  # scales of κ [1/m] and of stretch in the indicator
 COARSEST = 22e-3  # size of the forming mesh where the sheet is flat [m]
 FINE_AT = 30.0  # curvature at which the forming mesh has its finest size [1/m]
-MOST = 0.38  # thinning no sheet survives
+MOST = 0.38  # thinning at which a sheet would tear
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Field:
     values: np.ndarray
 
     def at(self, plan: np.ndarray) -> np.ndarray:
-        """Bilinear interpolation at planform points (k, 2); the rim's value beyond it."""
+        """Bilinear interpolation at planform points (k, 2); the value at the rim beyond it."""
         at = (plan[:, :2] - self.low).T / STEP
         return map_coordinates(self.values, at, order=1, mode="nearest")
 
@@ -74,7 +74,7 @@ def _normal(P: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
 
 @dataclass(frozen=True, eq=False)
 class Forming:
-    """What forming did to one part, over the planform.
+    """Effect of forming on one part, over the planform.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Forming:
         strength: float,
         paired: bool = False,
     ) -> "Forming":
-        """From curvature and stretch."""
+        """Forming of a part from its curvature and stretch."""
         kappa, stretch = fields
         bent = (kappa.values / (kappa.values + BENT)) ** 1.35
         indicator = replace(kappa, values=0.95 * bent + 0.05 * stretch.values / STRETCHED)
@@ -109,7 +109,7 @@ class Forming:
         return np.column_stack([np.abs(plan[:, 0]), plan[:, 1]]) if self.paired else plan[:, :2]
 
     def thickness(self, plan: np.ndarray) -> np.ndarray:
-        """t(y, s) = t₀ (1 - min(a i, 0.38)) [m] at planform points (n, 2 or 3)."""
+        """Thickness t(y, s) = t₀ (1 - min(a i, 0.38)) [m] at planform points (n, 2 or 3)."""
         thinning = self.strength * self.indicator.at(self._stored(plan))
         return self.gauge * (1 - np.minimum(thinning, MOST))
 
@@ -122,8 +122,8 @@ class Forming:
 def corner_thickness(field: Depth, cells: np.ndarray) -> np.ndarray:
     """Thickness (n, 4) of cells given by planform corners (n, 4, 2 or 3).
 
-    Each corner takes the value of the Gauss point next to it, so that the bilinear thickness has
-    the field's integral; the value at the corner itself, on a fold, would be too thin.
+    Each corner takes the value of its nearest Gauss point, so that the bilinear thickness has the
+    integral of the field. The value at the corner itself, on a fold, would be too thin.
     """
     near, far = 0.5 + np.array([1, -1]) / np.sqrt(12)
     weight = np.array([near**2, near * far, far**2, near * far])

@@ -1,4 +1,4 @@
-"""Graded triangle meshes, fine where a size field asks for it, as forming simulations have them."""
+"""Graded triangle meshes by a size field, as in forming simulations."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,7 +10,7 @@ from chladni.errors import ModelError
 from ..joints.bolts import free_edges
 from .plane_curves import counterclockwise, inside, resampled
 
-SizeField = Callable[[np.ndarray], np.ndarray]  # planform (n, 2) -> wanted size (n,) [m]
+SizeField = Callable[[np.ndarray], np.ndarray]  # planform (n, 2) -> required size (n,) [m]
 
 
 def loops(nodes: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
@@ -47,7 +47,7 @@ def _length(line: np.ndarray) -> float:
 def quadtree(
     low: np.ndarray, high: np.ndarray, size: SizeField, coarse: float, fine: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (n, 2) and sides (n,) of square cells no larger than the size field wants."""
+    """Centres (n, 2) and sides (n,) of square cells no larger than the size field allows."""
     axes = [
         np.arange(a + coarse / 2, b + coarse / 2, coarse) for a, b in zip(low, high, strict=True)
     ]

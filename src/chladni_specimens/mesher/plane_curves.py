@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from chladni.arrays import readonly
 
-FAR = 0.12  # beyond this a loop does not say how far it is [m]
+FAR = 0.12  # largest distance from a loop that is computed [m]
 
 
 def counterclockwise(loop: np.ndarray) -> np.ndarray:
@@ -60,8 +60,8 @@ def resampled(
 ) -> np.ndarray:
     """The line with evenly spaced points: `count` pieces, or pieces of about `step`.
 
-    A closed line gets an even number of points, as all-quad regions need it, and does not repeat
-    its first; an open line keeps both ends (pieces + 1 points).
+    A closed line gets an even number of points, as all-quad regions need, and does not repeat its
+    first point. An open line keeps both ends (pieces + 1 points).
     """
     dense = np.vstack([line, line[:1]]) if closed else np.asarray(line)
     along = arc_length(dense)
@@ -90,7 +90,7 @@ def rectangle(x0: float, y0: float, x1: float, y1: float, radius: float) -> np.n
 
 
 def stadium(a: Sequence[float], b: Sequence[float], radius: float) -> np.ndarray:
-    """All points at one distance from a straight piece, as a dense closed line."""
+    """Points at one distance from a straight segment, as a dense closed line."""
     p, q = np.array(a, dtype=float), np.array(b, dtype=float)
     e = _unit(q - p)
     angle = np.linspace(-np.pi / 2, np.pi / 2, 25)[:, None]
@@ -100,7 +100,7 @@ def stadium(a: Sequence[float], b: Sequence[float], radius: float) -> np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A closed line, dense enough to be measured from.
+    """A closed line, dense enough to measure distances from it.
 
     Attributes
     ----------

@@ -1,8 +1,7 @@
-"""Sheets: pressings as height fields over a plane, put together from meshed patches.
+"""Sheets: pressings as height fields over a plane, joined from meshed patches.
 
-A point of a sheet has planform coordinates (y, s) and a depth d below a base surface; the base
-surface says where that is in space. Patches are meshed in the plane and joined where their
-nodes coincide.
+A point of a sheet has planform coordinates (y, s) and a depth d below a base surface, which gives
+its place in space. Patches are meshed in the plane and joined where their nodes coincide.
 """
 
 from collections.abc import Callable, Sequence
@@ -61,7 +60,7 @@ class Patches:
         depth: Depth | float | Sequence[float] | np.ndarray,
         zone: int = MAIN,
     ) -> None:
-        """A patch from its plane mesh and its depth (field, constant or one value per node)."""
+        """Add a patch from its plane mesh and its depth (field, constant or value per node)."""
         points, quads = mesh
         d = depth(points) if callable(depth) else np.broadcast_to(depth, len(points))
         self.cells.append(quads + sum(len(p) for p in self.plans))
@@ -95,13 +94,13 @@ class Patches:
 
 
 def fold(out: Patches, edge: np.ndarray, back: np.ndarray, gap: float, *, closed: bool) -> None:
-    """Base of a hem's U below the outer sheet's edge (n, 2) and the flange folded back inboard."""
+    """Add the base of a hem's U below the outer sheet's edge (n, 2) and the folded flange."""
     out.add(strip([edge, edge], closed=closed), np.repeat([2 * gap, 0.0], len(edge)), BASE)
     out.add(strip([back, edge], closed=closed), 2 * gap, FOLD)
 
 
 def _joined(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """For each point the first one that coincides with it."""
+    """The first coincident point for each point."""
     row = np.arange(len(points))
     for i, j in sorted(cKDTree(points).query_pairs(tolerance)):
         row[j] = min(row[j], row[i])

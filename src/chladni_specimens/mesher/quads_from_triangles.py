@@ -1,7 +1,7 @@
 """Triangles to quadrilaterals: best pairs first, unpaired triangles joined along chains.
 
 A triangle is a quadrilateral that repeats its third node, as everywhere in this package.
-Remacle et al., Blossom-Quad, Int. J. Numer. Meth. Engng 89 (2012) 1102-1119, pair likewise.
+Remacle et al., Blossom-Quad, Int. J. Numer. Meth. Engng 89 (2012) 1102-1119, pair in the same way.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from chladni.geometry.cells import corner_quality, edges_of
 
 from .matching import augment
 
-GOOD_PAIR, FIRST_PAIRS = 0.2, 0.6  # least corner sine of any pair, of the pairs taken at once
+GOOD_PAIR, FIRST_PAIRS = 0.2, 0.6  # least corner sine of any pair, and of the first pairs
 
 
 def _across(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(triangle a, its side) and (triangle b, its side) over every inner edge, each (k, 2)."""
+    """Triangle and side on either side of every inner edge, each (k, 2)."""
     a, b = triangles, np.roll(triangles, -1, axis=1)
     low, high = np.minimum(a, b).ravel(), np.maximum(a, b).ravel()
     order = np.lexsort((high, low))
@@ -26,7 +26,7 @@ def _across(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def candidate_pairs(
     points: np.ndarray, triangles: np.ndarray, folds: set[tuple[int, int]]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of neighbours (k, 2), the quads they make (k, 4) and their quality, best first."""
+    """Pairs of neighbours (k, 2), their quads (k, 4) and the quality of these, best first."""
     (t0, k0), (t1, k1) = (x.T for x in _across(triangles))
     T = triangles
     quads = np.column_stack(
@@ -61,7 +61,7 @@ def paired(points: np.ndarray, triangles: np.ndarray, folds: set[tuple[int, int]
 
 
 def without_doublets(quads: np.ndarray, fixed: int) -> np.ndarray:
-    """The quads with every inner node that has but two of them removed (they become one)."""
+    """The quads without inner nodes of only two quads, which become one quad."""
     while True:
         count = np.bincount(quads.ravel(), minlength=fixed)
         for v in np.flatnonzero(count == 2):
@@ -82,8 +82,8 @@ def split_folded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The cells with each quad of a quality below `least` cut into its two better triangles.
 
-    Returns the cells and, for each, the row of the quad it came from. Quads that are sound in the
-    plane may fold over where a pressing turns sharply; a triangle cannot.
+    Returns the cells and, for each, the row of its original quad. Quads that are good in the plane
+    may fold over where a pressing turns sharply; a triangle cannot.
     """
     bad = corner_quality(points, quads) < least
     bad &= quads[:, 2] != quads[:, 3]
@@ -108,10 +108,10 @@ def _neighbour_mean(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def smoothed(points: np.ndarray, quads: np.ndarray, fixed: int, sweeps: int = 8) -> np.ndarray:
-    """Free nodes half way to the mean of their neighbours, x += (x̄ - x)/2, unless a cell suffers.
+    """Move free nodes half way to the mean of their neighbours, x += (x̄ - x)/2.
 
-    A move is taken back where one of the node's cells falls below the quality it had and below
-    0.7, so that smoothing never makes a worst cell worse.
+    A move is undone where a cell of the node becomes worse and its quality falls below 0.7.  So
+    smoothing never makes the worst cell worse.
     """
     edges = np.unique(edges_of(quads), axis=0)
     for _ in range(sweeps):

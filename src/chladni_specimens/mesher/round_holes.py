@@ -1,7 +1,7 @@
 """Round holes cut into a meshed sheet, smaller or larger than its cells.
 
-Where a cell is large enough the hole lies inside it and four cells go round it; else a node is
-opened: every cell around it loses that corner. Either way no other cell changes.
+In a large enough cell the hole lies inside it, surrounded by four cells. Otherwise a node is
+opened, and every cell around it loses that corner. No other cell changes.
 """
 
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from chladni.geometry.cells import edges_of
 
 from .pressed_sheets import MAIN, Depth, PressedSheet
 
-_ROOM = 1.8  # radii that a hole's middle keeps from the sides of the cell it lies in
-_TIGHT = 1.45  # the same where nothing else can take it; the square's corners lie at 1.25
-_SPOKE = 1.4  # radii that the neighbours of an opened node are away at least
-_CLOSE = 1.1  # the same where nothing else can take it
-_LOOKED = 6  # cells and nodes that are looked at
-_FAR = 8.0  # radii from the place wanted beyond which a hole is another hole
+_ROOM = 1.8  # radii from a hole's middle to the sides of its cell, at least
+_TIGHT = 1.45  # the least such distance as a last resort; the square's corners lie at 1.25
+_SPOKE = 1.4  # radii from an opened node to its neighbours, at least
+_CLOSE = 1.1  # the least such distance as a last resort
+_LOOKED = 6  # nearest cells and nodes that are tried
+_FAR = 8.0  # radii from the requested place beyond which a hole would be another hole
 
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    """A cell to hollow, or a node to open, and where the hole then is (y, s) [m]."""
+    """A cell to hollow, or a node to open, and the place of the hole (y, s) [m]."""
 
     centre: np.ndarray
     row: int
@@ -36,7 +36,7 @@ def bored(
 ) -> tuple[PressedSheet, np.ndarray]:
     """The sheet with a hole at the feasible place nearest to (y, s), and that place (2,).
 
-    The middle of the hole is off by at most half a diagonal of a cell smaller than four radii, by
+    The error of the hole's place is at most half a diagonal in cells smaller than four radii, and
     two radii in larger ones.
 
     Raises
@@ -71,7 +71,7 @@ def _only(sheet: PressedSheet, row: int) -> np.ndarray:
 def _cells(
     sheet: PressedSheet, place: np.ndarray, radius: float, room: float = _ROOM
 ) -> list[_Choice]:
-    """Cells near the place that can take the hole in their midst."""
+    """Cells near the place that can hold the hole inside."""
     x = sheet.plan[sheet.quads][..., :2]
     whole = (sheet.zone == MAIN) & (sheet.quads[:, 2] != sheet.quads[:, 3])
     near = np.argsort(np.linalg.norm(x.mean(axis=1) - place, axis=1), kind="stable")
@@ -136,7 +136,7 @@ def _opened(sheet: PressedSheet, at: _Choice, radius: float) -> tuple[np.ndarray
 
 
 def _without(sheet: PressedSheet, row: int) -> PressedSheet:
-    """The sheet without a node that no cell needs."""
+    """The sheet without a node that no cell uses."""
     keep = np.arange(len(sheet.plan)) != row
     quads = sheet.quads - (sheet.quads > row)
     return replace(sheet, plan=sheet.plan[keep], points=sheet.points[keep], quads=quads)

@@ -1,8 +1,8 @@
-"""Every number of the open tailgate: dimensions, gauges, joints and variants (SI).
+"""Numbers of the open tailgate: dimensions, gauges, joints and variants (SI).
 
-Materials, gauges and kinds of joint are those of Echaniz Granado (2015), table 1; it gives no
-dimensions, so the shape is ours, chosen such that mass and modes come out like those of its nominal
-model. Planform coordinates are y (left-right) and s (up along the centre line of the outer skin).
+Materials, gauges and kinds of joint are those of Echaniz Granado (2015), table 1. It gives no
+dimensions, so the shape is ours; its mass and modes are near those of the nominal model there.
+Planform coordinates are y (left-right) and s (up along the centre line of the outer skin).
 """
 
 from dataclasses import dataclass, fields
@@ -31,10 +31,10 @@ def _mirrored(bars: tuple[Bar, ...]) -> tuple[Bar, ...]:
 
 @dataclass(frozen=True)
 class TailgateDesign:
-    """The open tailgate's numbers [m, rad where not said otherwise]; see the comments.
+    """Numbers of the open tailgate [m, rad unless stated otherwise]; see the comments.
 
-    ``hem``: "modelled" is the one-sided soft string of Echaniz Granado (2015), "sealed" adds
-    sealant on the folded side and round the inner edge, "real" also stops the inner sheet's sliding
+    ``hem``: "modelled" is the one-sided soft string of Echaniz Granado (2015). "sealed" adds
+    sealant on the folded side and round the inner edge. "real" also stops the inner sheet's sliding
     along the hem (``hem_grip`` per length) over ``hem_stretch``.
     """
 
@@ -133,7 +133,7 @@ class TailgateDesign:
     t_lower: float = 2.0e-3
     t_latch: float = 1.5e-3
     t_bracket: float = 1.5e-3
-    formed: bool = False  # thickness as pressing leaves it instead of the sheet's gauge
+    formed: bool = False  # thickness after forming instead of the sheet's gauge
     # joints
     string: tuple[float, float] = (0.010, 0.15e-3)  # hem adhesive: width, height
     adhesive: float = ADHESIVE.E  # [Pa], hem and middle string
@@ -145,12 +145,12 @@ class TailgateDesign:
     pitch_seam: float = 0.090
     pitch_upper: float = 0.050
     screws: bool = True  # the four that stop the reinforcements' rattling, 12 g each
-    # what may be different in reality or wrong in a model
+    # numbers that may differ in reality or be wrong in a model
     hem: str = "modelled"
     hem_grip: float = 1e10  # [N/m²], stiffness against sliding along the hem per length
     hem_stretch: str = "all"
     tied_holes: bool = False  # RBE2 left in empty bolt holes
-    accelerometers: int = 0  # how many, 5 g each
+    accelerometers: int = 0  # number, 5 g each
 
     def __post_init__(self) -> None:
         if not 0.0048 <= self.size <= 0.032:  # the inner panel's is 0.8 of the model's

@@ -1,8 +1,8 @@
 """Thickness of the tailgate's parts after forming, on their own mesh and on that of the model.
 
-The strengths are such that the parts' mean thickness and the loss of mass come out like those of
-Echaniz Granado (2015), table 11 and section 5.3.1; the two can only agree if its means are over the
-*nodes* of a forming mesh that is finest where the sheet is thin.
+The strengths reproduce the parts' mean thickness and the loss of mass of Echaniz Granado (2015),
+table 11 and section 5.3.1. The two only agree if the means there are over the *nodes* of a forming
+mesh that is finest where the sheet is thin.
 """
 
 from collections.abc import Callable
@@ -82,7 +82,7 @@ def nominal(d: TailgateDesign) -> dict[str, float]:
 
 
 def forming(skin: Skin, part: str) -> Forming:
-    """What forming does to a part; a folded flange has its rim's thickness."""
+    """Effect of forming on a part; a folded flange has the thickness of its rim."""
     fields = pressed(skin.at, depth_field(skin, part), *_box(skin, part))
     return Forming.of(fields, nominal(skin.design)[part], STRENGTH[part], part in (UPPER, LOWER))
 

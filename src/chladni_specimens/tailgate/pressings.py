@@ -1,6 +1,6 @@
 """The tailgate's nine pressings as meshes of one size: strips along borders, the rest filled.
 
-Window frames are only 50 to 70 mm wide; they are meshed in strips from hem to window, so that a
+Window frames are only 50 to 70 mm wide.  They are meshed in strips from hem to window, so that a
 size of 25 to 30 mm still has well-shaped cells there.
 """
 
@@ -31,17 +31,17 @@ UPPER, LOWER, LATCH, BRACKET = (
     "latch reinforcement",
     "wiper motor bracket",
 )
-FOLD_GAP = 0.009  # folds this far apart are meshed as two at any size
+FOLD_GAP = 0.009  # least distance of folds that are meshed as two at any size
 LEFT, RIGHT = " left", " right"  # sheets of one part; y is positive on the left
 
 
 def without_side(sheet: str) -> str:
-    """The part a sheet belongs to; left and right share one."""
+    """The part of a sheet; left and right share one."""
     return sheet.removesuffix(LEFT).removesuffix(RIGHT)
 
 
 def cut(loop: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
-    """The closed line cut at height s: the arc above (from +y over the top), the arc below."""
+    """Cut a closed line at height s: the arc above (from +y over the top), the arc below."""
     up = loop[:, 1] >= s
     rise = np.flatnonzero(up & ~np.roll(up, 1) & (loop[:, 0] > 0))[0]
     p, up = np.roll(loop, -rise, axis=0), np.roll(up, -rise)
@@ -108,10 +108,10 @@ def _offsets(loop: Loop, line: np.ndarray, inward: np.ndarray) -> list[np.ndarra
 
 
 def _around(rows: list[np.ndarray], outer: np.ndarray, inner: np.ndarray, frame: int) -> np.ndarray:
-    """Border of what lies below a frame: outer arc, right cut, window's arc back, left cut.
+    """Border of the region below a frame: outer arc, right cut, window's arc back, left cut.
 
-    `outer` runs from the frame's end (-y) under the region to its start (+y); `inner` is the
-    closed window row; `rows` are the frame's rows from outer to inner.
+    `outer` runs from the frame's end (-y) under the region to its start (+y). `inner` is the closed
+    window row, `rows` are the frame's rows from outer to inner.
     """
     start = np.array([row[0] for row in rows[1:-1]]).reshape(-1, 2)
     end = np.array([row[-1] for row in rows[-2:0:-1]]).reshape(-1, 2)
@@ -153,7 +153,7 @@ def _inner_features(skin: Skin) -> list[np.ndarray]:
 
 
 def _folded(out: Patches, skin: Skin, arc: np.ndarray) -> None:
-    """Base of the hem's U and the flange folded back under the sheet, along an open arc."""
+    """Add the base of the hem's U and the flange folded under the sheet, along an open arc."""
     d = skin.design
     fold(out, arc, skin.outline.offset(arc, d.hem_width), d.gap, closed=False)
 
@@ -178,7 +178,7 @@ def outer_upper_panel(skin: Skin, edge: Borders) -> PressedSheet:
 
 
 def _upper_arc(skin: Skin, edge: Borders) -> tuple[np.ndarray, int]:
-    """Outline above the seam (from +y over the top) and where the frame's arc starts in it."""
+    """Outline above the seam (from +y over the top), and the start of the frame's arc in it."""
     size, over = skin.design.size, cut(skin.outline.points, skin.design.split)[0]
     frame = edge.outline[: edge.frame + 1]
     left, right = skin.outline.between(over[0], frame[0]), skin.outline.between(frame[-1], over[-1])
@@ -281,7 +281,7 @@ def bracket(skin: Skin) -> PressedSheet:
 
 
 def pressings(skin: Skin, holes: bool = True) -> dict[str, PressedSheet]:
-    """All sheets by name, with or without bolt holes; a pair's end in left (+y) and right."""
+    """All sheets by name, with or without bolt holes; names of pairs end in left (+y) and right."""
     edge = borders(skin)
     fine = skin.at_size(skin.design.inner_size * skin.design.size)
     inner, held = inner_panel(fine, borders(fine)), _held(skin)
@@ -303,7 +303,7 @@ def pressings(skin: Skin, holes: bool = True) -> dict[str, PressedSheet]:
 
 
 def _held(skin: Skin) -> dict[str, PressedSheet]:
-    """What is welded to the inner panel, the left ones of pairs."""
+    """Sheets that are welded to the inner panel, only the left ones of pairs."""
     sheets = (upper_left(skin), lower_left(skin), latch(skin), bracket(skin))
     return {sheet.name: sheet for sheet in sheets}
 
@@ -311,7 +311,7 @@ def _held(skin: Skin) -> dict[str, PressedSheet]:
 def _bored(
     skin: Skin, inner: PressedSheet, held: dict[str, PressedSheet]
 ) -> tuple[PressedSheet, dict[str, PressedSheet]]:
-    """Bolt holes through the reinforcements, and through the inner panel where those then are."""
+    """Bore bolt holes through the reinforcements, and through the inner panel at their places."""
     d, held = skin.design, dict(held)
     depth = dict(zip(held, (skin.upper, skin.lower, skin.latch, skin.bracket), strict=True))
     for y, s, part, both in d.holes:

@@ -1,7 +1,7 @@
 """Shape of the tailgate: the outer skin and the depth field of every pressing under it.
 
-P(y, s, d) = skin(y, s) - d n(y, s): a point lies the depth d below the skin along its outward
-normal n, into the car. x points rearward, y to the left, z up.
+A point of a pressing is P(y, s, d) = skin(y, s) - d n(y, s).  It lies the depth d below the skin
+against its outward normal n, into the car. x points rearward, y to the left, z up.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from ..mesher.base_surface import CrownedSurface, ramp
 from ..mesher.plane_curves import Loop, resampled, rounded
 from .design import TailgateDesign
 
-_SPACING = 0.5e-3  # of outline and window when they are measured from
+_SPACING = 0.5e-3  # points of outline and window for measuring distances
 
 
 def _bowed(y: np.ndarray, half: float) -> np.ndarray:
@@ -65,7 +65,7 @@ class Skin:
         )
 
     def at_size(self, size: float) -> Self:
-        """The same skin to be meshed at another size."""
+        """The skin for a mesh of another size."""
         return replace(self, design=replace(self.design, size=size))
 
     def at(self, plan: np.ndarray) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The open tailgate: nine pressings, their welds, adhesive and screws, as one assembly.
 
-Its parts and their values are those of Echaniz Granado (2015), table 1; the shape is ours (see
-``design``).
+Parts and their values are from Echaniz Granado (2015), table 1; the shape is ours (see ``design``).
 """
 
 from collections.abc import Callable
@@ -25,14 +24,14 @@ from .tailgate_joints import TailgateFrame, hem_strings, middle_string, screwed,
 
 @dataclass(frozen=True, eq=False)
 class FormedSpecimen:
-    """A generated structure with what it was made from.
+    """A generated structure with its sheets and joints.
 
     Attributes
     ----------
     assembly : Assembly
     sheets : dict of PressedSheet    by name
     rows : dict of (n,) int   rows of ``assembly.shells`` of each sheet
-    joints : tuple of Joint   what the builders connected
+    joints : tuple of Joint   connections made by the builders
     """
 
     assembly: Assembly
@@ -110,7 +109,7 @@ def _gauge(part: Part) -> float:
 def with_formed(
     assembly: Assembly, sheets: dict[str, PressedSheet], rows: dict[str, np.ndarray], skin: Skin
 ) -> Assembly:
-    """The assembly with the thickness forming leaves, if the design wants it."""
+    """The assembly with the thickness after forming, if the design requests it."""
     if not skin.design.formed:
         return assembly
     t = assembly.shells.thickness.copy()
@@ -122,7 +121,7 @@ def with_formed(
 
 
 def sensor_grids(assembly: Assembly, count: int) -> list[int]:
-    """Ids of `count` grids spread over the sheets: each next one is farthest from those before."""
+    """Ids of `count` grids spread over the sheets, each farthest from the earlier ones."""
     rows = np.unique(assembly.shells.nodes)
     x = assembly.points[rows]
     chosen = [int(np.argmax(x[:, 2]))]

@@ -31,12 +31,12 @@ from .pressings import (
 from .skin import Skin
 
 Pair = tuple[str, str]
-OFF_STEP = 0.97  # pitch of the strings in mesh sizes: never in step with the shells
+OFF_STEP = 0.97  # pitch of the strings in mesh sizes, so that it differs from the shells'
 
 
 @dataclass(frozen=True, eq=False)
 class TailgateFrame:
-    """The assembly under construction with what the joints need to find their sheets.
+    """The assembly under construction, with the sheets that the joints connect.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ def _lattice(y: np.ndarray | tuple, s: np.ndarray | tuple) -> np.ndarray:
 
 
 def _hem_row(skin: Skin) -> np.ndarray:
-    """Foot of the hem on outer upper where the seam begins."""
+    """Foot of the hem on the outer upper panel where the seam begins."""
     arc = cut(skin.outline.points, skin.design.split)[0]
     return skin.outline.offset(arc[[0, -1]], 2 * (skin.design.hem_width + 0.001))
 
@@ -120,7 +120,7 @@ def middle(skin: Skin, plan: np.ndarray, pair: Pair) -> np.ndarray:
 
 
 def welded(frame: TailgateFrame) -> Joined:
-    """All spot welds but the missing ones; they are numbered from 1 in the order of the pairs."""
+    """All spot welds except the missing ones, numbered from 1 in the order of the pairs."""
     d, assembly = frame.skin.design, frame.assembly
     report: list[Joint] = []
     number = 0
@@ -171,7 +171,7 @@ def _string(
 
 
 def hem_strings(frame: TailgateFrame) -> Joined:
-    """Soft adhesive between inner and outer sheets all round, and what the real hem has besides."""
+    """Soft adhesive between inner and outer sheets all round, and the additions of a real hem."""
     d, skin, assembly = frame.skin.design, frame.skin, frame.assembly
     width, height = d.string
     e = (d.gap - height) / 2
@@ -249,7 +249,7 @@ def _gripped(frame: TailgateFrame, name: str, arc: np.ndarray) -> Joined:
 
 
 def stretch(arc: np.ndarray, which: str, waist: float) -> np.ndarray:
-    """Which points (n,) of a planform line lie on the named stretch of the hem."""
+    """Mask of points (n,) of a planform line that lie on the named stretch of the hem."""
     y, s = arc.T
     return {
         "all": np.ones(len(arc), bool),
@@ -305,7 +305,7 @@ def holes(skin: Skin) -> list[tuple[np.ndarray, Pair]]:
 
 
 def tied_holes(frame: TailgateFrame) -> Joined:
-    """RBE2 over the rims of the empty bolt holes, as a model left by its screws has them."""
+    """RBE2 over the rims of the empty bolt holes, as in a model whose screws were removed."""
     assembly = frame.assembly
     report: list[Joint] = []
     for place, pair in holes(frame.skin):
