@@ -154,7 +154,7 @@ class _Level(Effect):
 
 
 def _without_rise(model: Reduced, effects: Sequence[Effect], x: np.ndarray) -> UnrisenModes:
-    """Modes that the rising stiffness is a function of; no modes where nothing rises."""
+    """Modes without the rise, in which rising stiffness is defined; empty where none rises."""
     rising = {
         id(e) for e, at in slices(effects) if any(m.rise is not None for m in e.matrices(x[at]))
     }

@@ -1,4 +1,4 @@
-"""Scatter of modal damping: a test that changes of stiffness and mass cannot pass by fitting.
+"""Test of the scatter of modal damping, which changes of stiffness and mass cannot explain.
 
 Modal damping of one structure scatters about its median.  The standard deviation of ln ζ is 0.31 to
 0.37 for the three tailgates of Echaniz Granado (2015, "Model calibration of a vehicle tailgate

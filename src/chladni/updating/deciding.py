@@ -1,4 +1,4 @@
-"""Fits and numbers that a decision requests, made until it is reached."""
+"""Loop that makes the fits and numbers a decision requests, until the decision is reached."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

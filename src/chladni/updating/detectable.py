@@ -2,8 +2,8 @@
 
 The recording is taken to be the model's own responses. A change is found when it lowers -2 ln p by
 more than an effect needs to be named. That is the threshold of a diagnosis plus 2 ln of the number
-of places tried, because the place is unknown. -2 ln p is that of a diagnosis (``scan``). Its
-covariance holds E, rho and t of the parts, scatter within them, the joints and the weighing. It
+of places tried, because the place is unknown. The value of -2 ln p is that of a diagnosis
+(``scan``). The covariance holds E, rho and t, scatter within parts, joints and the weighing. It
 also holds the errors of the mesh and of the model's form. A change that calibration could explain
 is therefore not counted. Held-out data count like the other data.
 """

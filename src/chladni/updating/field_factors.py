@@ -6,8 +6,8 @@ import numpy as np
 def stiffness_log(fields: dict[str, np.ndarray], component: str, power: int) -> np.ndarray:
     """E + p t + Q: logarithm of the factor on stiffness that grows with t^p.
 
-    Bending stiffness, p = 3, has the field ``bending`` in addition.  The sum is linear in the
-    fields, so it serves their gradients as well; shape (g, ...) of the fields.
+    Bending stiffness, p = 3, adds the field ``bending``.  A component of the plane stiffness adds
+    its own field Q. The sum is linear in the fields (g, ...), so it serves their gradients as well.
     """
     plain = fields["E"] + power * fields["t"]
     if power == 3:

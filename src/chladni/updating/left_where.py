@@ -3,8 +3,8 @@
 Round every group of shells, or beams, stiffness and density are changed a little, smoothly over a
 tenth of the sheet. To first order the best amount of such a change lowers -2 ln p by
 (cᵀC⁻¹r)² / cᵀC⁻¹c (Rao's score test, 1948). Here r is the residual of the fit, c its slope along
-the change and C the covariance with all free parameters of the fit marginalised. cᵀC⁻¹c is the
-information of the sensors on the change: where 1/√(cᵀC⁻¹c) is large, a place is blind.
+the change and C the covariance with all free parameters of the fit marginalised. The term cᵀC⁻¹c is
+the information of the sensors on the change: where 1/√(cᵀC⁻¹c) is large, a place is blind.
 """
 
 from dataclasses import dataclass

@@ -4,8 +4,8 @@ A crack, a missing weld, a soft patch or a spring to ground changes stiffness al
 slips or a viscous layer is compliant at the same place, foam or rubber is stiff there, and all of
 these dissipate.  The damping ratio of a mode grows by half the loss factor times its share of the
 strain energy there.  Its eigenvalue moves by the same share (Ungar and Kerwin 1962, J. Acoust. Soc.
-Am. 34, 954-957).  So the modes that the named effect changes most may also be damped most, beyond
-the scatter of damping.  An elastic effect is then not the full explanation.
+Am. 34, 954-957).  So an elastic effect is not the full explanation where the modes that it changes
+most are also damped most, beyond the scatter of damping.
 """
 
 from dataclasses import replace

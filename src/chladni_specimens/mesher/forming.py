@@ -1,8 +1,8 @@
 """Thickness after forming: thin where the sheet was bent and stretched.
 
 This replaces a forming simulation. The thickness is t = t₀ (1 - min(a i, 0.38)) with the strength a
-of the part and the indicator i = 0.95 (κ/(κ+40))^1.35 + 0.05 ε/0.35. κ is the curvature of the
-pressing, ε its stretch against the plain skin. Values are kept on a regular grid of the planform.
+of the part and the indicator i = 0.95 (κ/(κ+40))^1.35 + 0.05 ε/0.35. The pressing has the curvature
+κ and the stretch ε against the plain skin. Values are kept on a regular grid of the planform.
 """
 
 from collections.abc import Callable, Sequence
