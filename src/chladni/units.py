@@ -1,5 +1,6 @@
 """Unit systems of decks: everything is converted to SI once, where the deck is read."""
 
+import math
 from dataclasses import dataclass
 
 from .errors import FileError
@@ -50,6 +51,7 @@ UNITS = {
         Units("in-lb-s", 0.0254, 4.4482216152605 / 0.0254),  # pound-force; mass in lbf s²/in
     )
 }
+HERTZ = {"Hz": 1.0, "kHz": 1e3, "rad/s": 1 / (2 * math.pi), "rpm": 1 / 60}  # of a recording
 
 
 def units(name: str | Units) -> Units:

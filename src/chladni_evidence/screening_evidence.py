@@ -141,4 +141,4 @@ def screening_of(made: Sound, frf: FRF) -> Screening:
     outputs, inputs = measured_at(made.outputs), measured_at(made.bench.drive)
     places = dict(zip(outputs.labels, outputs.points, strict=True))
     alone = screened(Recording("recording", frf), found, (), places, use)
-    return against_model(alone, found, made.model, outputs, inputs)
+    return against_model(alone, frf, use, found, made.model, outputs, inputs)

@@ -46,6 +46,8 @@ quantity = "accelerance"
 gain = "known"
 factor = 1.0
 delay = 0.0
+frequency_unit = "Hz"
+conjugated = false
 sensors = "sensors.csv"
 mass = 1.413
 mass_sd = 0.002
@@ -97,6 +99,8 @@ OTHER = {  # another accepted value of every word
     ("test", "gain"): '"unknown"',
     ("test", "factor"): "1.1",
     ("test", "delay"): "0.0001",
+    ("test", "frequency_unit"): '"rad/s"',
+    ("test", "conjugated"): "true",
     ("test", "sensors"): '"others.csv"',
     ("test", "mass"): "1.42",
     ("test", "mass_sd"): "0.003",

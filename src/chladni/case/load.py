@@ -23,10 +23,10 @@ from ..io.tables.sensor_table import read_sensors
 from ..model.assembly import Assembly
 from ..model.free_parameter import FreeParameter
 from ..model.point_masses import with_masses
-from ..units import UNITS, Units
+from ..units import HERTZ, UNITS, Units
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
-from .mended_recordings import mended, record_length, with_frf
+from .mended_recordings import conjugated, in_hertz, mended, record_length, with_frf
 from .recording_groups import described, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
@@ -232,6 +232,8 @@ def _recordings(
     factor = test.number("factor")
     if factor == 0:
         raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
+    unit = test.text("frequency_unit", among=tuple(HERTZ)) or "Hz"
+    turned = test.flag("conjugated")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
     named = {name for _, _, name in listed}
     for section in more:
@@ -243,7 +245,9 @@ def _recordings(
     for section, word, name in listed:
         found = read_recordings(_file(section, word, name, outside), quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
-            alive, most = without_dead_channels(r), record_length(r)
+            alive = in_hertz(without_dead_channels(r), unit)
+            alive = conjugated(alive) if turned else alive
+            most = record_length(alive)
             delay = test.number("delay", low=-most, high=most) or 0.0
             read.append(mended(alive, 1.0 if factor is None else factor, delay, sensors))
     ranked = compared_first(test, stacked(read))

@@ -1,5 +1,7 @@
 """What a case says of its recordings: time data estimated, factor, delay, gains, channels left out.
 
+Their frequencies may be in another unit than Hz, their FRFs conjugated.
+
 Nothing is mended that the case does not say, and every mending is noted.
 """
 
@@ -12,6 +14,7 @@ from ..dynamics.frf import FRF
 from ..ema.frf_estimate import EstimateSettings, FrfEstimate, estimate
 from ..ema.setup import Recording, Role, Sensor
 from ..errors import ChladniError, FileError
+from ..units import HERTZ
 
 
 def with_frf(
@@ -91,6 +94,28 @@ def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor])
         frf = _times(frf, np.exp(2j * np.pi * frf.frequency * delay)[:, None, None])
         notes.append(f"{r.name}: a delay of {delay:g} s taken off, as [test] delay says")
     return replace(r, frf=frf, notes=tuple(notes))
+
+
+def in_hertz(r: Recording, unit: str) -> Recording:
+    """FRFs and poles whose frequencies are in a unit of ``HERTZ``, in Hz."""
+    if HERTZ[unit] == 1:
+        return r
+    frf, poles, k = r.frf, r.poles, HERTZ[unit]
+    if frf is not None:
+        frf = replace(frf, frequency=frf.frequency * k)
+    if poles is not None:
+        poles = replace(poles, frequency=poles.frequency * k, frequency_sd=poles.frequency_sd * k)
+    note = f"{r.name}: frequencies read in {unit}, as [test] frequency_unit says"
+    return replace(r, frf=frf, poles=poles, notes=(*r.notes, note))
+
+
+def conjugated(r: Recording) -> Recording:
+    """The FRFs with phases that turn the other way."""
+    if r.frf is None:
+        return r
+    note = f"{r.name}: all FRFs conjugated, as [test] conjugated says"
+    frf = replace(r.frf, values=r.frf.values.conj())
+    return replace(r, frf=frf, notes=(*r.notes, note))
 
 
 def _row(table: dict[tuple[str, Role], Sensor], output: str) -> Sensor:

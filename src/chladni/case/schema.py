@@ -10,7 +10,7 @@ from typing import get_args
 
 from ..dynamics.frf import Quantity
 from ..ema.setup import Control
-from ..units import UNITS
+from ..units import HERTZ, UNITS
 from .mapped_thickness import PLACES
 
 COMMANDS = ("test", "identify", "correlate", "calibrate", "diagnose",
@@ -100,6 +100,12 @@ SCHEMA = (
     Key("test", "delay", "number", "s", "0",
         "By how much all responses lag the forces; it is taken off. At most 1 / Δf of the lines.",
         "0.0005", _READ),
+    Key("test", "frequency_unit", "word", "", "Hz",
+        "What the frequencies of the recordings are in; all other frequencies of a case are in Hz.",
+        '"rad/s"', _READ, tuple(HERTZ)),
+    Key("test", "conjugated", "true or false", "", "false",
+        "Whether the FRFs were computed with exp(-iωt), so that their phases turn the wrong way.",
+        "true", _READ),
     Key("test", "sensors", "file", "", "nodes of the recording are grids of the deck",
         "Where sensors and shakers sit, which channels are left out or of a wrong gain: the table "
         "below.", '"sensors.csv"', (*_READ, "bench")),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..dynamics.frf import FRF
 from ..dynamics.modes import rigid_modes
 from ..ema.chain_checks import level_checks, modal_gains
 from ..ema.channel_checks import left_out
@@ -19,6 +20,7 @@ from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled
 from ..geometry.grid_normals import grid_normals
 from ..geometry.sampling import farthest_point_sample
+from .chain_hypotheses import chain_faults
 
 ACROSS = 0.9  # cosine to the normal: a sensor is glued flat on its sheet
 AWAY = 0.12  # of the structure: a patch that the model lacks bends shapes as a shorter move would
@@ -30,7 +32,9 @@ REACH = 1.3  # times the band: modes of the model that may mix with those of the
 
 def against_model(
     before: Screening,
-    found: Identified,
+    frf: FRF,
+    lines: np.ndarray,
+    found: Identified | None,
     model: Modelled,
     outputs: MeasuredDofs,
     inputs: MeasuredDofs,
@@ -38,14 +42,40 @@ def against_model(
 ) -> Screening:
     """The same, with what the model says of level, quantity and every channel.
 
-    The shapes alone are compared, and modal constants by their order of magnitude: frequencies may
-    be off, and physics may be missing.
+    First the chain as a whole: all else that looks wrong may follow from a fault of it.
+    Then the shapes, and modal constants by their order of magnitude: frequencies may be off, and
+    physics may be missing.
 
     Parameters
     ----------
-    found : of the recording, its outputs in the order of ``outputs``
+    lines : (n_f,) bool   of the recording, those to look at
+    found : what was identified from it, its outputs in the order of ``outputs``; None where nothing
     model : up to ``REACH`` times the band at least
     """
+    faults, check = chain_faults(frf, lines, model, outputs, inputs, before.findings)
+    if faults:
+        kept = tuple(f for f in before.findings if f.kind not in _FOLLOWS)
+        before = replace(before, findings=kept)
+    before = before.with_more(faults, [check])
+    return (
+        before
+        if faults or found is None
+        else _by_modes(before, found, model, outputs, inputs, gain_known)
+    )
+
+
+_FOLLOWS = ("wrong quantity", "reversed sign", "not reciprocal", "delay", "equal channels")
+
+
+def _by_modes(
+    before: Screening,
+    found: Identified,
+    model: Modelled,
+    outputs: MeasuredDofs,
+    inputs: MeasuredDofs,
+    gain_known: bool,
+) -> Screening:
+    """Level, quantity and every channel, by modal constants and shapes."""
     strong = strong_modes(found)
     built, modes = model.structure, model.modes
     f_max = REACH * found.band[1]

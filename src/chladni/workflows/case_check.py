@@ -15,6 +15,7 @@ from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model
 from .modes import loose_parts
+from .screening_of_case import POUND, in_pounds, screened_unprepared
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
 
@@ -171,6 +172,9 @@ def _mass(case: Case) -> list[CaseFinding]:
     if not 1 / FAR <= mass / weighed <= FAR:  # that is said of its units
         return []
     said = f"the deck weighs {mass:.4g} kg, the article {weighed:.4g} kg"
+    if in_pounds(mass, weighed):
+        mend = f"in case.toml, [test]: mass = {weighed * POUND:.5g}, if pounds were weighed"
+        return [CaseFinding(said, mend)]
     return [CaseFinding(said, "is the article the one of the deck, trim and sensors off?")]
 
 
@@ -216,8 +220,10 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
     try:
         screening = correlate(case, progress, every_line=False).screening
     except ChladniError as error:
-        said = str(error).removeprefix(f"{case.path}: ")
-        return [CaseFinding(said, "nothing can be fitted before", True)]
+        screening = screened_unprepared(case)
+        if screening is None or not screening.faults:
+            said = str(error).removeprefix(f"{case.path}: ")
+            return [CaseFinding(said, "nothing can be fitted before", True)]
     if screening is None:
         return []
     return [

@@ -58,8 +58,8 @@ from .over_levels import over_levels
 from .question_of_case import question
 from .screening_of_case import (
     RecordingAtFault,
-    screened_alone,
     screened_prepared,
+    screened_unprepared,
     unmendable,
 )
 
@@ -117,7 +117,7 @@ def searched(
     try:
         prepared = prepare(asked, within(progress, 0.0, 0.1))
     except FileError:  # a recording at fault may hold nothing to fit, and says so itself
-        alone = screened_alone(case)
+        alone = screened_unprepared(case)
         if alone is None or not alone.faults:
             raise
         raise RecordingAtFault(alone) from None

@@ -3,17 +3,24 @@
 import numpy as np
 
 from ..case import Case
+from ..dynamics.frf import FRF
 from ..effects.estimate import Estimate, Location
-from ..ema.finding import Finding, Screening
+from ..ema.finding import Check, Finding, Screening, Severity
 from ..ema.identification import Identified, identify
 from ..ema.recording_screening import screened
 from ..errors import ChladniError
-from ..fem.modelled import Modelled
+from ..fem.energy import mass_properties
+from ..fem.modelled import Modelled, modelled
+from ..model.point_masses import with_masses
+from ..updating.chain_hypotheses import EXPLAINED, smoothed
 from ..updating.channel_screening import against_model
 from ..updating.question import Prepared
 from ..updating.result import NamedEffect
+from .case_model import REACH
 from .diagnosis_result import DiagnosisResult
 
+HEAVY = 0.1  # of the structure: sensors seldom weigh more
+POUND, NEAR_POUND = 0.45359237, 0.1  # [kg], ln: what no scatter of sheets reaches
 FITTED = ("reversed sign",)  # of one channel: diagnosis weighs and measures it
 
 
@@ -26,18 +33,62 @@ class RecordingAtFault(ChladniError):
 
 
 def screened_by_model(
-    case: Case, found: Identified, model: Modelled, use: np.ndarray | None = None
+    case: Case, found: Identified | None, model: Modelled, use: np.ndarray | None = None
 ) -> Screening:
-    """All checks of the first recording.
+    """All checks of the first recording, and of the masses that the case gives.
 
     Parameters
     ----------
-    found : identified from its FRFs
+    found : identified from its FRFs; None where nothing could be
     model : of the deck as it was tested
     use : (n_f,) bool, lines it was identified from, default all
     """
+    frf = case.frfs[0]
+    lines = case.lines(frf.frequency) if use is None else use
     alone = screened(case.recordings[0], found, case.recordings[1:], _places(case), use)
-    return against_model(alone, found, model, case.outputs, case.inputs, case.gain_known)
+    if masses := _masses(case, frf, lines, model):
+        return alone.with_more(masses, [Check("masses that are given", "look at them", False)])
+    return against_model(
+        alone, frf, lines, found, model, case.outputs, case.inputs, case.gain_known
+    )
+
+
+def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Finding]:
+    """Sensors in grams and a weighing in pounds, where the responses say so."""
+    deck, carried = float(mass_properties(case.assembly)[0]), sum(m for _, m in case.carried)
+    found, weighed = [], case.setup.mass
+    seen = smoothed(frf, lines, model, case.outputs, case.inputs)
+    Q, level = (np.nan, np.nan) if seen is None else seen.as_declared()
+    if carried > HEAVY * deck:
+        grids, m = zip(*case.carried, strict=True)
+        light = modelled(with_masses(case.assembly, grids, 1e-3 * np.array(m)), model.band)
+        other = smoothed(frf, lines, light, case.outputs, case.inputs)
+        less = np.nan if other is None else other.as_declared()[0]
+        grams = less < EXPLAINED * Q
+        said = f"the sensors weigh {carried:.3g} kg in all, the structure {deck:.3g} kg"
+        if grams:
+            said += (
+                f"; of a thousandth of that, Q against the model is {less:.2g}, as it is {Q:.2g}"
+            )
+        if grams or carried > deck:
+            heaviest = max(m)
+            mend = f"mass in sensors.csv is in kg: write {heaviest / 1e3:.3g} for {heaviest:.3g} g"
+            severity: Severity = "fault" if grams else "warning"
+            found.append(Finding("sensor mass", f"{said}.", severity, (), mend, carried))
+    if weighed and in_pounds(deck, weighed) and not found:
+        said = (
+            f"the article weighs {weighed:.4g} kg, the deck {deck:.4g} kg, and the responses are "
+            f"{level:.3g} times the model's: {weighed:.4g} lb are {weighed * POUND:.4g} kg"
+        )
+        mend = f"in case.toml, [test]: mass = {weighed * POUND:.5g}"
+        if abs(np.log(level)) < abs(np.log(level / POUND)) and case.gain_known:
+            found.append(Finding("weighed mass", f"{said}.", "fault", (), mend, weighed))
+    return found
+
+
+def in_pounds(deck: float, weighed: float) -> bool:
+    """Whether the weighed mass would be the deck's [kg], had it been pounds."""
+    return deck > 0 and abs(np.log(deck / (POUND * weighed))) < NEAR_POUND
 
 
 def _places(case: Case) -> dict[str, np.ndarray]:
@@ -51,16 +102,17 @@ def screened_prepared(case: Case, prepared: Prepared) -> Screening | None:
     return screened_by_model(case, prepared.identified, prepared.nominal)
 
 
-def screened_alone(case: Case) -> Screening | None:
-    """The first recording without a model, where nothing could be prepared from it."""
+def screened_unprepared(case: Case) -> Screening | None:
+    """The first recording, where nothing could be prepared from it; None where no FRF exists."""
     if not case.frfs:
         return None
+    frf = case.frfs[0]
     try:
-        frf = case.frfs[0]
         found = identify(frf, case.band, use=case.lines(frf.frequency))
     except ChladniError:
         found = None
-    return screened(case.recordings[0], found, case.recordings[1:], _places(case))
+    high = case.band[1] if case.band else float(frf.frequency[-1])
+    return screened_by_model(case, found, modelled(case.tested(case.assembly), REACH * high))
 
 
 def unmendable(screening: Screening) -> bool:
