@@ -184,6 +184,14 @@ def test_a_sign_a_gain_and_an_exchange_are_told_apart() -> None:
         assert faults(change @ SHAPES) == due
 
 
+@pytest.mark.parametrize("gain", [0.02, 10.0, 400.0, -25.0])
+def test_a_gain_of_any_size_is_told_as_it_is(gain: float) -> None:
+    """The line that is asked for divides it away at once, not by steps."""
+    (found,) = shape_faults(NAMES, times({4: gain}) @ SHAPES, MODES, MODEL)
+    assert (found.kind, found.channels) == ("wrong gain", ("5:+Z",))
+    assert found.value == pytest.approx(gain, rel=0.1)
+
+
 def times(gains: dict[int, float]) -> np.ndarray:
     return np.diag([gains.get(k, 1.0) for k in range(MANY)])
 

@@ -27,7 +27,9 @@ LEAST_CHANNELS, LEAST_MODES = 5, 4
 MIX = (0.02, 0.06, 0.2)  # ε
 ERROR = (0.03, 0.08, 0.2, 0.45)  # σ, of the rms of a shape
 SHIFT = (-0.12, -0.06, 0.0, 0.06, 0.12)  # ln c
-GAINS = np.log(np.geomspace(0.15, 6.5, 61))
+FINE = np.log(np.geomspace(0.15, 6.5, 61))
+COARSE = np.log(np.geomspace(6.5, 1e4, 30)[1:])  # a dead channel shows less than the inverse
+GAINS = np.concatenate([-COARSE[::-1], FINE, COARSE])
 LEAST_GAIN = 0.18  # ln: 3 % is the tolerance of a sensor; no model knows a shape to much better
 THRESHOLD = 30.0  # of ln L, after the price of the trials: physics left out reaches half of it
 RARE = np.log(100.0)  # one recording in a hundred has a given fault
@@ -160,18 +162,7 @@ def _signs_and_gains(
     """One channel times a real factor g: ψ_i / g is what was there."""
     n, r = psi.shape
     factors = np.concatenate([np.exp(GAINS), -np.exp(GAINS)])
-    u = 1 / factors - 1
-    L = np.full((n, len(factors)), -np.inf)
-    for g in grid:
-        pull = np.einsum("rij,jr->ir", g.inverse, psi)
-        own = np.einsum("rii->ir", g.inverse)
-        q = (
-            g.squares(psi)
-            + 2 * u[None, :, None] * (psi * pull)[:, None]
-            + (u**2)[None, :, None] * (psi**2 * own)[:, None]
-        )
-        L = np.maximum(L, g.total(q))
-    L = L - r * np.log(np.abs(factors))
+    L = _of_factors(psi, grid, factors, slice(None))
     pure = int(np.abs(factors + 1).argmin())
     i = int(L[:, pure].argmax())
     sign = L[i, pure] - null - np.log(n) - RARE
@@ -182,7 +173,29 @@ def _signs_and_gains(
     gain = L[k, at] - null - price
     if sign >= gain or abs(np.log(-factors[at]) if factors[at] < 0 else 1.0) < LEAST_GAIN:
         return _scaled(labels, i, -1.0, float(sign))
-    return _scaled(labels, k, float(factors[at]), float(gain))
+    step = float(np.diff(GAINS).max())
+    near = factors[at] * np.exp(np.linspace(-step, step, 201))
+    closer = _of_factors(psi, grid, near, slice(k, k + 1))[0]
+    best = int(closer.argmax())
+    return _scaled(labels, k, float(near[best]), float(closer[best] - null - price))
+
+
+def _of_factors(
+    psi: np.ndarray, grid: list[_Mixture], factors: np.ndarray, rows: slice
+) -> np.ndarray:
+    """Greatest ln L of some channels each times a factor (n_rows, n_factors)."""
+    u, some = 1 / factors - 1, psi[rows]
+    L = np.full((len(some), len(factors)), -np.inf)
+    for g in grid:
+        pull = np.einsum("rij,jr->ir", g.inverse, psi)[rows]
+        own = np.einsum("rii->ir", g.inverse)[rows]
+        q = (
+            g.squares(psi)
+            + 2 * u[None, :, None] * (some * pull)[:, None]
+            + (u**2)[None, :, None] * (some**2 * own)[:, None]
+        )
+        L = np.maximum(L, g.total(q))
+    return L - psi.shape[1] * np.log(np.abs(factors))
 
 
 def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
@@ -194,7 +207,7 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
         turned = " and of the wrong sign" if g < 0 else ""
         kind, text = (
             "wrong gain",
-            f"output {label} is {abs(g):.2g} times as large as it can be{turned}",
+            f"output {label} is {abs(g):.3g} times as large as it can be{turned}",
         )
         mend = f"in sensors.csv give {label} the gain {g:.3g}"
     unless = "" if g == -1.0 else _UNLESS

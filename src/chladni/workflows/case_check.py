@@ -89,7 +89,9 @@ def check(case: Case, progress: Progress = silent) -> CaseCheck:
     ]  # fmt: skip
     if not any(f.fault for f in findings):
         progress("the recording beside the model", 0.8)
-        findings += _correlated(case, within(progress, 0.8, 1.0))
+        more = _correlated(case, within(progress, 0.8, 1.0))
+        sure = {f.remedy for f in more if f.fault}  # is not a guess any more
+        findings = [f for f in findings if f.remedy.partition(", if ")[0] not in sure] + more
     unused = {c: tuple(case.said(c)) for c in COMMANDS}
     return CaseCheck(tuple(_facts(case)), elastic, dofs, tuple(findings), unused)
 

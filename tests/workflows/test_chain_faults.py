@@ -1,0 +1,169 @@
+"""Errors of a whole recording: each named with the line that mends it, and nothing invented."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.cli.app import application
+from chladni.effects.points import with_masses
+from chladni.ema.finding import Finding
+from chladni.updating.chain_hypotheses import chain_faults
+
+from .conftest import write_case
+
+SENSORS = (2, 4, 7, 18, 24, 30, 36, 43, 47)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A plate whose article carries a mass of a tenth of it that the deck lacks."""
+    folder = tmp_path_factory.mktemp("chain")
+    write_case(folder, 6, SENSORS, np.linspace(15, 250, 900), 240.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sound(place):
+    return chladni.load_case(place)
+
+
+@pytest.fixture(scope="module")
+def model(sound):
+    return chladni.workflows.screening_of_case.modelled(sound.assembly, 800.0)
+
+
+def with_frf(case, **change):
+    first = case.recordings[0]
+    return replace(case, recordings=(replace(first, frf=replace(first.frf, **change)),))
+
+
+def elsewhere(case, grid):
+    ins = case.inputs
+    at = case.assembly.points[case.assembly.rows([grid])]
+    return replace(case, inputs=replace(ins, grids=np.array([grid]), points=at))
+
+
+SPOILT = {  # how, and what is said: kind, line that mends it
+    "labels": (
+        lambda c: with_frf(c, values=np.roll(c.frfs[0].values, 1, axis=1)),
+        "permuted labels", "2:+Z that of 47:+Z, 4:+Z that of 2:+Z",
+    ),
+    "radians": (
+        lambda c: with_frf(c, frequency=2 * np.pi * c.frfs[0].frequency),
+        "wrong unit of frequency", 'frequency_unit = "rad/s"',
+    ),
+    "conjugated": (
+        lambda c: with_frf(c, values=c.frfs[0].values.conj()), "conjugated FRFs", "conjugated = true",
+    ),
+    "quantity": (
+        lambda c: with_frf(c, quantity="mobility"), "wrong quantity", 'quantity = "accelerance"',
+    ),
+    "force": (lambda c: with_frf(c, values=-c.frfs[0].values), "reversed force", "turn the direct"),
+    "drive point": (lambda c: elsewhere(c, 46), "misplaced force", "input 2:+Z the grid 2,"),
+}  # fmt: skip
+
+
+def found_in(case, model):
+    frf = case.frfs[0]
+    return chain_faults(frf, case.lines(frf.frequency), model, case.outputs, case.inputs)
+
+
+@pytest.mark.parametrize("spoilt", SPOILT)
+def test_an_error_of_the_chain_is_named_with_its_line(sound, model, spoilt):
+    change, kind, mend = SPOILT[spoilt]
+    (finding,), check = found_in(change(sound), model)
+    assert (finding.kind, finding.severity) == (kind, "fault")
+    assert mend in finding.repair
+    assert check.passed is False
+
+
+@pytest.mark.parametrize("level", [1.0, 9.81, 0.1])
+def test_physics_that_is_missing_is_no_error_of_the_chain(sound, model, level):
+    """Nor is a wrong level, of which other checks speak."""
+    findings, check = found_in(with_frf(sound, values=level * sound.frfs[0].values), model)
+    assert findings == []
+    assert check.passed
+
+
+@pytest.mark.parametrize("stiffer", [0.7, 1.4])
+def test_a_model_of_another_stiffness_is_no_error_of_the_chain(sound, stiffer):
+    made = sound.assembly
+    parts = tuple(
+        p.with_section(**{
+            side: replace(m, E=m.E * stiffer)
+            for side in ("membrane", "bending", "shear")
+            if (m := getattr(p.section, side)) is not None
+        })
+        for p in made.parts
+    )  # fmt: skip
+    other = chladni.workflows.screening_of_case.modelled(made.with_parts(parts), 800.0)
+    assert found_in(sound, other)[0] == []
+
+
+def test_a_delay_is_not_taken_for_another_error(sound, model):
+    """It is a hypothesis like the others, of the size that the recording alone says."""
+    frf = sound.frfs[0]
+    turn = np.exp(-2j * np.pi * frf.frequency * 1.5e-3)[:, None, None]
+    late = Finding("delay", "late", "fault", (), "delay = 0.0015", 1.5e-3)
+    spoilt = replace(frf, values=frf.values * turn)
+    lines = sound.lines(frf.frequency)
+    findings, _ = chain_faults(spoilt, lines, model, sound.outputs, sound.inputs, [late])
+    assert findings == [late]
+
+
+def spoil_files(place, to, spoilt):
+    """The same errors as a user has them, in the files of a case."""
+    shutil.copytree(place, to)
+    toml, held = (to / "case.toml").read_text(), dict(np.load(to / "frf.npz", allow_pickle=False))
+    if spoilt == "radians":
+        held["frequency_hz"] = held["frequency_hz"] * 2 * np.pi
+    elif spoilt == "conjugated":
+        held["values"] = held["values"].conj()
+    elif spoilt == "grams":
+        rows = [f"{g}:+Z,{g},+Z,output,5" for g in SENSORS]
+        (to / "sensors.csv").write_text("\n".join(["label,grid,direction,role,mass", *rows, ""]))
+        toml = toml.replace("[band]", 'sensors = "sensors.csv"\n[band]')
+    elif spoilt == "pounds":
+        line = next(line for line in toml.splitlines() if line.startswith("mass"))
+        toml = toml.replace(line, f"mass = {2.20462 * float(line.split('=')[1]):.5f}")
+    np.savez(to / "frf.npz", **held)
+    (to / "case.toml").write_text(toml)
+    return to
+
+
+MENDED = {  # what is said, and the change of case.toml that it asks for
+    "radians": ('frequency_unit = "rad/s"', ("[band]", 'frequency_unit = "rad/s"\n[band]')),
+    "conjugated": ("conjugated = true", ("[band]", "conjugated = true\n[band]")),
+    "grams": ("write 0.005 for 5 g", None),
+    "pounds": ("[test]: mass = 0.", None),
+}
+
+
+@pytest.mark.parametrize("spoilt", MENDED)
+def test_check_and_diagnose_say_it_and_the_line_mends_it(place, tmp_path, spoilt):
+    said, change = MENDED[spoilt]
+    case = spoil_files(place, tmp_path / "case", spoilt)
+    done = CliRunner().invoke(application(), ["check", str(case), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 3, (done.output, done.exception)
+    assert said in done.stderr
+    result = chladni.diagnose(chladni.load_case(case))
+    assert result.verdict == "measurement fault"
+    assert any(said in note for note in result.notes)
+    if change is not None:
+        toml = (case / "case.toml").read_text()
+        (case / "case.toml").write_text(toml.replace(*change))
+        assert not chladni.check(chladni.load_case(case)).faults
+
+
+def test_sensors_that_are_heavy_in_earnest_are_no_mistake(sound):
+    """A sensor of a sixth of the plate, on the article as in the model."""
+    grid, kg = 24, 0.03
+    heavy = replace(sound, carried=((grid, kg),))
+    article = with_masses(sound.assembly, (grid,), kg)
+    frf = chladni.frf(article, list(sound.outputs.labels), ["2:+Z"], sound.frfs[0].frequency)
+    heavy = with_frf(heavy, values=frf.frfs[0].to("accelerance").values)
+    assert not [f for f in chladni.check(heavy).findings if "sensors weigh" in f.text]
