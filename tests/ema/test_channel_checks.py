@@ -50,6 +50,39 @@ def test_a_channel_of_noise_is_dead() -> None:
     assert kinds(replace(frf, values=values)) == {"dead channel": ("4:+Z",)}
 
 
+def rough(level: float) -> Recording:
+    """One channel whose lines follow no curve at levels above 1, as a hard spring leaves them."""
+    frf, rng = recording(noise=1e-4), np.random.default_rng(4)
+    values = frf.values.copy()
+    if level > 1:
+        values[:, 3, 0] *= np.exp(rng.normal(size=len(F)) + 1j * rng.normal(size=len(F)))
+    return Recording(f"level {level:g}", replace(frf, values=values, variance=None), level=level)
+
+
+def dead_ones(r: Recording, *others: Recording) -> list[tuple[str, ...]]:
+    return [f.channels for f in screened(r, calmer=others).findings if f.kind == "dead channel"]
+
+
+def test_a_channel_that_repeats_is_not_dead() -> None:
+    """A variance that is known says that the lines are no noise, whatever curve they follow."""
+    r = rough(5.0)
+    assert dead_ones(r) == [("4:+Z",)]
+    assert r.frf is not None
+    known = replace(r.frf, variance=1e-6 * np.abs(r.frf.values) ** 2)
+    assert dead_ones(replace(r, frf=known)) == []
+
+
+def test_a_channel_that_lives_at_a_lower_level_is_not_dead() -> None:
+    """Unless it went silent since, as one does whose cable came off."""
+    assert dead_ones(rough(5.0), rough(1.0)) == []
+    assert dead_ones(rough(5.0), rough(7.0)) == [("4:+Z",)]
+    assert dead_ones(rough(5.0), replace(rough(1.0), article="B")) == [("4:+Z",)]
+    loud = rough(5.0)
+    assert loud.frf is not None
+    values = loud.frf.values * np.where(np.arange(N) == 3, 1e-2, 1.0)[:, None]
+    assert dead_ones(replace(loud, frf=replace(loud.frf, values=values)), rough(1.0)) == [("4:+Z",)]
+
+
 @pytest.mark.parametrize("given", [True, False])
 def test_one_signal_under_two_labels_shares_its_noise(given: bool) -> None:
     """No two sensors have the same noise, so no model is needed."""

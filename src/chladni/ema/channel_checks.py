@@ -4,13 +4,14 @@ Ewins (2000), Modal Testing, sections 3.10 and 4.2 (checks of measured FRFs).
 """
 
 import re
+from collections.abc import Collection
 from itertools import combinations
 
 import numpy as np
 
 from ..dynamics.frf import FRF
 from .finding import Check, Finding
-from .screening import noise_of, roughness
+from .screening import noise_of
 
 LEAST_LINES = 12
 NOISE_ONLY = 0.3  # noise over power of the median line: nothing but noise has more
@@ -24,13 +25,14 @@ RECIPROCAL = 0.1  # |H_ij - H_ji| over |H_ij|, rms: more is no place and no nois
 
 
 def channel_checks(
-    frf: FRF, places: dict[str, np.ndarray] | None = None
+    frf: FRF, places: dict[str, np.ndarray] | None = None, alive: Collection[str] = ()
 ) -> tuple[list[Finding], list[Check]]:
     """All checks of one FRF matrix that need neither modes nor a model.
 
     Parameters
     ----------
     places : {output: (3,)} [m], where known, to say how far two channels are apart
+    alive : outputs that are known not to be dead
     """
     frf = frf.sel(band=(1e-9, np.inf))
     if len(frf.frequency) < LEAST_LINES:
@@ -38,8 +40,9 @@ def channel_checks(
         return [], [Check("channels", few, None)]
     findings: list[Finding] = []
     checks: list[Check] = []
-    for look in (dead, incoherent, reversed_drive, reciprocity):
-        found, check = look(frf)
+    for found, check in (
+        dead(frf, alive), incoherent(frf), reversed_drive(frf), reciprocity(frf)
+    ):  # fmt: skip
         findings += found
         checks.append(check)
     silent = {c for f in findings if f.kind == "dead channel" for c in f.channels}
@@ -51,17 +54,23 @@ def channel_checks(
     return findings, checks
 
 
-def dead(frf: FRF) -> tuple[list[Finding], Check]:
-    """Channels far below the others, or that hold noise alone."""
+def dead(frf: FRF, alive: Collection[str] = ()) -> tuple[list[Finding], Check]:
+    """Channels far below the others, or that hold noise alone.
+
+    Lines that follow no curve are noise where nothing is known of it; where the recording brings
+    its variance, they may as well repeat: a structure that is not linear answers so.
+    """
     rms = np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
     typical = np.median(rms)
-    noisy = np.median(roughness(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300), axis=(0, 2))
+    noisy = np.median(noise_of(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300), axis=(0, 2))
     found = []
     for k, label in enumerate(frf.outputs):
+        if label in alive:
+            continue
         if rms[k] <= 1e-4 * typical:
             text = f"output {label} is dead: its level is {rms[k] / typical:.1e} of the others'"
         elif noisy[k] > NOISE_ONLY:
-            text = f"output {label} is dead: its lines follow no curve, they are noise alone"
+            text = f"output {label} is dead: its lines are noise alone"
         else:
             continue
         found.append(

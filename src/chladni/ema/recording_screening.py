@@ -7,8 +7,15 @@ from typing import cast
 import numpy as np
 
 from ..dynamics.frf import FRF, Quantity
-from .chain_checks import LEAST_MODES, QUANTITIES, hinted_delay, other_quantity, phase_checks
-from .channel_checks import channel_checks
+from .chain_checks import (
+    LEAST_MODES,
+    LOUD,
+    QUANTITIES,
+    hinted_delay,
+    other_quantity,
+    phase_checks,
+)
+from .channel_checks import channel_checks, dead
 from .finding import Check, Finding, Screening
 from .identification import Identified, identify
 from .screening import levels_checked
@@ -27,6 +34,7 @@ def screened(
     others: Sequence[Recording] = (),
     places: dict[str, np.ndarray] | None = None,
     use: np.ndarray | None = None,
+    calmer: Sequence[Recording] = (),
 ) -> Screening:
     """What a recording says of itself.
 
@@ -36,11 +44,13 @@ def screened(
     others : recordings of the same test, at the same level or others
     places : {output: (3,)} [m]
     use : (n_f,) bool, lines it was identified from, default all; to be identified from once more
+    calmer : more recordings of the test: a channel that lives at a lower level is not dead
     """
     frf = recording.frf
     if frf is None:
         return Screening(recording.name)
-    findings, checks = channel_checks(frf, places)
+    alive = _alive_when_calm(recording, (*others, *calmer))
+    findings, checks = channel_checks(frf, places, alive)
     if recording.time is not None:
         clipped = overloaded(recording.time)
         for name, blocks in clipped.items():
@@ -60,6 +70,28 @@ def screened(
         checks.append(one)
         checks.append(_lines(strong, frf.frequency))
     return Screening(recording.name, tuple(findings), tuple(checks))
+
+
+def _alive_when_calm(recording: Recording, others: Sequence[Recording]) -> set[str]:
+    """Outputs that live at a lower level and are as loud here: not dead, but not linear."""
+    frf, level, alive = recording.frf, recording.level, set[str]()
+    for other in others:
+        if frf is None or other.frf is None or level is None or other.level is None:
+            continue
+        if other.level >= level or other.article != recording.article:
+            continue
+        both = [o for o in frf.outputs if o in other.frf.outputs]
+        if both and frf.inputs == other.frf.inputs and frf.quantity == other.frf.quantity:
+            calm = other.frf.sel(outputs=both)
+            silent = {c for f in dead(calm)[0] for c in f.channels}
+            louder = _rms(frf.sel(outputs=both)) > _rms(calm) / LOUD
+            alive |= {o for o, loud in zip(both, louder, strict=True) if loud} - silent
+    return alive
+
+
+def _rms(frf: FRF) -> np.ndarray:
+    """Of each output over lines and inputs (n_out,)."""
+    return np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
 
 
 def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:

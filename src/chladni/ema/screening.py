@@ -110,8 +110,8 @@ class Homogeneity:
     limit : float           ratio that chance does not reach
     linear : bool
     p : float               of so large a ratio by chance, N ratio being of a gamma distribution
-    channels : tuple of str  outputs whose own ratio is beyond chance, the worst first; none where
-        it is linear
+    channels : tuple of str  outputs whose own ratio is beyond chance, the one first that moves most
+        for its own response; none where it is linear
     bands : ((low, high), ...)  runs of such lines [Hz], the worst first; none likewise
     """
 
@@ -166,6 +166,9 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
     limit = 1 + max(_CHANCE, 5 / np.sqrt(whitened.size))
     linear = bool(ratio <= limit or rms <= least)
     channel, line = whitened.mean(axis=0), moving_mean(whitened.mean(axis=(1, 2)), _ABOUT)
+    moved = (np.abs(H2 - H1) ** 2 - noise).mean(axis=0)
+    moved /= np.maximum((np.abs(H1) ** 2 + np.abs(H2) ** 2).mean(axis=0), 1e-300)
+    beyond = _beyond(low.outputs, channel.max(axis=1), moved.max(axis=1), len(f))
     return Homogeneity(
         ratio=ratio,
         rms=rms,
@@ -175,15 +178,21 @@ def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
         limit=float(limit),
         linear=linear,
         p=float(gammaincc(whitened.size, whitened.size * ratio)),
-        channels=() if linear else _beyond(low.outputs, channel.max(axis=1), len(f)),
+        channels=() if linear else beyond,
         bands=() if linear else _bands_beyond(f, line),
     )
 
 
-def _beyond(outputs: Sequence[str], ratio: np.ndarray, lines: int) -> tuple[str, ...]:
-    """Outputs (n_out,) whose ratio chance does not reach, the worst first."""
+def _beyond(
+    outputs: Sequence[str], ratio: np.ndarray, moved: np.ndarray, lines: int
+) -> tuple[str, ...]:
+    """Outputs (n_out,) whose ratio chance does not reach, in the order of how far they move.
+
+    A local force f adds -H_oc f to output o. That is most, for the output's own response, where it
+    acts (o = c); over the noise it is most where an output hardly answers and is quiet for it.
+    """
     limit = 1 + max(2 * _CHANCE, 5 / np.sqrt(lines))
-    return tuple(outputs[k] for k in np.argsort(-ratio, kind="stable") if ratio[k] > limit)
+    return tuple(outputs[k] for k in np.argsort(-moved, kind="stable") if ratio[k] > limit)
 
 
 def _bands_beyond(f: np.ndarray, line: np.ndarray) -> tuple[tuple[float, float], ...]:
@@ -230,7 +239,7 @@ def _worst(h: Homogeneity) -> str:
     """Channels and bands in which two levels differ most, in words."""
     said = f"most near {h.frequency[h.line.argmax()]:.4g} Hz"
     if h.channels:
-        said += f", at {named(h.channels, _NAMED)}"
+        said += f", at {named(h.channels, _NAMED)} (the first moves most)"
     if h.bands:
         bands = ", ".join(f"{a:.4g} to {b:.4g} Hz" for a, b in h.bands[:_NAMED])
         said += f", in {bands}"

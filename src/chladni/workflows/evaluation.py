@@ -89,7 +89,8 @@ def evaluate_recordings(
             progress(f"screening {r.name}", k / len(held))
             others = [] if k else [other for other, _ in held[1:]]
             decays = ring_downs(r.time) if r.time is not None else ()
-            screening = _screened(case, r, others, first=k == 0)
+            calmer = [other for other, _ in held if other is not r]
+            screening = _screened(case, r, others, calmer, first=k == 0)
             assert r.frf is not None
             levels = decay_study(decays, r.frf.quantity)
             screening = _with_time(screening, e, decays)
@@ -110,11 +111,15 @@ def _decay_notes(found: RecordingEvaluation) -> list[str]:
 
 
 def _screened(
-    case: Case | None, r: Recording, others: Sequence[Recording], first: bool
+    case: Case | None,
+    r: Recording,
+    others: Sequence[Recording],
+    calmer: Sequence[Recording],
+    first: bool,
 ) -> Screening:
     identified = _identified(case, r)
     if case is None or not (first and case.frfs) or identified is None:
-        return screened(r, identified, others)
+        return screened(r, identified, others, calmer=calmer)
     model = modelled(case.tested(case.assembly), REACH * identified.band[1])
     return screened_by_model(case, identified, model)
 

@@ -157,7 +157,8 @@ def identify(
     with threadpool_limits(1):
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
-            found.append(_modes(recording, band, gaps, averages, () if k else held, choice))
+            others = ((), held) if k else (held, ())
+            found.append(_modes(recording, band, gaps, averages, others, choice))
     screenings = notes_of_all([r.screening for r in found])
     levels = _levels(found, averages)
     said = [*screenings, *said]
@@ -189,7 +190,7 @@ def _modes(
     band: tuple[float, float] | None,
     gaps: Sequence[tuple[float, float]],
     averages: int,
-    others: Sequence[Recording],
+    others: tuple[Sequence[Recording], Sequence[Recording]],
     choice: PoleChoice,
 ) -> RecordingModes:
     frf = recording.frf
@@ -205,7 +206,8 @@ def _modes(
         found = found.sel(~found.inside | clear(found))
         screening = Screening(recording.name)  # there is no force to hold channels against
     else:
-        screening = screened(recording, found, others)
+        compared, calmer = others
+        screening = screened(recording, found, compared, calmer=calmer)
     diagram = stabilisation(frf, found, use, averages)
     found = without_window(found, recording.added_damping)
     return RecordingModes(recording, found, screening, diagram)
