@@ -57,7 +57,8 @@ SPOILT = {  # how, and what is said: kind, line that mends it
         "wrong unit of frequency", 'frequency_unit = "rad/s"',
     ),
     "conjugated": (
-        lambda c: with_frf(c, values=c.frfs[0].values.conj()), "conjugated FRFs", "conjugated = true",
+        lambda c: with_frf(c, values=c.frfs[0].values.conj()),
+        "conjugated FRFs", "conjugated = true",
     ),
     "quantity": (
         lambda c: with_frf(c, quantity="mobility"), "wrong quantity", 'quantity = "accelerance"',

@@ -24,7 +24,7 @@ from ..ema.correlation import wrapped
 from ..ema.finding import Check, Finding
 from ..ema.identification import DERIVATIVES
 from ..ema.shape_faults import LEAST_CHANNELS, SHIFT
-from ..errors import named
+from ..errors import named as listed
 from ..fem.locate import rows_of
 from ..fem.measured_dofs import MeasuredDofs
 from ..fem.modelled import Modelled, node_points
@@ -36,9 +36,11 @@ LEAST_LINES, MOST_LINES = 20, 4000  # of the recording, of the model
 DAMPING = 0.01  # of the model; the smoothing is several times as wide
 RIGID = 1e-3  # of the highest frequency: below are rigid motions
 REACH = 2.0  # times the highest line: modes the model must have
-EXPLAINED = 1 / 3  # of Q as declared, what an error that is named may leave
+EXPLAINED = 1 / 2  # of Q as declared, and of ``CHANCE``: what an error that is named may leave
 PLACES = 400  # where the force may act
 LN10 = np.log(10.0)
+SURE = ("wrong quantity", "delay")  # where the recording alone says so, whatever the model says
+CHANCE = (np.pi / LN10) ** 2 / 3  # Q of responses of one size whose phases have nothing in common
 
 
 @dataclass(frozen=True)
@@ -164,19 +166,47 @@ def chain_faults(
 ) -> tuple[list[Finding], Check]:
     """The error of a whole recording that explains most of how far it is from the model.
 
-    Named is the best one, where it leaves less than ``EXPLAINED`` of Q as declared.
+    Named is the best one, where it :func:`explains` Q as declared.
 
     Parameters
     ----------
     lines : (n_f,) bool   of the recording, those to look at
     model : of the deck as it was tested, a little beyond the band at least
-    before : what the recording says of itself; a delay is one more hypothesis
+    before : what the recording says of itself. A delay is one more hypothesis; that the quantity is
+        wrong is known from phases, which one it is only from the model.
     """
     name = "the chain against the model"
     seen = smoothed(frf, lines, model, outputs, inputs)
     if seen is None:
         return [], Check(name, "too few lines or modes", None)
     declared, _ = seen.as_declared()
+    tried = other_readings(frf, seen, declared, model, outputs, inputs, before)
+    best = min(tried, key=lambda h: h.share)
+    among = [h for h in tried if h.finding.kind in {f.kind for f in before if f.kind in SURE}]
+    said = f"Q {declared:.2g} as declared, {best.Q:.2g} at best of {len(tried)} other readings"
+    named = [best] if explains(best.Q, best.Q / best.share) else among
+    findings = [h.finding for h in sorted(named, key=lambda h: h.share)[:1]]
+    return findings, Check(name, said, not findings)
+
+
+def explains(Q: float, declared: float) -> bool:
+    """Whether an error leaves so little of Q as declared that it is named.
+
+    Much is left of responses that are not those of the model, whichever way they are read.
+    """
+    return Q < EXPLAINED * min(declared, CHANCE)
+
+
+def other_readings(
+    frf: FRF,
+    seen: Smoothed,
+    declared: float,
+    model: Modelled,
+    outputs: MeasuredDofs,
+    inputs: MeasuredDofs,
+    before: Sequence[Finding] = (),
+) -> list[Hypothesis]:
+    """Every error that is tried, ``declared`` being Q without any."""
     tried = [*_read_otherwise(frf, seen, declared, model, outputs, inputs)]
     for late in (f for f in before if f.kind == "delay"):
         Q = min(map(seen.score, seen.answers(delay=late.value)))
@@ -185,10 +215,7 @@ def chain_faults(
     if len(outputs.labels) >= LEAST_CHANNELS and inside.sum() >= LEAST_MODES:
         tried += _relabelled(seen, declared, outputs.labels)
         tried += _driven_elsewhere(seen, model, inputs)
-    best = min(tried, key=lambda h: h.share)
-    said = f"Q {declared:.2g} as declared, {best.Q:.2g} at best of {len(tried)} other readings"
-    wrong = best.share < EXPLAINED
-    return [best.finding] if wrong else [], Check(name, said, not wrong)
+    return tried
 
 
 def _read_otherwise(
@@ -246,7 +273,7 @@ def _relabelled(seen: Smoothed, declared: float, labels: tuple[str, ...]) -> lis
         f"{len(moved)} of {len(labels)} outputs stand under each other's labels: exchanged, Q "
         f"against the model is {Q:.2g}, as declared {declared:.2g}."
     )
-    mend = f"in sensors.csv give each the grid and direction of the other: {named(rows, 6)}"
+    mend = f"in sensors.csv give each the grid and direction of the other: {listed(rows, 6)}"
     channels = tuple(labels[k] for k in moved)
     return [Hypothesis(Q, Q / declared, Finding("permuted labels", text, "fault", channels, mend))]
 

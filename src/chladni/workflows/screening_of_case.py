@@ -12,7 +12,7 @@ from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.point_masses import with_masses
-from ..updating.chain_hypotheses import EXPLAINED, smoothed
+from ..updating.chain_hypotheses import explains, smoothed
 from ..updating.channel_screening import against_model
 from ..updating.question import Prepared
 from ..updating.result import NamedEffect
@@ -64,7 +64,7 @@ def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Fi
         light = modelled(with_masses(case.assembly, grids, 1e-3 * np.array(m)), model.band)
         other = smoothed(frf, lines, light, case.outputs, case.inputs)
         less = np.nan if other is None else other.as_declared()[0]
-        grams = less < EXPLAINED * Q
+        grams = explains(less, Q)
         said = f"the sensors weigh {carried:.3g} kg in all, the structure {deck:.3g} kg"
         if grams:
             said += (
