@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 import chladni
 from chladni.cli.app import application
 from chladni.effects.points import with_masses
-from chladni.ema.finding import Finding
+from chladni.ema.finding import Finding, Screening
 from chladni.updating.chain_hypotheses import chain_faults
+from chladni.workflows.screening_of_case import instead_of_effects
 
 from .conftest import write_case
 
@@ -168,3 +169,13 @@ def test_sensors_that_are_heavy_in_earnest_are_no_mistake(sound):
     frf = chladni.frf(article, list(sound.outputs.labels), ["2:+Z"], sound.frfs[0].frequency)
     heavy = with_frf(heavy, values=frf.frfs[0].to("accelerance").values)
     assert not [f for f in chladni.check(heavy).findings if "sensors weigh" in f.text]
+
+
+def test_a_verdict_without_a_cause_says_what_looks_wrong():
+    """A warning stops no diagnosis; where nothing explains the data it is the first suspect."""
+    turned = Screening("a.uff", (Finding("turned sensor", "...", "warning", ("7:+Z",)),))
+    (said,) = instead_of_effects("not in catalogue", turned)
+    assert "turned sensor" in said
+    assert "7:+Z" in said
+    assert instead_of_effects("missing physics", turned) == ()
+    assert instead_of_effects("not in catalogue", Screening("a.uff")) == ()

@@ -58,6 +58,7 @@ from .over_levels import over_levels
 from .question_of_case import question
 from .screening_of_case import (
     RecordingAtFault,
+    instead_of_effects,
     screened_prepared,
     screened_unprepared,
     unmendable,
@@ -163,11 +164,12 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
         distrust = (*distrust, *foretells_worse(result.agreement))
     if diagnosing and prepared.too_little and result.verdict != "nonlinear":  # levels name theirs
         distrust = (f"nothing is named: {prepared.too_little}", *distrust)
-    said = () if known.screening is None else known.screening.notes
+    seen = known.screening
+    if diagnosing:
+        distrust = (*distrust, *instead_of_effects(result.verdict, seen))
+    said = () if seen is None else seen.notes
     notes = (*said, *result.notes, *lost, *case.said("diagnose" if diagnosing else "calibrate"))
-    return replace(
-        result, notes=notes, distrust=distrust, searched=diagnosing, screening=known.screening
-    )
+    return replace(result, notes=notes, distrust=distrust, searched=diagnosing, screening=seen)
 
 
 def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:

@@ -121,6 +121,13 @@ def unmendable(screening: Screening) -> bool:
     return len(faults) > 1 or any(f.kind not in FITTED for f in faults)
 
 
+def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, ...]:
+    """Why a verdict that names no cause is not to be trusted: the recording itself looks wrong."""
+    if verdict != "not in catalogue" or screening is None or not screening.findings:
+        return ()
+    return (f"{screening.sentence}: that may be what no effect explains",)
+
+
 def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisResult:
     """The answer of a recording that is to be mended first: nothing was fitted to it."""
     note = (
