@@ -31,8 +31,10 @@ FINE = np.log(np.geomspace(0.15, 6.5, 61))
 COARSE = np.log(np.geomspace(6.5, 1e4, 30)[1:])  # a dead channel shows less than the inverse
 GAINS = np.concatenate([-COARSE[::-1], FINE, COARSE])
 LEAST_GAIN = 0.18  # ln: 3 % is the tolerance of a sensor; no model knows a shape to much better
+OWN = np.geomspace(0.05, 5.0, 9)  # τ, of the rms of a shape: an error of one channel alone
 THRESHOLD = 30.0  # of ln L, after the price of the trials: physics left out reaches half of it
 RARE = np.log(100.0)  # one recording in a hundred has a given fault
+MIMICKED = RARE  # of ln L, over a channel that the model misjudges, of what physics may mimic
 _UNLESS = ", unless the model is wrong about the shapes there"
 WORST = 3  # channels for which other places are tried
 COPY = 0.05  # of the power of two channels, their difference: they may be one
@@ -59,9 +61,10 @@ class ModelShapes:
 
 @dataclass(frozen=True, eq=False)
 class _Fault:
-    """A hypothesis: what it gains, and how it reads."""
+    """A hypothesis: what it gains, over a misjudged channel as well, and how it reads."""
 
     gain: float
+    over_misjudged: float
     finding: Finding
 
 
@@ -83,7 +86,7 @@ def shape_faults(
     found: list[Finding] = []
     for _ in range(MOST):
         best = _best(labels, psi, frequency, phi, model, at)
-        if best is None or best.gain < THRESHOLD:
+        if best is None:
             break
         found.append(best.finding)
         fine = np.array([label not in best.finding.channels for label in labels])
@@ -109,13 +112,34 @@ def _best(
     grid = [_Mixture.of(phi, model.frequency, f, e, s, c)
             for e in MIX for s in ERROR for c in SHIFT]  # fmt: skip
     null = max(g.likelihood(psi) for g in grid)
+    misjudged = _misjudged(psi, grid)
     found = [
-        _signs_and_gains(labels, psi, grid, null),
+        _reversed(labels, psi, grid, null),
+        _gains(labels, psi, grid, null, misjudged),
         _exchanges(labels, psi, grid, null),
     ]
-    found += _other_rows(labels, psi, phi, model, at, grid, null)
-    known = [fault for fault in found if fault is not None]
-    return max(known, key=lambda fault: fault.gain, default=None)
+    found += _other_rows(labels, psi, phi, model, at, grid, null, misjudged)
+    best = max(found, key=lambda fault: fault.gain)
+    return best if best.gain > THRESHOLD and best.over_misjudged > MIMICKED else None
+
+
+def _misjudged(psi: np.ndarray, grid: list["_Mixture"]) -> np.ndarray:
+    """Ln L where the model knows one channel worse than the others, of each channel (n,).
+
+    With τ² of its own, C_i = C + τ² e_i e_iᵀ: what physics that the model lacks does about a
+    sensor. A fault of a channel that physics may mimic has to fit better than that.
+    """
+    n, r = psi.shape
+    L = np.full(n, -np.inf)
+    for g in grid:
+        pull = np.einsum("rij,jr->ir", g.inverse, psi)
+        own = np.einsum("rii->ir", g.inverse)
+        q0 = g.squares(psi)
+        for tau2 in OWN**2 / n:
+            more = 1 + tau2 * own
+            q = np.maximum(q0 - tau2 * pull**2 / more, 1e-300)
+            L = np.maximum(L, g.total(q) - np.log(more).sum(axis=1) / 2)
+    return np.asarray(L - np.log(max(r, 2)) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,28 +180,36 @@ class _Mixture:
         return float(self.total(self.squares(psi)))
 
 
-def _signs_and_gains(
+def _reversed(
     labels: tuple[str, ...], psi: np.ndarray, grid: list[_Mixture], null: float
-) -> _Fault | None:
+) -> _Fault:
+    """One channel times -1."""
+    L = _of_factors(psi, grid, np.array([-1.0]), slice(None))[:, 0]
+    i = int(L.argmax())
+    return _scaled(labels, i, -1.0, float(L[i] - null - np.log(len(psi)) - RARE), np.inf)
+
+
+def _gains(
+    labels: tuple[str, ...],
+    psi: np.ndarray,
+    grid: list[_Mixture],
+    null: float,
+    misjudged: np.ndarray,
+) -> _Fault:
     """One channel times a real factor g: ψ_i / g is what was there."""
     n, r = psi.shape
     factors = np.concatenate([np.exp(GAINS), -np.exp(GAINS)])
     L = _of_factors(psi, grid, factors, slice(None))
-    pure = int(np.abs(factors + 1).argmin())
-    i = int(L[:, pure].argmax())
-    sign = L[i, pure] - null - np.log(n) - RARE
-    small = (np.abs(np.log(np.abs(factors))) < LEAST_GAIN) & (factors > 0)
-    L[:, small] = -np.inf
+    L[:, np.abs(np.log(np.abs(factors))) < LEAST_GAIN] = -np.inf
     k, at = (int(v) for v in np.unravel_index(L.argmax(), L.shape))
     price = np.log(n) + RARE + 0.5 * np.log(max(r, 2)) + 1.0
-    gain = L[k, at] - null - price
-    if sign >= gain or abs(np.log(-factors[at]) if factors[at] < 0 else 1.0) < LEAST_GAIN:
-        return _scaled(labels, i, -1.0, float(sign))
     step = float(np.diff(GAINS).max())
     near = factors[at] * np.exp(np.linspace(-step, step, 201))
+    near = near[np.abs(np.log(np.abs(near))) >= LEAST_GAIN]
     closer = _of_factors(psi, grid, near, slice(k, k + 1))[0]
     best = int(closer.argmax())
-    return _scaled(labels, k, float(near[best]), float(closer[best] - null - price))
+    over = float(closer[best] - misjudged[k] - 1.0)
+    return _scaled(labels, k, float(near[best]), float(closer[best] - null - price), over)
 
 
 def _of_factors(
@@ -198,7 +230,7 @@ def _of_factors(
     return L - psi.shape[1] * np.log(np.abs(factors))
 
 
-def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
+def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float, over: float) -> _Fault:
     label = labels[i]
     if g == -1.0:
         kind, text = "reversed sign", f"output {label} has the wrong sign in every mode"
@@ -213,12 +245,12 @@ def _scaled(labels: tuple[str, ...], i: int, g: float, gain: float) -> _Fault:
     unless = "" if g == -1.0 else _UNLESS
     text += f" ({evidence_in_words(gain)}){unless}."
     severity: Severity = "fault" if g == -1.0 else "warning"
-    return _Fault(gain, Finding(kind, text, severity, (label,), mend, g))
+    return _Fault(gain, over, Finding(kind, text, severity, (label,), mend, g))
 
 
 def _exchanges(
     labels: tuple[str, ...], psi: np.ndarray, grid: list[_Mixture], null: float
-) -> _Fault | None:
+) -> _Fault:
     """Two channels under each other's label."""
     n = len(psi)
     pairs = np.array(list(combinations(range(n), 2)))
@@ -240,7 +272,7 @@ def _exchanges(
         f"({evidence_in_words(gain)})."
     )
     mend = f"in sensors.csv exchange the labels {names[0]} and {names[1]}"
-    return _Fault(gain, Finding("swapped channels", text, "fault", names, mend))
+    return _Fault(gain, np.inf, Finding("swapped channels", text, "fault", names, mend))
 
 
 def _other_rows(
@@ -251,6 +283,7 @@ def _other_rows(
     at: np.ndarray,
     grid: list[_Mixture],
     null: float,
+    misjudged: np.ndarray,
 ) -> list[_Fault]:
     """The channels that fit worst, along other directions, at other places, at another's place."""
     first = max(grid, key=lambda g: g.likelihood(psi))
@@ -265,7 +298,8 @@ def _other_rows(
         tried += [("elsewhere", model.elsewhere(int(at[i])))] if model.elsewhere else []
         for kind, (values, names) in tried:
             if len(names):
-                out.append(_replaced(labels, psi, phi, int(i), kind, values, names, near, null))
+                words = (labels, psi, phi, int(i), kind, values, names, near, null, misjudged)
+                out.append(_replaced(*words))
     return out
 
 
@@ -285,6 +319,7 @@ def _replaced(
     names: list[str],
     grid: list[_Mixture],
     null: float,
+    misjudged: np.ndarray,
 ) -> _Fault:
     """Row i of the model by each of others (k, m), by what the other channels foretell of it."""
     n = len(psi)
@@ -326,4 +361,4 @@ def _replaced(
         )
         mend = f"look where {label} sits and put that place into sensors.csv"
         finding = Finding("misplaced sensor", text, "warning", (label,), mend)
-    return _Fault(gain, finding)
+    return _Fault(gain, float(L[k] - misjudged[i] - np.log(len(rows))), finding)
