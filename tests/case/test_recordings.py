@@ -1,5 +1,6 @@
 """Of several recordings one is compared; what is not used is named."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from chladni.case.sensor_places import places
 from chladni.case.toml_sections import TomlSection
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import Function, PoleTable, Recording, Shapes, TestSetup
-from chladni.errors import ChladniError
+from chladni.errors import ChladniError, LabelError
 from chladni.io.nastran import assembly, read_deck
 from chladni.units import UNITS
 
@@ -106,13 +107,36 @@ def test_nodes_and_axes_of_a_recording_are_used(tmp_path: Path) -> None:
     assert any("nodes 12" in n for n in notes)
 
 
-def test_numbers_that_coincide_by_chance_are_noticed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("factor", [1.0, 1e3])
+def test_places_count_where_numbers_coincide_by_chance(tmp_path: Path, factor: float) -> None:
+    """In metres or in millimetres."""
     (tmp_path / "plate.bdf").write_text(deck())
     made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
     notes: list[str] = []
-    elsewhere = Recording("a.uff", nodes={12: made.points[made.rows([30])[0]]})
-    places(section(), TestSetup(), made, ("12:+Z",), "output", [elsewhere], notes)
-    assert any("node 12 of the recording is" in n and "give the places" in n for n in notes)
+    labels, there = ("1:+Z", "2:+Z", "3:+Z"), made.points[made.rows([12, 30, 34])]
+    nodes = dict(zip((1, 2, 3), factor * there, strict=True))
+    recorded = [Recording("a.uff", nodes=nodes)]
+    found = places(section(), TestSetup(), made, labels, "output", recorded, notes)
+    np.testing.assert_allclose(found.points, there, atol=1e-9)
+    assert any("3 of 3 are off): the places were taken" in n for n in notes)
+    assert any("fit the deck in mm" in n for n in notes) == (factor != 1)
+
+
+@pytest.mark.parametrize("nodes", [{}, {k: np.zeros(3) for k in (1, 2, 3)}])
+def test_labels_that_count_are_channels(tmp_path: Path, nodes: dict[int, np.ndarray]) -> None:
+    """Unless coordinates say that they are grids; those that a lab leaves at zero say nothing."""
+    (tmp_path / "plate.bdf").write_text(deck())
+    made = assembly(read_deck(tmp_path / "plate.bdf"), UNITS["mm-t-s"])
+    labels, recorded = ("1:+Z", "2:+Z", "3:+Z"), Recording("a.uff", nodes=nodes)
+    with pytest.raises(LabelError, match="number channels"):
+        places(section(), TestSetup(), made, labels, "output", [recorded], [])
+    known = dict(zip((1, 2, 3), made.points[made.rows([1, 2, 3])], strict=True))
+    recorded = replace(recorded, nodes=known)
+    found = places(section(), TestSetup(), made, labels, "output", [recorded], [])
+    assert found.grids.tolist() == [1, 2, 3]
+    some = ("1:+Z", "3:+Z", "4:+Z")
+    found = places(section(), TestSetup(), made, some, "output", [Recording("a.npz")], [])
+    assert found.grids.tolist() == [1, 3, 4]
 
 
 @pytest.mark.parametrize(

@@ -101,12 +101,14 @@ SCHEMA = (
         "By how much all responses lag the forces; it is taken off. At most 1 / Δf of the lines.",
         "0.0005", _READ),
     Key("test", "frequency_unit", "word", "", "Hz",
-        "What the frequencies of the recordings are in; all other frequencies of a case are in Hz.",
+        "Unit of frequency in the recordings; all other frequencies of a case are in Hz.",
         '"rad/s"', _READ, tuple(HERTZ)),
     Key("test", "conjugated", "true or false", "", "false",
-        "Whether the FRFs were computed with exp(-iωt), so that their phases turn the wrong way.",
+        "True: the FRFs were computed with exp(-iωt), their phases turn the wrong way.",
         "true", _READ),
-    Key("test", "sensors", "file", "", "nodes of the recording are grids of the deck",
+    Key("test", "sensors", "file", "",
+        "labels name grids of the deck, unless their coordinates lie elsewhere or they just count "
+        "1, 2, 3",
         "Where sensors and shakers sit, which channels are left out or of a wrong gain: the table "
         "below.", '"sensors.csv"', (*_READ, "bench")),
     Key("test", "mass", "number", "kg", "not weighed",

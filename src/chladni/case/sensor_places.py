@@ -13,11 +13,11 @@ from ..geometry.nearest import ShellSurface
 from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 from .label_directions import ways_said
+from .node_numbers import OFF, count_channels, numbers_agree, on_structure, scaled, size_of
 from .toml_sections import TomlSection
 
 ROLES: tuple[Role, ...] = ("output", "input")
 _FAR = 0.1  # of the structure's size: a place farther from it is a mistake of units
-_OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
 
 
 def labels(recordings: Sequence[Recording], setup: TestSetup, role: Role) -> tuple[str, ...]:
@@ -39,11 +39,19 @@ def places(
 ) -> MeasuredDofs:
     """Every label on the structure, by the table of sensors or by what the recording says of it."""
     table = {s.label: s for s in (setup.outputs if role == "output" else setup.inputs)}
-    nodes = {n: x for r in recorded for n, x in r.nodes.items()}
+    unit, nodes = scaled(made, {n: x for r in recorded for n, x in r.nodes.items()})
     axes = {n: A for r in recorded for n, A in r.axes.items()}
     spoken = [label for label in labels if label not in table]
-    known = {**table, **{label: _spoken(label, test, made, nodes, axes) for label in spoken}}
-    notes += _nodes_said(made, spoken, nodes, axes)
+    seated = on_structure(made, nodes)
+    elsewhere = seated and not numbers_agree(made, nodes)
+    if not seated and count_channels(spoken):
+        raise LabelError(
+            f"{test.at('recordings')}: the labels {named(spoken, 3)} number channels: no "
+            "coordinates say that they are the grids of these numbers; give each its grid or its "
+            "place in sensors.csv"
+        )
+    known = {**table, **{n: _spoken(n, test, made, nodes, axes, elsewhere) for n in spoken}}
+    notes += _nodes_said(made, spoken, nodes, axes, elsewhere, unit)
     notes += _off_said(made, role, [x for n in labels if (x := known[n].place) is not None])
     found = placed(made, [known[label] for label in labels], test.at("recordings"))
     notes += ways_said(made, found, table)
@@ -69,11 +77,13 @@ def _spoken(
     made: Assembly,
     nodes: Mapping[int, np.ndarray],
     axes: Mapping[int, np.ndarray],
+    elsewhere: bool,
 ) -> Sensor:
     """What a label and the recording's geometry say of a dof, the direction in the basic frame.
 
     Its +X, +Y, +Z are the axes the recording gives the node, else those the deck counts the grid's
-    displacements in. A node that is no grid sits where the recording says it does.
+    displacements in. A node that is no grid, or whose number is that of another grid
+    (``elsewhere``), sits where the recording says it does.
     """
     where = test.at("recordings")
     node = label.partition(":")[0].strip()
@@ -83,7 +93,7 @@ def _spoken(
     if node == "base":
         return Sensor(label, None, direction=way)
     id = int(node)
-    at = np.flatnonzero(made.ids == id)
+    at = np.flatnonzero((made.ids == id) & (not elsewhere or id not in nodes))
     if way is not None and id in axes:
         way = way @ axes[id]
     elif way is not None and len(at) and made.axes is not None:
@@ -112,8 +122,16 @@ def _nodes_said(
     spoken: Sequence[str],
     nodes: Mapping[int, np.ndarray],
     axes: Mapping[int, np.ndarray],
+    elsewhere: bool,
+    unit: str,
 ) -> list[str]:
-    """How the geometry of a recording was read."""
+    """How the geometry of a recording was read.
+
+    Parameters
+    ----------
+    elsewhere : the numbers are those of other grids
+    unit : of the coordinates
+    """
     said = [label.partition(":")[0] for label in spoken]
     ids = list(dict.fromkeys(int(n) for n in said if n.isdecimal()))
     row = {int(id): k for k, id in enumerate(made.ids)}
@@ -125,15 +143,17 @@ def _nodes_said(
         )
     if turned := [n for n in ids if n in axes]:
         out.append(f"directions at nodes {named(turned)} are along the recording's own axes there")
-    size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
     both = [n for n in ids if n in row and n in nodes]
+    if both and unit != "m":
+        out.append(f"coordinates of the recording fit the deck in {unit}: they were read so")
     away = {n: float(np.linalg.norm(made.points[row[n]] - nodes[n])) for n in both}
-    if away and max(away.values()) > _OFF * size:
-        worst, off = max(away, key=lambda n: away[n]), sum(d > _OFF * size for d in away.values())
+    if away and max(away.values()) > OFF * size_of(made):
+        worst = max(away, key=lambda n: away[n])
+        off = sum(d > OFF * size_of(made) for d in away.values())
         out.append(
             f"node {worst} of the recording is {away[worst]:.3g} m away from grid {worst} of the "
-            f"deck ({off} of {len(away)} are off): the grids were taken; if the numbers are not "
-            "the deck's, give the places in sensors.csv"
+            f"deck ({off} of {len(away)} are off): the {'places' if elsewhere else 'grids'} were "
+            "taken; rows of sensors.csv say it otherwise"
         )
     return out
 

@@ -57,8 +57,8 @@ def channel_checks(
 def dead(frf: FRF, alive: Collection[str] = ()) -> tuple[list[Finding], Check]:
     """Channels far below the others, or that hold noise alone.
 
-    Lines that follow no curve are noise where nothing is known of it; where the recording brings
-    its variance, they may as well repeat: a structure that is not linear answers so.
+    Noise is the variance that the recording brings. Without one it is what follows no curve, though
+    a structure that is not linear answers so as well.
     """
     rms = np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
     typical = np.median(rms)

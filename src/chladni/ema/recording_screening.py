@@ -90,7 +90,7 @@ def _alive_when_calm(recording: Recording, others: Sequence[Recording]) -> set[s
 
 
 def _rms(frf: FRF) -> np.ndarray:
-    """Of each output over lines and inputs (n_out,)."""
+    """Root mean square of each output over lines and inputs (n_out,)."""
     return np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
 
 

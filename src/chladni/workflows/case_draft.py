@@ -164,8 +164,9 @@ def _missing(
     if lost:
         more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
         out.append(
-            f"places of {', '.join(lost[:_NAMED])}{more}: the deck has no such grid and the "
-            "recording no such node; a row each in sensors.csv, with a grid or x, y, z in metres"
+            f"places of {', '.join(lost[:_NAMED])}{more}: no grid of the deck and no node of the "
+            "recording is known to be there; a row each in sensors.csv, with a grid or x, y, z in "
+            "metres"
         )
     if not read:
         out.append("a recording: [test] recordings, a universal file, .npz or .csv")

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..case.node_numbers import count_channels, numbers_agree, on_structure, scaled, size_of
 from ..ema.setup import Recording, Role, Sensor
 from ..errors import named
 from ..geometry.nearest import ShellSurface
@@ -13,9 +14,6 @@ from ..io.tables.sensor_table import direction
 from ..model.assembly import Assembly
 
 SAME_PLACE = 0.002  # of the structure's size: a place this near to a grid is that grid
-OFF = 0.02  # of the size: a node farther from the grid of its number is another one
-SCALES = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 0.01, "units 1000 times as large": 1e3}
-_ENOUGH, _LOOKED = 3, 200  # nodes by which a scale can be told; and that are looked at
 Way = Literal["grid", "place", "nearest", "base", "table", "missing"]
 
 
@@ -58,17 +56,16 @@ def matched(
     """
     if recording is None or recording.frf is None:
         return [_of_table(s) for s in table], []
-    size = float(np.linalg.norm(np.ptp(made.points, axis=0)))
-    unit, scale = _scale(made, recording, size)
+    size = size_of(made)
+    unit, nodes = scaled(made, recording.nodes)
     notes = []
-    if scale != 1:
+    if unit != "m":
         notes.append(
             f"the places of {recording.name} fit the deck if they are read in {unit}: so they "
             "were, though the file says otherwise or nothing"
         )
     own = {(s.label, s.role): s for s in table}
-    nodes = {n: scale * x for n, x in recording.nodes.items()}
-    by_number = _numbers_agree(made, nodes, size)
+    by_number = numbers_agree(made, nodes)
     if nodes and not by_number and set(nodes) & set(made.ids.tolist()):
         notes.append(
             f"nodes of {recording.name} have numbers of grids that lie elsewhere: places count, "
@@ -77,9 +74,18 @@ def matched(
     sides: tuple[tuple[Role, Sequence[str]], ...] = (
         ("output", recording.frf.outputs), ("input", recording.frf.inputs),
     )  # fmt: skip
+    rest = [label for label in recording.frf.outputs if (label, "output") not in own]
+    channels = not on_structure(made, nodes) and count_channels(rest)
+    if channels:
+        notes.append(
+            f"labels {named(rest, 3)} of {recording.name} number channels: no coordinates say that "
+            "they are the grids of these numbers"
+        )
     found = [
         _of_table(own[label, role])
         if (label, role) in own
+        else MatchedDof(label, role, "missing", axis=direction(label, label))
+        if channels and not label.startswith("base")
         else _one(made, recording, nodes, by_number, size, label, role)
         for role, labels in sides
         for label in labels
@@ -130,33 +136,3 @@ def _by_place(
         return MatchedDof(label, role, way, grid, distance=float(away[near]), axis=axis)
     off = float(ShellSurface.whole(made).feet(place).distance[0])
     return MatchedDof(label, role, "nearest", None, place, off, axis)
-
-
-def _scale(made: Assembly, recording: Recording, size: float) -> tuple[str, float]:
-    """(unit, factor) that brings the recording's places onto the deck; metres unless far better."""
-    if len(recording.nodes) < _ENOUGH:
-        return "m", 1.0
-    places = np.array(list(recording.nodes.values()))
-    off = {unit: _off(made, places * factor, size) for unit, factor in SCALES.items()}
-    best = min(off, key=lambda unit: off[unit])
-    if off["m"] > 5 * OFF and off[best] < OFF:
-        return best, SCALES[best]
-    return "m", 1.0
-
-
-def _off(made: Assembly, places: np.ndarray, size: float) -> float:
-    """Median distance from the nearest grid over the structure's size; a mere dot is far off."""
-    if float(np.linalg.norm(np.ptp(places, axis=0))) < OFF * size:
-        return np.inf
-    away = [float(np.linalg.norm(made.points - x, axis=1).min()) for x in places[:_LOOKED]]
-    return float(np.median(away)) / size
-
-
-def _numbers_agree(made: Assembly, nodes: dict[int, np.ndarray], size: float) -> bool:
-    """Whether nodes lie where the grids of their numbers do; nothing known speaks for them."""
-    ids = [n for n in nodes if n in set(made.ids.tolist())]
-    if not ids:
-        return True
-    places = np.array([nodes[n] for n in ids])
-    away = np.linalg.norm(made.points[made.rows(ids)] - places, axis=1)
-    return bool(np.median(away) <= OFF * size)

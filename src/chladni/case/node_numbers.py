@@ -1,0 +1,75 @@
+"""Numbers of a recording's nodes: those of the deck's grids, or of channels.
+
+Numbers that coincide prove nothing: decks and recordings alike begin at 1. Coordinates decide where
+there are any. Where there are none, labels that count 1, 2, 3, ... number channels.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..model.assembly import Assembly
+
+OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
+SCALES = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 0.01, "units 1000 times as large": 1e3}
+_ENOUGH, _LOOKED = 3, 200  # nodes by which a scale or a count can be told; and that are looked at
+
+
+def size_of(made: Assembly) -> float:
+    """Diagonal of the box about the structure [m]."""
+    return float(np.linalg.norm(np.ptp(made.points, axis=0)))
+
+
+def scaled(made: Assembly, nodes: Mapping[int, np.ndarray]) -> tuple[str, dict[int, np.ndarray]]:
+    """Unit in which nodes lie on the deck, and the nodes in metres.
+
+    Metres unless another unit is far better.
+    """
+    if len(nodes) < _ENOUGH:
+        return "m", dict(nodes)
+    places, size = np.array(list(nodes.values())), size_of(made)
+    off = {unit: _off(made, places * factor, size) for unit, factor in SCALES.items()}
+    best = min(off, key=lambda unit: off[unit])
+    unit = best if off["m"] > 5 * OFF and off[best] < OFF else "m"
+    return unit, {n: SCALES[unit] * x for n, x in nodes.items()}
+
+
+def _off(made: Assembly, places: np.ndarray, size: float) -> float:
+    """Median distance from the nearest grid over the structure's size; a mere dot is far off."""
+    if _dot(places, size):
+        return np.inf
+    away = [float(np.linalg.norm(made.points - x, axis=1).min()) for x in places[:_LOOKED]]
+    return float(np.median(away)) / size
+
+
+def _dot(places: np.ndarray, size: float) -> bool:
+    return float(np.linalg.norm(np.ptp(places, axis=0))) < OFF * size
+
+
+def on_structure(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
+    """Whether nodes [m] are places on the structure; several at one dot are places of nothing."""
+    places, size = np.array(list(nodes.values())), size_of(made)
+    if not len(places) or (len(places) > 1 and _dot(places, size)):
+        return False
+    away = [float(np.linalg.norm(made.points - x, axis=1).min()) for x in places[:_LOOKED]]
+    return float(np.median(away)) <= 5 * OFF * size
+
+
+def numbers_agree(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
+    """Whether nodes [m] lie where the grids of their numbers do; nothing known speaks for them."""
+    ids = [n for n in nodes if n in set(made.ids.tolist())]
+    if not ids:
+        return True
+    places = np.array([nodes[n] for n in ids])
+    away = np.linalg.norm(made.points[made.rows(ids)] - places, axis=1)
+    return bool(np.median(away) <= OFF * size_of(made))
+
+
+def count_channels(labels: Sequence[str]) -> bool:
+    """Whether labels of outputs number channels: their nodes are 1, 2, 3, ... to the last.
+
+    >>> count_channels(["1:+Z", "2:+Z", "3:+Z"]), count_channels(["2:+Z", "4:+Z", "7:+Z"])
+    (True, False)
+    """
+    nodes = {label.partition(":")[0].strip() for label in labels}
+    return len(nodes) >= _ENOUGH and nodes == {str(k + 1) for k in range(len(nodes))}
