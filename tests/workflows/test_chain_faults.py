@@ -118,6 +118,17 @@ def test_a_delay_is_not_taken_for_another_error(sound, model):
     assert findings == [late]
 
 
+def test_phases_say_that_the_quantity_is_wrong_and_the_model_which_it_is(sound, model, monkeypatch):
+    """Though no reading fits the model as it should."""
+    monkeypatch.setattr("chladni.updating.chain_hypotheses.EXPLAINED", 0.0)
+    frf = replace(sound.frfs[0], quantity="mobility")
+    words = (frf, sound.lines(frf.frequency), model, sound.outputs, sound.inputs)
+    assert chain_faults(*words)[0] == []
+    guess = Finding("wrong quantity", "a quarter turn", "fault", (), 'quantity = "receptance"')
+    (found,), _ = chain_faults(*words, [guess])
+    assert 'quantity = "accelerance"' in found.repair
+
+
 def spoil_files(place, to, spoilt):
     """The same errors as a user has them, in the files of a case."""
     shutil.copytree(place, to)

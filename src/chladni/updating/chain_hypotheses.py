@@ -39,6 +39,7 @@ REACH = 2.0  # times the highest line: modes the model must have
 EXPLAINED = 1 / 2  # of Q as declared, and of ``CHANCE``: what an error that is named may leave
 PLACES = 400  # where the force may act
 LN10 = np.log(10.0)
+TINY = 1e-9  # Q of a recording that is the model's own
 SURE = ("wrong quantity", "delay")  # where the recording alone says so, whatever the model says
 CHANCE = (np.pi / LN10) ** 2 / 3  # Q of responses of one size whose phases have nothing in common
 
@@ -105,7 +106,8 @@ class Smoothed:
 
     def score(self, H: np.ndarray, inputs: slice = slice(None)) -> float:
         """Q of responses (n_s, n_out, n_in)."""
-        return float(np.median(_squares(_logarithm(H) - self.log_test[:, :, inputs])))
+        Q = np.median(_squares(_logarithm(H) - self.log_test[:, :, inputs]))
+        return float(np.maximum(Q, TINY))
 
 
 def _log10(H: np.ndarray) -> np.ndarray:
