@@ -254,3 +254,17 @@ def test_two_faults_are_found_one_after_another() -> None:
 def test_few_channels_or_modes_say_nothing() -> None:
     assert shape_faults(NAMES[:4], -SHAPES[:4], MODES, ModelShapes(SHAPES[:4], MODES)) == []
     assert shape_faults(NAMES, SHAPES[:, :3], MODES[:3], MODEL) == []
+
+
+def test_a_channel_that_the_model_misjudges_has_no_wrong_gain() -> None:
+    """Twice as large in half of its modes and half as large in the others, it has no gain at all.
+
+    Larger in all of them, if not by the same factor, it is half explained by one; that is what a
+    patch about the sensor does, and no calibrator finds it.
+    """
+    each = np.exp(np.linspace(0.1, 0.9, SHAPES.shape[1]))
+    for factors in (each, np.tile([2.0, 0.5], SHAPES.shape[1])[: SHAPES.shape[1]]):
+        psi = SHAPES.copy()
+        psi[4] *= factors
+        assert faults(psi) == []
+    assert faults(times({4: 1.65}) @ SHAPES) == [("wrong gain", ("5:+Z",))]

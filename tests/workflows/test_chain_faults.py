@@ -173,6 +173,15 @@ def test_check_and_diagnose_say_it_and_the_line_mends_it(place, tmp_path, spoilt
         assert not chladni.check(chladni.load_case(case)).faults
 
 
+def test_one_wrong_direction_is_named_with_its_line(sound):
+    """The response of the model along it is next to nothing, which no gain makes up for."""
+    ways = sound.outputs.directions.copy()
+    ways[sound.outputs.labels.index("24:+Z")] = 1, 0, 0
+    turned = replace(sound, outputs=replace(sound.outputs, directions=ways))
+    (found,) = chladni.check(turned).findings
+    assert found.remedy == "in sensors.csv give 24:+Z the direction +Z"
+
+
 def test_sensors_that_are_heavy_in_earnest_are_no_mistake(sound, tmp_path):
     """A sensor of a sixth of the plate, on the article as in the model."""
     grid, kg = 24, 0.03

@@ -34,9 +34,9 @@ LEAST_GAIN = 0.18  # ln: 3 % is the tolerance of a sensor; no model knows a shap
 OWN = np.geomspace(0.05, 5.0, 9)  # τ, of the rms of a shape: an error of one channel alone
 THRESHOLD = 30.0  # of ln L, after the price of the trials: physics left out reaches half of it
 RARE = np.log(100.0)  # one recording in a hundred has a given fault
-MIMICKED = RARE  # of ln L, over a channel that the model misjudges, of what physics may mimic
+MIMICKED = 15.0  # of ln L, of what physics may mimic, over a channel that the model misjudges
 _UNLESS = ", unless the model is wrong about the shapes there"
-WORST = 3  # channels for which other places are tried
+WORST, LIKELY = 3, 6  # channels for which other places are tried, mixtures they are tried in
 COPY = 0.05  # of the power of two channels, their difference: they may be one
 MOST = 3  # faults that are named one after another
 
@@ -115,30 +115,33 @@ def _best(
     misjudged = _misjudged(psi, grid)
     found = [
         _reversed(labels, psi, grid, null),
-        _gains(labels, psi, grid, null, misjudged),
+        _gains(labels, psi, grid, null, misjudged.max(axis=0)),
         _exchanges(labels, psi, grid, null),
     ]
     found += _other_rows(labels, psi, phi, model, at, grid, null, misjudged)
-    best = max(found, key=lambda fault: fault.gain)
-    return best if best.gain > THRESHOLD and best.over_misjudged > MIMICKED else None
+    best: dict[str, _Fault] = {}  # of each channel: what explains it less is not named instead
+    for fault in sorted(found, key=lambda fault: fault.gain):
+        best[fault.finding.channels[0]] = fault
+    sure = [f for f in best.values() if f.gain > THRESHOLD and f.over_misjudged > MIMICKED]
+    return max(sure, key=lambda fault: fault.gain, default=None)
 
 
 def _misjudged(psi: np.ndarray, grid: list["_Mixture"]) -> np.ndarray:
-    """Ln L where the model knows one channel worse than the others, of each channel (n,).
+    """Ln L where the model knows one channel worse than the others, of each mixture (n_grid, n).
 
     With τ² of its own, C_i = C + τ² e_i e_iᵀ: what physics that the model lacks does about a
     sensor. A fault of a channel that physics may mimic has to fit better than that.
     """
     n, r = psi.shape
-    L = np.full(n, -np.inf)
-    for g in grid:
+    L = np.full((len(grid), n), -np.inf)
+    for k, g in enumerate(grid):
         pull = np.einsum("rij,jr->ir", g.inverse, psi)
         own = np.einsum("rii->ir", g.inverse)
         q0 = g.squares(psi)
         for tau2 in OWN**2 / n:
             more = 1 + tau2 * own
             q = np.maximum(q0 - tau2 * pull**2 / more, 1e-300)
-            L = np.maximum(L, g.total(q) - np.log(more).sum(axis=1) / 2)
+            L[k] = np.maximum(L[k], g.total(q) - np.log(more).sum(axis=1) / 2)
     return np.asarray(L - np.log(max(r, 2)) / 2)
 
 
@@ -289,16 +292,18 @@ def _other_rows(
     first = max(grid, key=lambda g: g.likelihood(psi))
     pull = np.einsum("rij,jr->ir", first.inverse, psi)
     odd = (pull**2 / np.einsum("rii->ir", first.inverse) / first.squares(psi)).sum(axis=1)
-    near = sorted(grid, key=lambda g: -g.likelihood(psi))[:6] + grid[:: max(1, len(grid) // 12)]
     out = []
     for i in np.argsort(-odd)[:WORST]:
+        likely = np.argsort(-misjudged[:, i])[:LIKELY]  # by the other channels
+        near = [grid[k] for k in likely] + grid[:: max(1, len(grid) // 12)]
+        own = float(misjudged[:, i].max())
         others = _like(psi, int(i))
         tried = [("copy", (phi[others], [labels[k] for k in others]))]
         tried += [("turned", model.turned(int(at[i])))] if model.turned else []
         tried += [("elsewhere", model.elsewhere(int(at[i])))] if model.elsewhere else []
         for kind, (values, names) in tried:
             if len(names):
-                words = (labels, psi, phi, int(i), kind, values, names, near, null, misjudged)
+                words = (labels, psi, phi, int(i), kind, values, names, near, null, own)
                 out.append(_replaced(*words))
     return out
 
@@ -319,7 +324,7 @@ def _replaced(
     names: list[str],
     grid: list[_Mixture],
     null: float,
-    misjudged: np.ndarray,
+    misjudged: float,
 ) -> _Fault:
     """Row i of the model by each of others (k, m), by what the other channels foretell of it."""
     n = len(psi)
@@ -361,4 +366,4 @@ def _replaced(
         )
         mend = f"look where {label} sits and put that place into sensors.csv"
         finding = Finding("misplaced sensor", text, "warning", (label,), mend)
-    return _Fault(gain, float(L[k] - misjudged[i] - np.log(len(rows))), finding)
+    return _Fault(gain, float(L[k] - misjudged - np.log(len(rows))), finding)
