@@ -1,7 +1,7 @@
 """Numbers of a recording's nodes: those of the deck's grids, or of channels.
 
-Numbers that coincide prove nothing: decks and recordings alike begin at 1. Coordinates decide where
-there are any. Where there are none, labels that count 1, 2, 3, ... number channels.
+Numbers that coincide prove nothing: decks and recordings both begin at 1. Coordinates decide where
+the recording has them. Without them, labels that count 1, 2, 3, ... number channels.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from ..model.assembly import Assembly
 
 OFF = 0.02  # of the structure's size: a node farther from the grid of its number is another one
 SCALES = {"m": 1.0, "mm": 1e-3, "inch": 0.0254, "cm": 0.01, "units 1000 times as large": 1e3}
-_ENOUGH, _LOOKED = 3, 200  # nodes by which a scale or a count can be told; and that are looked at
+_ENOUGH, _LOOKED = 3, 200  # least nodes for a scale or a count, most that are used
 
 
 def size_of(made: Assembly) -> float:
@@ -47,7 +47,7 @@ def _dot(places: np.ndarray, size: float) -> bool:
 
 
 def on_structure(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
-    """Whether nodes [m] are places on the structure; several at one dot are places of nothing."""
+    """True if nodes [m] are places on the structure; several at one point are not."""
     places, size = np.array(list(nodes.values())), size_of(made)
     if not len(places) or (len(places) > 1 and _dot(places, size)):
         return False
@@ -56,7 +56,7 @@ def on_structure(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
 
 
 def numbers_agree(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
-    """Whether nodes [m] lie where the grids of their numbers do; nothing known speaks for them."""
+    """True if nodes [m] lie where the grids of their numbers do, or no grid has these numbers."""
     ids = [n for n in nodes if n in set(made.ids.tolist())]
     if not ids:
         return True
@@ -66,7 +66,7 @@ def numbers_agree(made: Assembly, nodes: Mapping[int, np.ndarray]) -> bool:
 
 
 def count_channels(labels: Sequence[str]) -> bool:
-    """Whether labels of outputs number channels: their nodes are 1, 2, 3, ... to the last.
+    """True if labels of outputs number channels: their nodes are 1, 2, 3, ... to the last.
 
     >>> count_channels(["1:+Z", "2:+Z", "3:+Z"]), count_channels(["2:+Z", "4:+Z", "7:+Z"])
     (True, False)

@@ -188,8 +188,8 @@ def _beyond(
 ) -> tuple[str, ...]:
     """Outputs (n_out,) whose ratio chance does not reach, in the order of how far they move.
 
-    A local force f adds -H_oc f to output o. That is most, for the output's own response, where it
-    acts (o = c); over the noise it is most where an output hardly answers and is quiet for it.
+    A local force f adds -H_oc f to output o. Relative to the output's own response that is large
+    where the force acts (o = c). Relative to the noise it is large at outputs of little noise.
     """
     limit = 1 + max(2 * _CHANCE, 5 / np.sqrt(lines))
     return tuple(outputs[k] for k in np.argsort(-moved, kind="stable") if ratio[k] > limit)

@@ -10,8 +10,9 @@ is profiled, ln L = Σ_r -n/2 ln(ψ_rᵀ C_r⁻¹ ψ_r) - ½ ln|C_r|. A fault of
 gain, an exchange of two, another direction, another place) changes ψ or the rows of Φ; it is named
 where ln L rises by more than the number of trials explains.
 
-A patch that the model lacks bends shapes about a sensor as well as a move of it does, so that what
-physics may mimic (gain, place, direction) is a warning; a reversed sign, an exchange are faults.
+A patch that the model lacks bends shapes about a sensor as well as a move of it does. Therefore a
+gain, a place or a direction is a warning, and has to fit better than a channel with an error τ² of
+its own (C_r + τ² e_i e_iᵀ); a reversed sign and an exchange are faults.
 """
 
 from collections.abc import Callable

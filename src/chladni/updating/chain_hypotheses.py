@@ -192,7 +192,7 @@ def chain_faults(
 
 
 def explains(Q: float, declared: float) -> bool:
-    """Whether an error leaves so little of Q as declared that it is named.
+    """True if an error leaves so little of Q as declared that it is named.
 
     Much is left of responses that are not those of the model, whichever way they are read.
     """
