@@ -1,5 +1,6 @@
 """A damaged file ends in one sentence that names it, whatever library stumbled over it."""
 
+import re
 import wave
 import zipfile
 from pathlib import Path
@@ -15,6 +16,8 @@ from chladni.io.tables.read_tables import read_csv, read_npz
 from chladni.io.time.read_time import read_wav
 from chladni.io.uff.read_uff import read_uff, write_uff
 from chladni.units import UNITS
+
+from . import foreign_uff
 
 F = np.linspace(10.0, 20.0, 6)
 GOOD = {
@@ -188,6 +191,93 @@ def test_a_doubled_or_lost_line_is_refused(tmp_path: Path) -> None:
         path.write_text("\n".join(new))
         with pytest.raises(ChladniError, match=rf"a\.uff.*{said}"):
             read_uff(path)
+
+
+def with_function(path: Path, number: int, kind: int) -> Path:
+    """The file with another function type in the head of one of its datasets 58."""
+    lines = path.read_text().split("\n")
+    at = [k for k, line in enumerate(lines) if line.strip() == "58"][number] + 6
+    lines[at] = f"{kind:5d}{lines[at][5:]}"
+    path.write_text("\n".join(lines))
+    return path
+
+
+@pytest.mark.parametrize("kind", [2, 3, 9, 12, 19, 99])
+def test_a_record_that_is_read_as_no_frf_is_named(tmp_path: Path, kind: int) -> None:
+    path = tmp_path / "a.uff"
+    written(path)
+    found = read_uff(with_function(path, 1, kind))
+    assert found.frf is not None
+    assert found.frf.outputs == ("1:+Z", "3:+Z")
+    (note,) = (note for note in found.notes if "not used" in note)
+    assert re.search(rf"1 records .*: 2:\+Z / 1:\+Z \((function type {kind}|[a-z ]+)\)$", note)
+
+
+@pytest.mark.parametrize(("kind", "said"), [(1, "time history"), (6, "coherence")])
+def test_a_real_function_with_complex_values_is_refused(
+    tmp_path: Path, kind: int, said: str
+) -> None:
+    path = tmp_path / "a.uff"
+    written(path)
+    with pytest.raises(
+        ChladniError, match=rf"a\.uff, dataset 4 .*function type {kind} is a {said}"
+    ):
+        read_uff(with_function(path, 1, kind))
+
+
+def test_coherence_of_no_frf_is_named_and_twice_it_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.uff"
+    written(path, np.full((61, 3, 1), 0.9))
+    found = read_uff(with_function(path, 2, 99))  # 0: FRF, 1: its coherence, 2: the next FRF
+    assert any("2:+Z / 1:+Z (coherence)" in note for note in found.notes)
+    lines = written(path, np.full((61, 3, 1), 0.9))
+    start = [k for k, line in enumerate(lines) if line.strip() == "58"]
+    path.write_text("\n".join([*lines[:-1], *lines[start[1] - 1 : start[2] - 1], ""]))
+    with pytest.raises(ChladniError, match=r"coherence of 1:\+Z / 1:\+Z is there twice"):
+        read_uff(path)
+
+
+def test_a_node_at_two_places_is_refused(tmp_path: Path) -> None:
+    for second, good in (((1.0, 2.0, 0.5), True), ((1.0, 2.5, 0.5), False)):
+        path = tmp_path / "a.uff"
+        first = foreign_uff.nodes({7: (1.0, 2.0, 0.5)})
+        path.write_bytes(foreign_uff.file(first, foreign_uff.old_nodes({7: second})))
+        if good:
+            np.testing.assert_allclose(read_uff(path).nodes[7], (1.0, 2.0, 0.5))
+        else:
+            with pytest.raises(ChladniError, match=r"a\.uff, dataset 2 .*node 7 is there twice"):
+                read_uff(path)
+
+
+@pytest.mark.parametrize(
+    ("column", "width", "value", "said"),
+    [
+        (7, 6, "3", "byte order 3 is unknown"),
+        (13, 6, "1", r"real numbers are of format 1 \(DEC VMS\)"),
+        (13, 6, "3", r"real numbers are of format 3 \(IBM 370\)"),
+        (19, 12, "9", "its head has 9 lines"),
+        (31, 12, "100", "holds 100 bytes of numbers, 144 are there"),
+        (31, 12, "288", "holds 288 bytes of numbers, 144 are there"),
+        (31, 12, "many", "does not hold four counts"),
+        (31, 12, "0", ""),  # not stated
+    ],
+)
+def test_the_first_line_of_a_binary_dataset_is_held_against_it(
+    tmp_path: Path, column: int, width: int, value: str, said: str
+) -> None:
+    path = tmp_path / "a.ufb"
+    H = np.linspace(1, 2, 6).reshape(6, 1, 1) * (1 + 2j)
+    write_uff(path, FRF(H, F, ("1:+Z",), ("1:+Z",), "mobility"), binary=True)
+    data = path.read_bytes()
+    at = data.index(b"    58b") + column
+    path.write_bytes(data[:at] + value.rjust(width).encode() + data[at + width :])
+    if said:
+        with pytest.raises(ChladniError, match=rf"a\.ufb, dataset \d \(type 58\).*{said}"):
+            read_uff(path)
+    else:
+        frf = read_uff(path).frf
+        assert frf is not None
+        np.testing.assert_array_equal(frf.values, H)
 
 
 def test_coherence_in_percent_is_refused(tmp_path: Path) -> None:

@@ -167,9 +167,6 @@ def _idle(r: Recording) -> list[str]:
             f"{r.name}: {len(used)} records of responses ({used[0].kind}) and no force: correlate, "
             "calibrate and diagnose take natural frequencies from them"
         )
-    elif r.functions:
-        kinds = ", ".join(dict.fromkeys(f.kind for f in r.functions))
-        out.append(f"{r.name}: {len(r.functions)} records that are no FRFs are not used ({kinds})")
     if r.shapes is not None:
         out.append(f"{r.name}: its {len(r.shapes.frequency)} mode shapes are not used")
     return out

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...dofs import label
+from ...ema.response_correlations import responses
 from ...ema.setup import Function, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
@@ -37,6 +38,8 @@ from .write_uff import write_uff as write_uff
 
 _KINDS = {1: "time", 2: "auto spectrum", 3: "cross spectrum", 9: "psd", 12: "spectrum"}
 _SPECTRA = (2, 3, 9, 12)
+_SAME_PLACE = 1e-4  # of the largest coordinate: dataset 15 keeps six digits
+_REAL = {1: "time history", 6: "coherence", 26: "multiple coherence"}
 
 
 def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
@@ -69,6 +72,8 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         except _BROKEN as error:
             raise _damaged(path, one.number, one.code, error) from error
     frf, (averages, added) = frf_matrix(pile, quantity), read_stamp(pile.title)
+    time = time_record(pile) if frf is None else None
+    _name_unused(pile, frf is None and time is None)
     if frf is not None and averages:
         frf = with_variance(frf, averages)
         pile.notes.append(f"{path.name}: its noise is that of {averages:g} averages, as it says")
@@ -80,7 +85,7 @@ def read_uff(path: str | Path, quantity: str | None = None) -> Recording:
         axes=_axes(pile),
         elements=tuple(pile.elements),
         functions=tuple(pile.functions),
-        time=time_record(pile) if frf is None else None,
+        time=time,
         added_damping=added,
         notes=tuple(pile.notes),
     )
@@ -164,6 +169,12 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
     where, kind = pile.where(record), record.function
     record = _complete(record, where)
     node, way = record.reference
+    if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
+        found = "a function of frequency" if kind == 1 else "complex"
+        raise FileError(
+            f"{where}: function type {kind} is a {_REAL[kind]}, but its values are {found}; a "
+            "frequency response has function type 4"
+        )
     try:
         output, input = _dof(*record.response), _dof(node, way)
     except FileError as error:
@@ -173,7 +184,10 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
     if kind in (4, 5) or (kind == 0 and np.iscomplexobj(record.y) and node):
         _take_frf(pile, record, (output, input), quantity)
     elif kind in (6, 26):
-        pile.coherence[output, input if kind == 6 else ""] = np.real(record.y)
+        pair = output, input if kind == 6 else ""
+        if pair in pile.coherence:
+            raise FileError(f"{where}: the coherence of {output} / {input} is there twice")
+        pile.coherence[pair] = np.real(record.y)
     else:
         named = _KINDS.get(kind, f"function type {kind}")
         reference = input if node else ""
@@ -186,6 +200,25 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
         pile.functions.append(found)
         if kind == 1:
             pile.time.append(TimeSignal(output, record.ordinate.kind, found))
+
+
+def _name_unused(pile: Pile, alone: bool) -> None:
+    """Note the records nothing is made of; ``alone``: the file holds neither FRFs nor a test."""
+    used = {id(f) for f in responses(pile.functions)} if alone else set()
+    left = [
+        f"{f.output}{f' / {f.input}' if f.input else ''} ({f.kind})"
+        for f in pile.functions
+        if id(f) not in used
+    ]
+    left += [
+        f"{i}{f' / {j}' if j else ''} (coherence)"
+        for i, j in pile.coherence
+        if not any(i == output and j in ("", input) for output, input in pile.frf)
+    ]
+    if left:
+        pile.notes.append(
+            f"{pile.path.name}: {len(left)} records that are no FRFs are not used: {named(left)}"
+        )
 
 
 def _complete(record: FunctionSet, where: str) -> FunctionSet:
@@ -242,9 +275,19 @@ def _take_nodes(pile: Pile, one: NodeSet) -> None:
     xyz = one.places * pile.units.length
     if not np.isfinite(xyz).all():
         raise FileError(f"{pile.where(one)}: a coordinate is not a number")
+    apart = _SAME_PLACE * np.abs(xyz).max(initial=0.0)
     for node, place, system in zip(one.nodes, xyz, one.systems, strict=True):
+        other = pile.nodes.get(int(node), place)
+        if np.abs(other - place).max() > apart:
+            raise FileError(
+                f"{pile.where(one)}: node {node} is there twice, at {_at(other)} and {_at(place)} m"
+            )
         pile.nodes[int(node)] = place
         pile.turned[int(node)] = int(system)
+
+
+def _at(place: np.ndarray) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in place) + ")"
 
 
 def _take_lines(pile: Pile, one: TraceSet) -> None:

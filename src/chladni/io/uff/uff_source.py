@@ -8,11 +8,15 @@ from pathlib import Path
 
 from ...errors import FileError, named
 from ..file_size import refuse_large
+from .uff_pile import dataset_name
 
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _LOOSE = re.compile(rb"(?m)^[ \t]*-1[ \t]*(?=\r?$)")
 _FORTRAN = re.compile(rb"(?<=[\d.])[dD](?=[+-]\d)")
 _THREE = re.compile(rb"(\d\.\d+)\d([+-]\d{3})(?![\d.])")  # 1.00000-105: no room for the E
+_BINARY_FIELDS = ((3, 9), (9, 15), (15, 27), (27, 39))  # behind "58b"
+_HEAD_LINES, _IEEE = 11, 2
+_REALS = {1: "DEC VMS", 3: "IBM 370"}
 _BINARY = re.compile(rb"(?m)^ *58[bB]")
 
 
@@ -40,8 +44,11 @@ def readable(path: Path) -> Iterator[Path]:
         raise FileError(f"{path.name} is no universal file: no line '    -1' in {len(data)} bytes")
     if marks % 2:
         raise FileError(f"{path.name} is truncated: dataset {marks // 2 + 1} has no closing '-1'")
-    if not _BINARY.search(data):
-        _refuse_untyped(path, tidy)
+    for number, part in enumerate(_MARK.split(tidy)[1::2], start=1):
+        if part.lstrip()[:3].lower() == b"58b":
+            _refuse_other_binary(dataset_name(path, number, 58), part)
+        else:
+            _refuse_untyped(path, number, part)
     if tidy is data:
         yield path
         return
@@ -51,13 +58,43 @@ def readable(path: Path) -> Iterator[Path]:
         yield copy
 
 
-def _refuse_untyped(path: Path, data: bytes) -> None:
+def _refuse_untyped(path: Path, number: int, part: bytes) -> None:
     """Refuse a dataset whose first line is no type: a reader would pass over all of it."""
-    for k, part in enumerate(_MARK.split(data)[1::2], start=1):
-        first = part.strip().split(b"\n", 1)[0].strip()
-        if not first.isdigit():
-            said = first[:30].decode("latin-1")
-            raise FileError(f"{path.name}: dataset {k} begins with {said!r}, not with its type")
+    first = part.strip().split(b"\n", 1)[0].strip()
+    if not first.isdigit():
+        said = first[:30].decode("latin-1")
+        raise FileError(f"{path.name}: dataset {number} begins with {said!r}, not with its type")
+
+
+def _refuse_other_binary(where: str, part: bytes) -> None:
+    """Refuse a dataset 58b whose first line is not that of what follows it.
+
+    The line holds, in columns 8 to 43, byte order, format of real numbers, lines of head and
+    bytes of numbers (SDRC dataset 58b); a count of zero is not stated.
+    """
+    lines = part.lstrip(b"\r\n ").splitlines(keepends=True)
+    try:
+        order, form, head, count = (int(lines[0][a:b].strip() or 0) for a, b in _BINARY_FIELDS)
+    except ValueError:
+        said = lines[0].decode("latin-1").strip()[:60]
+        raise FileError(f"{where}: its first line {said!r} does not hold four counts") from None
+    if order not in (1, 2):
+        raise FileError(f"{where}: byte order {order} is unknown; it is 1 (little) or 2 (big)")
+    if form != _IEEE:
+        name = _REALS.get(form, "unknown")
+        raise FileError(
+            f"{where}: its real numbers are of format {form} ({name}); format {_IEEE} (IEEE 754) "
+            "is read: export the file in it, or as text (dataset 58)"
+        )
+    if head not in (0, _HEAD_LINES):
+        raise FileError(f"{where}: it says its head has {head} lines; a head has {_HEAD_LINES}")
+    held = b"".join(lines[1 + _HEAD_LINES :])
+    extra = len(held) - count
+    if count and not (0 <= extra <= 2 and not held[count:].strip(b"\r\n")):
+        raise FileError(
+            f"{where}: it says it holds {count} bytes of numbers, {len(held)} are there; the file "
+            "is damaged, or was moved as text"
+        )
 
 
 def _tidied(data: bytes) -> bytes:
