@@ -14,7 +14,7 @@ from chladni.case import load_case
 from chladni.cli.app import COMMANDS, application, guarded
 from chladni.errors import AccuracyError, FileError
 from chladni.fem.modelled import modelled
-from chladni.io.dyna import read_formed
+from chladni.io.formed_files import read_formed
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS
 from chladni.workflows.diagnosis_pipeline import _deck

@@ -5,7 +5,8 @@ import pytest
 
 from chladni.errors import FileError, ModelError, ShapeError
 from chladni.geometry.formed_mesh import FormedMesh
-from chladni.io.dyna import read_formed, read_keyword, write_keyword
+from chladni.io.dyna import read_keyword, write_keyword
+from chladni.io.formed_files import read_formed
 from chladni_specimens.mesher.flat_regions import grid
 
 
@@ -122,7 +123,7 @@ def test_include(tmp_path):
         ("            0.70            0.71            0.72            0.72\n", "", "2 per element"),
         ("*NODE", "*INCLUDE\nnowhere.k\n*NODE", "no file 'nowhere.k'"),
         ("*NODE", "*INCLUDE\nbad.k\n*NODE", "line 4: 'bad.k' includes itself"),
-        ("            0.62", "             nan", "line 10: nan is no number"),
+        ("            0.62", "             nan", "line 10: 'nan' is no number"),
         (FIXED, "*KEYWORD\n*END\n", "both are needed"),
     ],
 )
@@ -141,8 +142,71 @@ def test_wrong_unit_is_noticed(tmp_path):
     path.write_text(FIXED)
     with pytest.raises(ModelError, match="unit system"):
         read_keyword(path, "SI")
+    with pytest.raises(FileError, match=r"a\.k: .*unit system"):
+        read_formed(path, "SI")
     with pytest.raises(FileError, match="cannot be read"):
         read_keyword(tmp_path / "none.k")
+
+
+NODE_2 = "       2            10.0             0.0             0.0\n"
+SHELL_2 = FIXED.partition("0.64             0.0\n")[2].partition("*END")[0]
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "said"),
+    [
+        (NODE_2, NODE_2.replace("10.0", "11.0"), "line 6: node 2 is there twice.* line 5 of a.k"),
+        (SHELL_2, SHELL_2.replace("0.71", "0.91"), "line 13: shell 2 .* line 11 of a.k"),
+        (SHELL_2, SHELL_2.replace("5", "6"), "line 13: shell 2 is there twice"),
+    ],
+)
+def test_a_line_may_be_repeated_but_not_contradicted(tmp_path, line, other, said):
+    """Includes repeat nodes; one id for two things leaves open which of them is meant."""
+    path = tmp_path / "a.k"
+    assert FIXED.count(line) == 1
+    path.write_text(FIXED)
+    once = read_keyword(path)
+    path.write_text(FIXED.replace(line, line + line))
+    again = read_keyword(path)
+    np.testing.assert_array_equal(again.points, once.points)
+    np.testing.assert_array_equal(again.cells, once.cells)
+    path.write_text(FIXED.replace(line, line + other))
+    with pytest.raises(FileError, match=said):
+        read_keyword(path)
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "1e999"])
+def test_a_word_that_is_no_finite_number_is_refused_with_its_line(tmp_path, word):
+    path = tmp_path / "a.k"
+    path.write_text(FIXED.replace(NODE_2, NODE_2.replace("10.0", f"{word:>4}"[-4:])))
+    if word == "1e999":
+        path.write_text(FREE.replace("0.0e+0", word))
+    with pytest.raises(FileError, match=rf"a.k, line \d: '{word}' is no number in \*NODE"):
+        read_keyword(path)
+
+
+def test_a_mesh_that_contradicts_itself_is_refused(tmp_path):
+    """Corners that are not there, places and thicknesses that are no numbers; the file is named."""
+    import meshio
+
+    mesh = sheet()
+    path = tmp_path / "a.vtu"
+    for fault, said in (
+        ("negative", "cell 3 .counted from 0. names point -1; there are 0 to 24"),
+        ("beyond", "cell 3 .counted from 0. names point 25"),
+        ("place", r"point 7 .counted from 0. is at \(nan, "),
+        ("thickness", "is no number"),
+    ):
+        points, cells, t = 1e3 * mesh.points, np.array(mesh.cells), scaled(mesh.nodal)
+        if fault in ("negative", "beyond"):
+            cells[3, 1] = -1 if fault == "negative" else len(points)
+        elif fault == "place":
+            points[7, 0] = np.nan
+        else:
+            t[5] = np.nan
+        meshio.Mesh(points, [("quad", cells)], point_data={"thickness": t}).write(path)
+        with pytest.raises(FileError, match=f"a.vtu.*{said}"):
+            read_formed(path)
 
 
 def test_vtu(tmp_path):
@@ -190,12 +254,12 @@ def test_a_damaged_mesh_is_one_sentence(tmp_path, capsys, text):
 def test_places_are_numbers(tmp_path, x):
     path = tmp_path / "bad.csv"
     path.write_text(f"node,x,y,z,thickness\n1,0,0,0,1\n2,{x},0,0,1\n")
-    with pytest.raises(FileError, match=r"bad\.csv: the place of node 2 is not three numbers"):
+    with pytest.raises(FileError, match=rf"bad\.csv, line 3: x is '{x}', which is not a number"):
         read_formed(path)
 
 
 def test_cells_have_nodes():
-    with pytest.raises(ModelError, match="outside the 3 nodes"):
+    with pytest.raises(ModelError, match="names point 3; there are 0 to 2"):
         FormedMesh(np.arange(3), np.eye(3), np.array([[0, 1, 3, 3]]), np.ones(1), np.ones((1, 4)))
 
 
@@ -206,6 +270,12 @@ def test_csv(tmp_path):
     np.testing.assert_allclose(mesh.nodal, [0.6e-3, 0.7e-3])
     np.testing.assert_allclose(mesh.points[1], [0.01, 0, 0])
     assert mesh.ids.tolist() == [4, 5]
+    path.write_text("# Node,x,y,z,Thickness,set\n4,0,0,0,0.6,A\n4,0,0,0,0.6,B\n")
+    assert read_formed(path).ids.tolist() == [4, 4]
+    for cell, said in (("abc", "line 3: thickness is 'abc'"), ("0.7", "line 3: node 4 is there")):
+        path.write_text(f"node,x,y,z,thickness\n4,0,0,0,0.6\n4,0,0,0,{cell}\n")
+        with pytest.raises(FileError, match=rf"t\.csv, {said}"):
+            read_formed(path)
     path.write_text("node,x,y,z\n4,0,0,0\n")
     with pytest.raises(FileError, match="thickness"):
         read_formed(path)

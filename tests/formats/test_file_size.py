@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from chladni.errors import FileError
-from chladni.io.dyna import read_formed
 from chladni.io.file_size import LARGEST, OVERRIDE, refuse_large
+from chladni.io.formed_files import read_formed
 from chladni.io.nastran import read_deck
 from chladni.io.nastran.results.op2 import read_op2_modes, read_op4
 from chladni.io.nastran.results.punch import read_punch_modes

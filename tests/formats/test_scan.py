@@ -1,5 +1,7 @@
 """Scans in STL, PLY and OBJ: what is read, what is said of them, what is refused."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -67,3 +69,52 @@ def test_a_missing_scan_and_flat_triangles_are_refused(tmp_path):
         read_scan(tmp_path / "none.stl")
     with pytest.raises(FileError, match="none of its 1 triangles has an area"):
         read_scan(_saved(tmp_path, CORNERS[:2], np.array([[0, 1, 1]]), "line.ply"))
+
+
+def _changed(folder, name, old, new):
+    """A box in a file of text, with one of its lines another."""
+    mesh = trimesh.creation.box((300, 200, 100))
+    suffix = name.rpartition(".")[2]
+    kinds = {"stl": {"file_type": "stl_ascii"}, "ply": {"encoding": "ascii"}}
+    mesh.export(folder / name, **kinds.get(suffix, {}))
+    lines = (folder / name).read_text().split("\n")
+    k = [k for k, line in enumerate(lines) if re.match(old, line)][2]
+    lines[k : k + 1] = [] if new is None else [new]
+    (folder / name).write_text("\n".join(lines))
+    return folder / name
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        ("a.stl", "vertex ", "vertex nan 0 0", r"point 2 .* is at \(nan, 0, 0\) m"),
+        ("a.stl", "vertex ", "vertex 3e38 0 0", r"point 2 .* is at \(3e\+35, 0, 0\) m"),
+        ("a.stl", "endsolid|endloop", "", None),  # a keyword that is not needed
+        ("a.ply", "3 ", "3 0 -1 2", "cell 2 .* names point -1; there are 0 to 7"),
+        ("a.ply", "3 ", None, "says it holds 20 lines, but 19 can be read"),
+        ("a.ply", r"[-\d.]+ [-\d.]+ ", "0 inf 0", r"point 2 .*inf"),
+        ("a.obj", "f ", "f 1 2 -3", r"a\.obj, line \d+: a face names vertex -3"),
+        ("a.obj", "f ", "f 0/1 1/1 2/1", r"a\.obj, line \d+: a face names vertex 0"),
+        ("a.obj", "v ", "v 1 nan 0", r"point 2 .*nan"),
+    ],
+)
+def test_a_damaged_scan_is_refused_and_not_mended(tmp_path, name, old, new, said):
+    """A reader that drops or turns round what it cannot use would leave a hole in the part."""
+    path = _changed(tmp_path, name, old, new)
+    if said is None:
+        assert read_scan(path, 1e-3).volume == pytest.approx(6e-3)
+        return
+    with pytest.raises(FileError, match=said):
+        read_scan(path, 1e-3)
+
+
+@pytest.mark.parametrize("change", ["cut", "longer", "count"])
+def test_a_binary_stl_is_as_long_as_it_says(tmp_path, change):
+    path = tmp_path / "a.stl"
+    trimesh.creation.box((300, 200, 100)).export(path)
+    data = path.read_bytes()
+    path.write_bytes({
+        "cut": data[:-50], "longer": data + data[-50:], "count": data[:80] + b"\3\0\0\0" + data[84:]
+    }[change])  # fmt: skip
+    with pytest.raises(FileError, match=r"says it holds \d+ triangles, but \d+ can be read"):
+        read_scan(path, 1e-3)

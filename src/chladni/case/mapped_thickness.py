@@ -10,7 +10,7 @@ from ..geometry.scan_alignment import align_scan, as_sheet
 from ..geometry.thickness_alignment import Alignment, align, moved
 from ..geometry.thickness_mapping import Mapped, map_thickness, shell_area
 from ..geometry.thickness_of_scan import thickness_of_scan
-from ..io.dyna import read_formed
+from ..io.formed_files import read_formed
 from ..io.scanned_surface import SUFFIXES, read_scan
 from ..model.assembly import Assembly
 from ..units import Units

@@ -4,7 +4,37 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..errors import ModelError
 from .facets import cell_normals
+
+FARTHEST = 1e9  # [m] from the origin: beyond, a coordinate is none of a structure
+
+
+def check_surface(points: np.ndarray, cells: np.ndarray) -> None:
+    """Refuse coordinates that are no numbers and cells that name points that are not there.
+
+    Parameters
+    ----------
+    points : (n, 3)   [m]
+    cells : (m, k) int rows of points
+
+    Raises
+    ------
+    ModelError
+        With the first of them, counted from 0 as mesh files do.
+    """
+    for k in np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))[:1]:
+        place = ", ".join(f"{x:g}" for x in points[k])
+        raise ModelError(f"point {k} (counted from 0) is at ({place}) m, which is no place")
+    for k, j in np.argwhere((cells < 0) | (cells >= len(points)))[:1]:
+        raise ModelError(
+            f"cell {k} (counted from 0) names point {cells[k, j]}; there are 0 to {len(points) - 1}"
+        )
+
+
+def contradicted(values: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Rows of ``values`` (n, k) that differ from the row ``first`` (n,) where their id stood."""
+    return np.flatnonzero((values != values[first]).any(axis=1))
 
 
 def corner_quality(points: np.ndarray, quads: np.ndarray) -> np.ndarray:

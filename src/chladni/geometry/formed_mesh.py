@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import readonly
 from ..errors import ModelError, ShapeError
-from .cells import point_means
+from .cells import check_surface, point_means
 from .facets import cell_areas
 
 
@@ -39,11 +39,9 @@ class FormedMesh:
                 f"thickness is {self.thickness.shape}, cells {self.cells.shape}, "
                 f"part {self.part.shape}; one row per cell is due"
             )
-        if not np.isfinite(self.points).all():
-            row = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
-            raise ModelError(f"the place of node {self.ids[row]} is not three numbers")
-        if self.cells.size and not 0 <= self.cells.min() <= self.cells.max() < len(self.points):
-            raise ModelError(f"a cell has a corner outside the {len(self.points)} nodes")
+        check_surface(self.points, self.cells)
+        if len(wrong := np.flatnonzero(~np.isfinite(self.thickness).all(axis=1))):
+            raise ModelError(f"the thickness of cell {wrong[0]} (counted from 0) is no number")
         if not len(self.nodal):
             object.__setattr__(self, "nodal", self._nodal())
         known = self.nodal[np.isfinite(self.nodal)]

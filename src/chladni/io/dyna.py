@@ -1,31 +1,26 @@
-"""Formed thickness in and out: LS-DYNA keyword files, VTU and CSV.
+"""Formed thickness in and out: LS-DYNA keyword files.
 
 A forming simulation hands over *NODE and *ELEMENT_SHELL_THICKNESS, two lines an element (LS-DYNA
 Keyword User's Manual, Vol. I). Shells without thicknesses of their own take their section's.
 Everything is converted to SI here.
 """
 
-import io
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..errors import ChladniError, FileError
+from ..errors import FileError
+from ..geometry.cells import contradicted
 from ..geometry.formed_mesh import FormedMesh
 from ..output import write_text
 from ..units import Units
 from ..units import units as units_named
-from .damage import DAMAGED
 from .file_size import refuse_large
 
 _WIDTHS = {"": (8, 16), "%": (10, 16), "+": (20, 20)}  # integers and reals of each format
-_NODE_IDS = ("node", "nid", "id", "grid")
-_THICKNESS_NAMES = ("thickness", "t", "thk", "shell thickness")
 
 
 @dataclass
@@ -107,14 +102,12 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
         words = np.char.strip(np.column_stack([c.ravel().astype("U32") for c in columns]))
     words[words == ""] = "0"
     try:
-        values: np.ndarray = words.astype(kind)
+        if np.isfinite(values := words.astype(kind)).all():
+            return values
     except (ValueError, OverflowError):
-        row, word = _first_bad(words, kind)
-        raise block.fault(int(rows[row]), f"{word!r} is no number") from None
-    if not np.isfinite(values).all():
-        row, column = (int(k[0]) for k in np.nonzero(~np.isfinite(values)))
-        raise block.fault(int(rows[row]), f"{words[row, column]} is no number")
-    return values
+        pass
+    row, word = _first_bad(words, kind)
+    raise block.fault(int(rows[row]), f"{word!r} is no number")
 
 
 def _split(line: str, widths: Sequence[int]) -> list[str]:
@@ -130,15 +123,17 @@ def _first_bad(words: np.ndarray, kind: type) -> tuple[int, str]:
     for row, line in enumerate(words):
         for word in line:
             try:
-                kind(word)
-            except ValueError:
+                bad = not np.isfinite(np.array([word]).astype(kind)[0])
+            except (ValueError, OverflowError):
+                bad = True
+            if bad:
                 return row, str(word)
     return 0, str(words[0, 0])
 
 
 def _nodes(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
     """Ids (n,) and places (n, 3) of all *NODE lines, by increasing id."""
-    ids, places = [np.zeros(0, np.int64)], [np.zeros((0, 3))]
+    ids, places, lines = [np.zeros(0, np.int64)], [np.zeros((0, 3))], []
     for block in blocks:
         if block.keyword == "NODE" and block.lines:
             whole, real = _WIDTHS[block.form]
@@ -146,8 +141,31 @@ def _nodes(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
             values = _table(block, rows, (whole, real, real, real), float)
             ids.append(values[:, 0].astype(np.int64))
             places.append(values[:, 1:])
-    number, order = np.unique(np.concatenate(ids), return_index=True)
-    return number, np.vstack(places)[order]
+            lines.append((block, rows))
+    every, xyz = np.concatenate(ids), np.vstack(places)
+    first = _first_of_each(every, xyz, lines, "node")
+    return every[first], xyz[first]
+
+
+def _first_of_each(
+    ids: np.ndarray, values: np.ndarray, lines: list[tuple[_Block, np.ndarray]], what: str
+) -> np.ndarray:
+    """Where each id stands first; what an include repeats is the same, all else is refused."""
+    _, first, which = np.unique(ids, return_index=True, return_inverse=True)
+    for k in contradicted(values, first[which])[:1]:
+        (block, row), (other, before) = _at(lines, int(k)), _at(lines, int(first[which[k]]))
+        where = f"line {other.at[before]} of {other.source.name}"
+        raise block.fault(row, f"{what} {ids[k]} is there twice, with other values in {where},")
+    return first
+
+
+def _at(lines: list[tuple[_Block, np.ndarray]], k: int) -> tuple[_Block, int]:
+    """Block and row of the k-th of all that was read."""
+    for block, rows in lines:
+        if k < len(rows):
+            return block, int(rows[k])
+        k -= len(rows)
+    raise IndexError(k)
 
 
 def _cards(block: _Block) -> int:
@@ -158,7 +176,7 @@ def _cards(block: _Block) -> int:
 
 def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
     """(n, 6) id, part, four node ids and (n, 4) thickness, zero where the section's holds."""
-    found, thickness = [np.zeros((0, 6), np.int64)], [np.zeros((0, 4))]
+    found, thickness, lines = [np.zeros((0, 6), np.int64)], [np.zeros((0, 4))], []
     for block in blocks:
         if not block.keyword.startswith("ELEMENT_SHELL") or not block.lines:
             continue
@@ -173,7 +191,10 @@ def _shells(blocks: list[_Block]) -> tuple[np.ndarray, np.ndarray]:
         has = "THICKNESS" in block.keyword
         t = _table(block, first + 1, (real,) * 4, float) if has else np.zeros((len(first), 4))
         thickness.append(t)
-    return np.vstack(found), np.vstack(thickness)
+        lines.append((block, first))
+    shells, t = np.vstack(found), np.vstack(thickness)
+    once = np.sort(_first_of_each(shells[:, 0], np.hstack([shells, t]), lines, "shell"))
+    return shells[once], t[once]
 
 
 def _names(blocks: list[_Block]) -> tuple[dict[int, str], dict[int, int]]:
@@ -265,118 +286,3 @@ def _keyword_lines(mesh: FormedMesh, unit: Units) -> Iterator[str]:
         yield f"{k:8d}{part:8d}" + "".join(f"{n:8d}" for n in nodes)
         yield "".join(f"{v:16.{digits}f}" for v in t)
     yield "*END"
-
-
-def read_formed(path: Path | str, units: str | Units = "mm-t-s") -> FormedMesh:
-    """Formed thickness from a keyword file (.k, .key, .dyn, .dynain, .asc), a VTU or a CSV.
-
-    A mesh file (whatever meshio reads) holds the thickness as point or cell data; a CSV has the
-    columns node, x, y, z, thickness and no cells.
-    """
-    path = Path(path)
-    unit = units_named(units)
-    if path.is_file():
-        refuse_large(path)
-    read: Callable[[Path, Units], FormedMesh] = read_keyword
-    if path.suffix.lower() == ".csv":
-        read = _read_csv
-    if path.suffix.lower() in (".vtu", ".vtk", ".msh", ".xdmf", ".ply"):
-        read = _read_mesh
-    try:
-        return read(path, unit)
-    except FileError:
-        raise
-    except ChladniError as error:  # of the mesh itself
-        raise FileError(f"{path}: {error}") from error
-
-
-def _read_csv(path: Path, unit: Units) -> FormedMesh:
-    """Points with thickness, no cells."""
-    try:
-        data = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise FileError(f"{path} is no table of numbers: {error}") from error
-    names = {name.lower(): name for name in data.dtype.names or ()}
-    t = next((names[n] for n in _THICKNESS_NAMES if n in names), None)
-    if t is None or not {"x", "y", "z"} <= set(names):
-        raise FileError(f"{path} has columns {', '.join(names)}; x, y, z and thickness are due")
-    data = np.atleast_1d(data)
-    points = np.column_stack([data[names[c]] for c in "xyz"])
-    id_ = next((names[n] for n in _NODE_IDS if n in names), None)
-    ids = data[id_].astype(np.int64) if id_ else np.arange(1, len(points) + 1)
-    none = np.zeros((0, 4), np.int64)
-    return FormedMesh(
-        ids,
-        points * unit.length,
-        none,
-        none[:, 0],
-        np.zeros((0, 4)),
-        nodal=data[t] * unit.length,
-    )
-
-
-def _read_mesh(path: Path, unit: Units) -> FormedMesh:
-    """Quads and triangles of a mesh file with nodal or elemental thickness."""
-    mesh = _meshio(path)
-    try:
-        return _formed_of(path, mesh, unit)
-    except ChladniError:
-        raise
-    except DAMAGED as error:
-        raise FileError(f"{path} cannot be read as a mesh: {error}") from error
-
-
-def _meshio(path: Path) -> Any:
-    """A mesh by meshio, which prints the reason and ends the process where it cannot read one."""
-    import meshio
-
-    said = io.StringIO()
-    try:
-        with redirect_stdout(said), redirect_stderr(said):
-            return meshio.read(path)
-    except SystemExit:
-        why = " ".join(said.getvalue().split())
-        raise FileError(f"{path} cannot be read as a mesh: {why or 'it is damaged'}") from None
-    except (*DAMAGED, meshio.ReadError) as error:
-        why = f"there is no {error}" if isinstance(error, KeyError) else str(error)
-        raise FileError(f"{path} cannot be read as a mesh: {why}") from error
-
-
-def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:
-    cells, t, part = [], [], []
-    for k, block in enumerate(mesh.cells):
-        if block.type in ("quad", "triangle"):
-            nodes = block.data if block.type == "quad" else block.data[:, [0, 1, 2, 2]]
-            cells.append(nodes)
-            t.append(_thickness_of(path, mesh, k, nodes))
-            part.append(_part_of(mesh, k, len(nodes)))
-    if not cells:
-        raise FileError(f"{path} has no quads and no triangles")
-    points = np.column_stack([mesh.points, np.zeros((len(mesh.points), 3 - mesh.points.shape[1]))])
-    return FormedMesh(
-        np.arange(1, len(points) + 1),
-        points * unit.length,
-        np.vstack(cells).astype(np.int64),
-        np.concatenate(part),
-        np.vstack(t) * unit.length,
-    )
-
-
-def _thickness_of(path: Path, mesh: object, block: int, nodes: np.ndarray) -> np.ndarray:
-    """Thickness at the corners of a block of cells (n, 4), in the file's unit."""
-    at_points = {k.lower(): v for k, v in mesh.point_data.items()}  # type: ignore[attr-defined]
-    at_cells = {k.lower(): v for k, v in mesh.cell_data.items()}  # type: ignore[attr-defined]
-    for name in _THICKNESS_NAMES:
-        if name in at_points:
-            return np.asarray(at_points[name], dtype=float).ravel()[nodes]
-        if name in at_cells:
-            return np.repeat(np.asarray(at_cells[name][block], float).reshape(-1, 1), 4, axis=1)
-    known = ", ".join([*at_points, *at_cells]) or "no data at all"
-    raise FileError(f"{path} has no field called thickness; it has {known}")
-
-
-def _part_of(mesh: object, block: int, count: int) -> np.ndarray:
-    data = {k.lower(): v for k, v in mesh.cell_data.items()}  # type: ignore[attr-defined]
-    if "part" in data:
-        return np.asarray(data["part"][block]).astype(np.int64).ravel()
-    return np.ones(count, np.int64)

@@ -1,16 +1,21 @@
 """Scans of real parts: triangulated surfaces in STL, PLY or OBJ files, looked over as they come."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError
-from ..geometry.cells import edges_of
+from ..errors import FileError, ModelError
+from ..geometry.cells import check_surface, edges_of
 from ..geometry.facets import cell_areas
 from ..geometry.mesh_quality import edge_faults, free_edges
 from .file_size import refuse_large
 
+_FACET = re.compile(rb"facet\s+normal", re.IGNORECASE)
+_STL_HEAD = 84  # bytes of a binary STL up to its first triangle; the last four are their number
+_NOT_COUNTED = re.compile(rb"(?m)^f\b[^\n]*?\s(-\d+|0+)(?=[/\s]|\Z)")
+_ELEMENT = re.compile(rb"(?m)^element +\S+ +(\d+)")
 SUFFIXES = (".stl", ".ply", ".obj")
 
 
@@ -48,14 +53,19 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
         raise FileError(f"no file {path}")
     refuse_large(path)
     try:
-        mesh = load_mesh(path)
+        mesh = load_mesh(path, process=False)
     except (ValueError, KeyError, IndexError, NotImplementedError) as error:
         raise FileError(f"{path} cannot be read as a triangulated surface: {error}") from error
-    if not isinstance(mesh, Trimesh) or not len(mesh.faces):
+    held = len(mesh.faces) if isinstance(mesh, Trimesh) else 0
+    _refuse_cut(path, held)
+    if not held:
         raise FileError(f"{path} holds no triangles; save the scan as a triangulated surface")
+    try:
+        check_surface(length * np.array(mesh.vertices), np.array(mesh.faces))
+    except ModelError as error:
+        raise FileError(f"{path}: {error}") from error
+    mesh.merge_vertices()
     points, faces = length * np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64)
-    if not np.isfinite(points).all():
-        raise FileError(f"{path} has coordinates that are no numbers")
     cells = faces[:, [0, 1, 2, 2]]
     real = cell_areas(points, cells) > 1e-12 * np.ptp(points, axis=0).max() ** 2
     if not real.any():
@@ -63,6 +73,33 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
     closed = mesh.is_watertight and mesh.is_winding_consistent
     volume = abs(float(mesh.volume)) * length**3 if closed else np.nan
     return ScannedSurface(points, cells[real], volume, tuple(_remarks(points, cells[real], ~real)))
+
+
+def _refuse_cut(path: Path, held: int) -> None:
+    """Refuse a file that does not hold what it says, which its reader passes over.
+
+    A binary STL states the number of its triangles, one of text has a line for each, a PLY of text
+    one for each element of its head; an OBJ numbers its vertices from 1.
+    """
+    data, suffix, due, what = path.read_bytes(), path.suffix.lower(), held, "triangles"
+    if suffix == ".stl" and (facets := len(_FACET.findall(data))):
+        due = facets
+    elif suffix == ".stl" and len(data) > _STL_HEAD:
+        due, held = int.from_bytes(data[80:_STL_HEAD], "little"), (len(data) - _STL_HEAD) // 50
+    elif suffix == ".ply" and b"\nformat ascii" in data[:200]:
+        head, _, body = data.partition(b"end_header")
+        due, what = sum(int(n) for n in _ELEMENT.findall(head)), "lines"
+        held = min(due, sum(bool(line.strip()) for line in body.splitlines()))
+    elif suffix == ".obj" and (wrong := _NOT_COUNTED.search(data)):
+        line = data[: wrong.start()].count(b"\n") + 1
+        raise FileError(
+            f"{path}, line {line}: a face names vertex {wrong[1].decode()}; only vertices counted "
+            "from 1 are read"
+        )
+    if due and held != due:
+        raise FileError(
+            f"{path} says it holds {due} {what}, but {held} can be read: it is cut off or damaged"
+        )
 
 
 def _remarks(points: np.ndarray, cells: np.ndarray, flat: np.ndarray) -> list[str]:

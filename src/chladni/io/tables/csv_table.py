@@ -54,8 +54,8 @@ class CsvTable:
         )
 
 
-def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTable:
-    """A CSV file with these columns, in any order.
+def read_table(path: Path, due: Sequence[str], optional: Sequence[str] | None) -> CsvTable:
+    """A CSV file with these columns, in any order; ``optional`` None: any others may stand there.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def read_table(path: Path, due: Sequence[str], optional: Sequence[str]) -> CsvTa
         raise FileError(f"{path.name} is no table: {error}") from error
     if not rows:
         raise FileError(f"{path.name} is empty; the first line names the columns {', '.join(due)}")
-    header = [name.strip().lower() for name in rows[0][1]]
+    header = [name.strip().lower().lstrip("# ") for name in rows[0][1]]
     _check_header(path, header, due, optional)
     for line, row in rows[1:]:
         if len(row) != len(header):
@@ -97,14 +97,14 @@ def beside_it(path: Path) -> list[str]:
 
 
 def _check_header(
-    path: Path, header: list[str], due: Sequence[str], optional: Sequence[str]
+    path: Path, header: list[str], due: Sequence[str], optional: Sequence[str] | None
 ) -> None:
     if missing := [name for name in due if name not in header]:
         raise FileError(
             f"{path.name}, line 1: no column {', '.join(missing)}; there are {', '.join(header)}"
         )
     for name in header:
-        if name not in (*due, *optional):
+        if optional is not None and name not in (*due, *optional):
             known = ", ".join((*due, *optional))
             raise FileError(f"{path.name}, line 1: unknown column {name!r}; known are {known}")
         if header.count(name) > 1:
