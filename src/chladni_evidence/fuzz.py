@@ -23,7 +23,7 @@ from pathlib import Path
 
 from chladni.output import write_json, write_text
 
-from .fuzz_inputs import FuzzInput
+from .fuzz_input import FuzzInput
 
 PATIENCE = 60.0  # of the processor's time [s]
 MEMORY = 2e9  # resident at most [bytes]
@@ -124,12 +124,15 @@ def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
 
 
 def _whole(out: Path) -> str:
-    """Whether every JSON of a result is one."""
+    """Whether every JSON of a result is one, with numbers alone where numbers stand."""
+    no_number: list[str] = []
     for path in out.rglob("*.json"):
         try:
-            json.loads(path.read_text(encoding="utf-8"))
+            json.loads(path.read_text(encoding="utf-8"), parse_constant=no_number.append)
         except ValueError:
             return "half-written"
+    if no_number:
+        return "nan written"
     return "answered" if any(out.iterdir()) else "nothing written"
 
 

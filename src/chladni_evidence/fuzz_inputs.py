@@ -1,195 +1,13 @@
-"""Sound inputs that are injured: decks, universal files, tables, archives, cases, finished runs."""
+"""Sound inputs that are injured: files cut, doubled or misspelt, and those of contradictions."""
 
-import json
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import numpy as np
-
-from chladni.effects.estimate import Estimate, Location
-from chladni.io.nastran import write_assembly
-from chladni.io.tables.write_tables import write_csv, write_npz
-from chladni.io.uff.write_uff import write_uff
-from chladni.output import plain
-from chladni.report.diagnosis_json import diagnosis_json
-from chladni.units import units
-from chladni.updating.result import NamedEffect
-from chladni.workflows.diagnosis_result import DiagnosisResult
-from chladni.workflows.frf import frf as evaluated
-from chladni.workflows.loaded_model import load_model
-from chladni_specimens.plates import box, plate
-
-from .mutations import WORDS, injured_archive, injured_text
-
-DECKS = {
-    "chain.bdf": """SOL 103
-CEND
-SPC = 1
-METHOD = 3
-BEGIN BULK
-EIGRL,3,,,4
-GRID,1,,0.,0.,0.
-GRID,2,,1.,0.,0.
-GRID,3,,2.,0.,0.
-GRID,4,,2.,1.,0.
-CELAS2,1,4000.,1,1,2,1
-CBUSH,2,7,2,3,,,,0
-PBUSH,7,K,1.+4,2.+4,3.+4,10.,20.,30.
-CDAMP2,3,2.0,2,1,3,1
-CONM2,4,2,,0.1,,,,,1.-4,,1.-4,,,1.-4
-CONM2,5,3,,0.2,,,,,1.-4,,1.-4,,,1.-4
-RBE2,6,3,123456,4
-CONM2,7,4,,0.05
-SPC1,1,123456,1
-SPC1,1,23456,2
-ENDDATA
-""",
-    "frame.bdf": """SOL 103
-CEND
-BEGIN BULK
-MAT1*                  12.1000000000+11                             3.0E-1
-*                  7850.
-PBAR,1,1,1.-4,1.-9,2.-9,2.-9
-PBEAML,2,1,,TUBE
-,.012,.010
-GRID    1               0.      0.      0.
-GRID    2               .2      0.      0.
-GRID    3               .4      0.      0.
-GRID    4               .4      .2      0.
-GRID    5               .4      .4      0.
-CBAR    1       1       1       2       0.      0.      1.
-CBAR    2       1       2       3       0.      0.      1.
-CBEAM   3       2       3       4       0.      0.      1.
-CBEAM   4       2       4       5       0.      0.      1.
-CONROD  5       1       5       1-1-4
-RBE3,7,,9,123456,1.,123,1,3
-,5
-GRID,9,,.2,.1,.1
-CONM2,8,9,,.3
-ENDDATA
-""",
-    "bricks.bdf": """BEGIN BULK
-CORD2R,3,,0.,0.,0.,0.,0.,1.
-,1.,0.,0.
-MAT1,1,7.+10,,.33,2700.
-PSOLID,1,1
-GRID,1,3,0.,0.,0.
-GRID,2,3,.1,0.,0.
-GRID,3,3,.1,.1,0.
-GRID,4,3,0.,.1,0.
-GRID,5,3,0.,0.,.1
-GRID,6,3,.1,0.,.1
-GRID,7,3,.1,.1,.1
-GRID,8,3,0.,.1,.1
-GRID,9,3,.05,.05,.2
-CHEXA,1,1,1,2,3,4,5,6
-,7,8
-CTETRA,2,1,5,6,7,9
-CTETRA,3,1,5,7,8,9
-SPC1,1,123,1,THRU,4
-MPC,2,9,1,1.,8,1,-1.
-ENDDATA
-""",
-    "sets.bdf": """SOL 103
-CEND
-TEMPERATURE(LOAD) = 4
-SPC = 7
-MPC = 8
-METHOD = 3
-BEGIN BULK
-EIGRL,3,,,4
-MAT1,1,7.+10,2.6316+10,.33,2700.
-MATT1,1,5
-TABLEM1,5
-,20.,7.+10,100.,6.5+10,ENDT
-TEMPD,4,80.
-PBARL,1,1,,BOX
-,.03,.02,.002,.003
-PBEAML,2,1,,I
-,.03,.02,.02,.002,.003,.003
-PBAR,3,1,1.-4,1.-9,2.-9,2.-9
-,,,,,,,,
-,,,.5-9
-GRID,1,,0.,0.,0.
-GRID,2,,.2,0.,0.
-GRID,3,,.4,0.,0.
-GRID,4,,.4,.2,0.
-CBAR,1,1,1,2,0.,0.,1.
-CBEAM,2,2,2,3,0.,0.,1.
-CBAR,3,3,3,4,0.,0.,1.
-CONM2,4,4,,.3
-,2.-4,.5-4,2.-4,,,3.-4
-PSOLID,9,1
-GRID,11,,0.,0.,.1
-GRID,12,,.1,0.,.1
-GRID,13,,0.,.1,.1
-GRID,14,,0.,0.,.2
-GRID,15,,.1,0.,.2
-GRID,16,,0.,.1,.2
-CPENTA,9,9,11,12,13,14,15,16
-SPC1,1,123456,1
-SPC1,2,123,11,12,13
-SPCADD,6,2
-SPCADD,7,1,6
-MPC,3,4,3,1.,3,3,-1.
-MPCADD,8,3
-ENDDATA
-""",
-}
-_SMALL = 60_000  # bytes of a deck of the user's that is taken
-SENSORS = ("label", "grid", "x", "y", "z", "direction", "role", "mass", "position_sd")
-
-
-@dataclass(frozen=True)
-class FuzzInput:
-    """Files of one input, which of them was injured, and the command that is given it."""
-
-    kind: str
-    files: dict[str, bytes]
-    arguments: tuple[str, ...]
-
-
-Files = Mapping[str, bytes]
-Maker = Callable[[random.Random, Files], FuzzInput]
-CASE = """\
-[model]
-deck = "plate.bdf"
-units = "mm-t-s"
-damping = 0.01
-
-[test]
-recordings = ["frf.npz"]
-quantity = "accelerance"
-gain = "known"
-sensors = "sensors.csv"
-mass = 0.518
-mass_sd = 0.001
-hangers = [1, 49]
-
-[[recording]]
-file = "frf.uff"
-article = "B"
-level = 2.0
-
-[band]
-fit = [25.0, 170.0]
-exclude = [[49.0, 51.0]]
-
-[held_out]
-sensors = 2
-band = [150.0, 180.0]
-
-[[parameter]]
-name = "E of the sheet"
-field = "E"
-sd = 0.05
-low = 0.8
-high = 1.3
-"""
+from .contradictions import CONTRADICTIONS
+from .fuzz_input import FuzzInput, Maker
+from .mutations import WORDS, injured_archive, injured_bytes, injured_text
+from .sound_files import Files, sound_files
 
 
 def fuzz_inputs(
@@ -199,63 +17,7 @@ def fuzz_inputs(
     for k in range(count):
         rng = random.Random(f"{seed}:{k}")
         kind = rng.choice(list(kinds))
-        yield _MAKERS[kind](rng, _sound(more))
-
-
-@cache
-def _sound(more: Path | None) -> dict[str, bytes]:
-    """Sound files by name: decks, recordings of a plate in every format, tables, a finished run."""
-    found = {name: text.encode() for name, text in DECKS.items()}
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        made = plate(0.3, 0.22, 6, 6, 1e-3)
-        write_assembly(made, folder / "plate.bdf", units("mm-t-s"))
-        write_assembly(box(h=0.05), folder / "box.bdf", units("SI"))
-        ends = [f"{grid}:+Z" for grid in (2, 4, 7, 18, 30, 43)]
-        model = load_model(folder / "plate.bdf", "mm-t-s")
-        f = np.linspace(20.0, 180.0, 161)
-        frf = evaluated(model, ends, ["2:+Z"], f).frfs[0].to("accelerance")
-        places = dict(zip(made.ids.tolist(), made.points, strict=True))
-        write_uff(folder / "frf.uff", frf, places)
-        write_npz(folder / "frf.npz", frf)
-        write_csv(folder / "frf.csv", frf)
-        found |= {p.name: p.read_bytes() for p in folder.iterdir()}
-    found["poles.csv"] = b"mode,frequency_hz,frequency_sd_hz,damping\n" + b"".join(
-        b"%d,%.4f,0.05,0.01\n" % (k + 1, hz) for k, hz in enumerate((58.1, 91.3, 130.2, 155.7))
-    )
-    found["time.csv"] = _time_table()
-    found["sensors.csv"] = _sensor_table(ends).encode()
-    found["case.toml"] = CASE.encode()
-    found["diagnosis.json"] = json.dumps(plain(diagnosis_json(_finished())), indent=1).encode()
-    paths = sorted(more.rglob("*")) if more else []
-    for path in (p for p in paths if p.suffix in (".bdf", ".dat", ".nas") and p.is_file()):
-        if path.stat().st_size < _SMALL:
-            found[f"{path.parent.name}_{path.stem}.bdf"] = path.read_bytes()
-    return found
-
-
-def _time_table() -> bytes:
-    """A hammer test of one degree of freedom: force and acceleration, three blocks."""
-    t = np.arange(256) / 512.0
-    force = np.where(np.arange(256) == 8, 10.0, 0.0)
-    h = np.exp(-6 * t) * np.sin(2 * np.pi * 40 * t)
-    answer = np.convolve(force, h)[:256]
-    rows = [b"time_s,block,1:+Z [N],2:+Z [m/s^2]\n"]
-    for block in range(3):
-        rows += [b"%.6f,%d,%.5g,%.5g\n" % (t[k], block, force[k], answer[k]) for k in range(256)]
-    return b"".join(rows)
-
-
-def _sensor_table(ends: Sequence[str]) -> str:
-    rows = [f"{e},{e.split(':')[0]},,,,+Z,output,0.001," for e in ends]
-    return "\n".join([",".join(SENSORS), *rows, "2:+Z,2,,,,+Z,input,,", ""])
-
-
-def _finished() -> DiagnosisResult:
-    where = Location("at the corner", ("sheet",), (43,), (0.1, 0.2, 0.0), 0.02)
-    mass = Estimate("M", 0.02, "kg", 0.018, 0.022)
-    effect = NamedEffect("point-mass", "a lump", 12.0, where, (mass,))
-    return DiagnosisResult(verdict="missing physics", effects=(effect,), notes=("one note",))
+        yield _MAKERS[kind](rng, sound_files(more))
 
 
 DECK_COMMANDS = (
@@ -311,6 +73,37 @@ def _case(rng: random.Random, sound: Files) -> FuzzInput:
     return FuzzInput("case", files, (command, ".", *options))
 
 
+def _punch(rng: random.Random, sound: Files) -> FuzzInput:
+    files = {"plate.bdf": sound["plate.bdf"], "modes.pch": injured_text(sound["modes.pch"], rng)}
+    words = ("correlate", "plate.bdf", "--modes", "modes.pch", "--units", "mm-t-s")
+    return FuzzInput("punch", files, words)
+
+
+def _wav(rng: random.Random, sound: Files) -> FuzzInput:
+    """Sound without its end or of another head, or a table of channels that is not its own."""
+    wav, table = sound["run.wav"], sound["run.channels.csv"]
+    what = rng.choice(("head", "bytes", "table"))
+    if what == "head":
+        wav = injured_bytes(wav[:48], rng) + wav[48:]
+    elif what == "bytes":
+        wav = injured_bytes(wav, rng)
+    else:
+        table = injured_text(table, rng)
+    return FuzzInput("wav", {"run.wav": wav, "run.channels.csv": table}, ("test", "run.wav"))
+
+
+MESHES = ("formed.k", "formed.vtu", "formed.csv", "scan.stl", "scan.ply", "scan.obj",
+          "packed.vtu", "packed.stl", "packed.ply")  # fmt: skip
+
+
+def _mesh(rng: random.Random, sound: Files) -> FuzzInput:
+    name = rng.choice(MESHES)
+    injure = injured_bytes if name.startswith("packed") else injured_text
+    files = {"plate.bdf": sound["plate.bdf"], name: injure(sound[name], rng)}
+    words = ("map", "plate.bdf", name, "--units", "mm-t-s", *rng.choice(((), (), ("--align",))))
+    return FuzzInput("mesh", files, words)
+
+
 def _page(rng: random.Random, sound: Files) -> FuzzInput:
     files = {"diagnosis.json": injured_text(sound["diagnosis.json"], rng)}
     return FuzzInput("page", files, ("report", "."))
@@ -324,5 +117,9 @@ _MAKERS: dict[str, Maker] = {
     "case": _case,
     "page": _page,
     "options": _options,
+    "punch": _punch,
+    "wav": _wav,
+    "mesh": _mesh,
+    **CONTRADICTIONS,
 }
 KINDS = tuple(_MAKERS)

@@ -88,13 +88,20 @@ def _negated(lines: Lines, k: int, rng: random.Random) -> Lines:
 _TEXT = (_cut, _doubled, _swapped, _truncated, _byte, _letter, _field, _token, _token, _negated)
 
 
+def injured_bytes(data: bytes, rng: random.Random) -> bytes:
+    """Bytes of other values, half of the time cut off behind some, or with some more within."""
+    raw = bytearray(data)
+    for _ in range(rng.choice((0, 1, 5, 20))):
+        raw[rng.randrange(len(raw))] = rng.randrange(256)
+    at = rng.randrange(len(raw))
+    cut, longer = raw[:at], raw[:at] + rng.randbytes(rng.choice((1, 8))) + raw[at:]
+    return bytes(rng.choice((raw, raw, cut, longer)))
+
+
 def injured_archive(data: bytes, rng: random.Random) -> bytes:
     """An NPZ with one array of another kind, or its bytes damaged."""
     if rng.random() < 0.2:
-        raw = bytearray(data)
-        for _ in range(rng.randint(1, 20)):
-            raw[rng.randrange(len(raw))] = rng.randrange(256)
-        return bytes(raw[: rng.choice((len(raw), rng.randrange(len(raw))))])
+        return injured_bytes(data, rng)
     with np.load(io.BytesIO(data), allow_pickle=False) as held:
         arrays = {name: held[name] for name in held.files}
     name = rng.choice(list(arrays))

@@ -7,7 +7,8 @@ import pytest
 import chladni_evidence.fuzz as fuzzing
 from chladni_evidence.__main__ import main
 from chladni_evidence.fuzz import DUE, fuzz, outcome
-from chladni_evidence.fuzz_inputs import KINDS, FuzzInput, fuzz_inputs
+from chladni_evidence.fuzz_input import FuzzInput
+from chladni_evidence.fuzz_inputs import KINDS, fuzz_inputs
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs processes that fork")
 GOOD = "BEGIN BULK\nSPOINT,1\nCELAS4,1,1000.,1\nCMASS4,2,1.,1\nENDDATA\n"
@@ -48,6 +49,7 @@ BREAKS = {  # a command, put in the place of chladni, that breaks a rule
     "no sentence": "import sys; print('what?', file=sys.stderr); raise SystemExit(2)",
     "noise": "import os; os.mkdir('out'); open('out/a','w'); import sys; sys.stderr.write('hm')",
     "half-written": "import os, sys; os.mkdir('out'); sys.stderr.write('chladni: no'); sys.exit(2)",
+    "nan written": "import os; os.mkdir('out'); open('out/a.json', 'w').write('[NaN]')",
     "nothing written": "import os; os.mkdir('out')",
     "programmer's words": "import sys; sys.stderr.write(\"chladni: ['a']\"); sys.exit(2)",
     "ended by signal 11": "import os, faulthandler as f; f.disable(); os.kill(os.getpid(), 11)",
