@@ -87,6 +87,34 @@ def test_frequency_responses(tmp_path, polar, by_point):
         np.testing.assert_allclose(r.values, H, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("keep", "said"),
+    [
+        ([*range(20)], r"subcase 1: there is no point 11 in mode 2.* \(3 of 4 records\)"),
+        ([*range(21)], r"modes.pch:21: the record of grid 11 holds 3 values, 6 are due"),
+        ([*range(8), *range(9, 22)], r"modes.pch:8: the record of grid 7 holds 3 values"),
+        ([*range(9), *range(7, 22)], r"subcase 1: point 7 is there twice in mode 1"),
+    ],
+)
+def test_a_cut_or_doubled_punch_file_is_refused(tmp_path, keep, said):
+    """Every mode holds every point once, with six components (MSC Nastran Reference Guide)."""
+    path = modes_file(tmp_path, [4.0, 9.0], rng.normal(size=(2, 6, 2)), [7, 11])
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[k] for k in keep))
+    with pytest.raises(FileError, match=said):
+        read_punch_modes(path)
+
+
+def test_a_number_cut_in_its_digits_is_refused(tmp_path):
+    path = modes_file(tmp_path, [4.0], rng.normal(size=(1, 6, 1)), [7])
+    text = path.read_text()
+    path.write_text(text[:-8])  # without the number of the last line: nothing of it is lost
+    assert read_punch_modes(path).shapes.shape == (1, 6, 1)
+    path.write_text(text[:-15])
+    with pytest.raises(FileError, match=r"modes.pch:\d+: the line ends in a field"):
+        read_punch_modes(path)
+
+
 def test_what_is_not_there(tmp_path):
     path = modes_file(tmp_path, [4.0], rng.normal(size=(1, 6, 1)), [7])
     with pytest.raises(FileError, match="holds no frequency responses"):

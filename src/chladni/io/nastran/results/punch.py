@@ -16,6 +16,7 @@ from ....errors import FileError
 from ...file_size import refuse_large
 from ..text.numbers import parse_real
 
+_LINE: Final = 72  # columns of data
 _KINDS: Final = {
     "$EIGENVECTOR": "eigenvector", "$DISPLACEMENTS": "displacement", "$VELOCITY": "velocity",
     "$ACCELERATION": "acceleration",
@@ -67,11 +68,17 @@ def read_punch_modes(path: Path | str) -> PunchModes:
     FileError
         If there are none, or a record is damaged.
     """
-    found = [r for b in _blocks(Path(path)) if b.kind == "eigenvector" for r in b.records]
+    subcases: dict[int, list[Record]] = {}
+    for block in _blocks(Path(path)):
+        if block.kind == "eigenvector":
+            subcases.setdefault(block.subcase, []).extend(block.records)
+    found = [r for records in subcases.values() for r in records]
     if not found:
         raise FileError(
             f"{path} holds no eigenvectors; ask for DISPLACEMENT(PUNCH) = ALL in SOL 103"
         )
+    for subcase, records in subcases.items():
+        _refuse_gaps(records, f"{path}: subcase {subcase}")
     values, ids, eigenvalue = _table(found)
     frequency = np.sqrt(np.maximum(eigenvalue, 0)) / (2 * np.pi)
     return PunchModes(frequency, ids, np.moveaxis(values.real, 0, 2))
@@ -93,6 +100,7 @@ def read_punch_responses(path: Path | str) -> tuple[PunchResponse, ...]:
         raise FileError(f"{path} holds no frequency responses; ask for (PUNCH) in SOL 108 or 111")
     out = []
     for (kind, subcase), records in groups.items():
+        _refuse_gaps(records, f"{path}: {kind} of subcase {subcase}")
         values, ids, frequency = _table(records)
         out.append(PunchResponse(kind, subcase, frequency, ids, values))
     return tuple(out)
@@ -111,6 +119,27 @@ def _table(
     return values, ids, np.array([x for x, _ in abscissa])
 
 
+def _refuse_gaps(records: list[Record], where: str) -> None:
+    """Refuse records of which one is there twice or missing: every point, in each mode or line."""
+    seen: set[tuple[int, tuple[float, int]]] = set()
+    points, abscissae = dict.fromkeys(r[0] for r in records), dict.fromkeys(r[1] for r in records)
+    for point, x, _ in records:
+        if (point, x) in seen:
+            raise FileError(f"{where}: point {point} is there twice {_at(x)}")
+        seen.add((point, x))
+    if len(seen) < (due := len(points) * len(abscissae)):
+        point, x = next((p, x) for x in abscissae for p in points if (p, x) not in seen)
+        raise FileError(
+            f"{where}: there is no point {point} {_at(x)}, where others have it "
+            f"({len(seen)} of {due} records); the file is cut off or damaged"
+        )
+
+
+def _at(x: tuple[float, int]) -> str:
+    """Which mode, or which line."""
+    return f"in mode {x[1]}" if x[1] else f"at {x[0]:g} Hz"
+
+
 def _blocks(path: Path) -> Iterator[_PunchBlock]:
     """Blocks of records with the header that stands above each."""
     try:
@@ -120,7 +149,8 @@ def _blocks(path: Path) -> Iterator[_PunchBlock]:
         raise FileError(f"{path} cannot be read: {error.strerror}") from None
     block = _PunchBlock()
     rows: list[tuple[int, str]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
+    lines = text.splitlines()
+    for number, line in enumerate(lines, start=1):
         if line.startswith("$"):
             if rows:
                 yield _filled(block, rows, path)
@@ -128,6 +158,8 @@ def _blocks(path: Path) -> Iterator[_PunchBlock]:
             _header(block, line[:72], path, number)
         elif line.strip() and block.kind:
             rows.append((number, line[:72]))
+            if len(line) < _LINE and not text.endswith("\n") and number == len(lines):
+                raise FileError(f"{path}:{number}: the line ends in a field: the file is cut off")
     if rows:
         yield _filled(block, rows, path)
 
@@ -172,6 +204,12 @@ def _filled(block: _PunchBlock, rows: list[tuple[int, str]], path: Path) -> _Pun
         key = parse_real(head[0]) if head else float("nan")
         if np.isnan(key) or any(np.isnan(v) for v in values) or not values:
             raise FileError(f"{path}:{number}: {first.strip()[:40]!r} is no record of a punch file")
+        due = 12 if block.complex else 6
+        if head[1:2] == ["G"] and len(values) != due:
+            raise FileError(
+                f"{path}:{number}: the record of grid {head[0]} holds {len(values)} values, {due} "
+                "are due; a line is lost or cut off"
+            )
         point, x = (int(key), block.abscissa) if block.point is None else (block.point, key)
         block.records.append((point, (x, block.mode), _complex(block, np.array(values))))
     return block
