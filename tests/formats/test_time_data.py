@@ -240,3 +240,32 @@ def test_the_table_of_channels_is_held_to_its_words(tmp_path: Path) -> None:
         (tmp_path / "a.channels.csv").write_text(table)
         with pytest.raises(ChladniError, match=said):
             read_recordings(tmp_path / "a.csv")
+
+
+def test_a_wav_that_is_shorter_than_it_says_is_refused(tmp_path: Path) -> None:
+    """The chunk of samples states its bytes; all ones there: a recorder that never came to it."""
+    path = tmp_path / "a.wav"
+    wavfile.write(path, int(RATE), np.vstack([FORCE, MOTION]).T.astype(np.float32))
+    (tmp_path / "a.channels.csv").write_text(CHANNELS)
+    data = path.read_bytes()
+    assert the_record(path).force.shape[2] == N
+    at = data.index(b"data") + 4
+    for changed in (data[: len(data) // 2], data[:at] + b"\0\0\1\0" + data[at + 4 :]):
+        path.write_bytes(changed)
+        with pytest.raises(ChladniError, match=r"a.wav says it holds \d+ bytes of samples, but"):
+            read_recordings(path)
+
+
+def test_channels_said_twice_are_refused_and_those_not_said_named(tmp_path: Path) -> None:
+    path = csv(tmp_path / "a.csv")
+    table = tmp_path / "a.channels.csv"
+    table.write_text(CHANNELS + "2,12:+Z,g,4\n")
+    with pytest.raises(ChladniError, match=r"line 5: channel 2 is there twice, before in line 3"):
+        read_recordings(path)
+    table.write_text(CHANNELS.rpartition("3,")[0])
+    (found,) = read_recordings(path)
+    assert found.time is not None
+    assert found.time.outputs == ("7:+Z",)
+    assert any("a.channels.csv has no line for channel 9:-X" in note for note in found.notes)
+    table.write_text(CHANNELS)
+    assert not any("no line for" in note for note in read_recordings(path)[0].notes)

@@ -8,17 +8,18 @@ output) and ``scale`` (unit per number of the file; of WAV, per full scale).
 import re
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ...ema.time_record import TimeRecord
-from ...errors import FileError, not_text
+from ...errors import FileError, named, not_text
 from ..damage import DAMAGED
 from ..file_size import refuse_large
 from ..tables.csv_table import read_table
 from .time_channels import TimeChannel, assembled, from_arrays, rate_of
 
+_UNSTATED = 0xFFFFFFFF  # length of a chunk that is not known yet
 Read = tuple[TimeRecord, list[str]]
 
 
@@ -32,6 +33,7 @@ def read_wav(path: Path) -> Read:
     """
     from scipy.io import wavfile
 
+    _refuse_cut(path)
     try:
         rate, x = wavfile.read(path)
     except DAMAGED as error:
@@ -49,7 +51,30 @@ def read_wav(path: Path) -> Read:
     elif x.dtype.kind == "i":
         values /= -float(np.iinfo(x.dtype).min)
     raw = [TimeChannel(str(k + 1), "", v[None]) for k, v in enumerate(values)]
-    return assembled(path.name, float(rate), _described(path, raw))
+    return _assembled(path, float(rate), raw)
+
+
+def _refuse_cut(path: Path) -> None:
+    """Refuse a WAV whose chunk of samples is longer than what is left of the file.
+
+    A chunk is a name, its length in bytes, and its bytes, padded to an even number (Microsoft,
+    Multimedia Programming Interface and Data Specifications 1.0, 1991). A recorder that does not
+    know the length yet writes ones in all its bits.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        order: Literal["little", "big"] = "big" if file.read(12)[:4] == b"RIFX" else "little"
+        while len(head := file.read(8)) == 8:
+            length, left = int.from_bytes(head[4:], order), size - file.tell()
+            if head[:4] != b"data":
+                file.seek(length + length % 2, 1)
+                continue
+            if left < length < _UNSTATED:
+                raise FileError(
+                    f"{path.name} says it holds {length} bytes of samples, but {left} are there: "
+                    "it is cut off or damaged"
+                )
+            return
 
 
 def read_mat(path: Path) -> Read:
@@ -76,10 +101,7 @@ def read_mat(path: Path) -> Read:
     records = [r for v in held.values() for r in np.ravel(np.array(v, dtype=object))
                if hasattr(r, "x_values") and hasattr(r, "y_values")]  # fmt: skip
     if records:
-        rate, channels = _testlab(path.name, records)
-        if described(path).is_file():
-            channels = _described(path, channels)
-        return assembled(path.name, rate, channels)
+        return _assembled(path, *_testlab(path.name, records))
     arrays = {}
     for name, value in held.items():
         array = np.asarray(value)
@@ -103,7 +125,7 @@ def _named(path: Path, arrays: dict[str, np.ndarray]) -> Read:
     motion = {"receptance": "m", "mobility": "m/s"}.get(record.quantity, "m/s^2")
     units = ["N"] * len(record.inputs) + [motion] * len(record.outputs)
     raw = [TimeChannel(str(k + 1), u, stacks[:, k]) for k, u in enumerate(units)]
-    return assembled(path.name, record.rate, _described(path, raw))
+    return _assembled(path, record.rate, raw)
 
 
 def _testlab(name: str, records: list[Any]) -> tuple[float, list[TimeChannel]]:
@@ -174,9 +196,7 @@ def read_time_csv(path: Path) -> Read:
         said = re.fullmatch(r"(.*?)\s*\[(.*)\]", cell)
         label, unit = (said[1], said[2]) if said else (cell, "")
         raw.append(TimeChannel(label, unit, np.stack([rows[p, k] for p in pieces])))
-    if described(path).is_file():
-        raw = _described(path, raw)
-    return assembled(path.name, rate, raw)
+    return _assembled(path, rate, raw)
 
 
 def described(path: Path) -> Path:
@@ -184,11 +204,23 @@ def described(path: Path) -> Path:
     return path.with_name(f"{path.stem}.channels.csv")
 
 
-def _described(path: Path, raw: list[TimeChannel]) -> list[TimeChannel]:
-    """The channels as the table beside the file has them; what it does not name is left out."""
+def _assembled(path: Path, rate: float, raw: list[TimeChannel]) -> Read:
+    """The record of the channels, as the table beside the file has them where there is one."""
+    if not described(path).is_file():
+        return assembled(path.name, rate, raw)
+    channels, left = _described(path, raw)
+    record, notes = assembled(path.name, rate, channels)
+    if left:
+        said = f"{described(path).name} has no line for channel {named(left)}, which is not used"
+        notes = [*notes, said]
+    return record, notes
+
+
+def _described(path: Path, raw: list[TimeChannel]) -> tuple[list[TimeChannel], list[str]]:
+    """The channels as the table beside the file has them, and those it does not name."""
     table = read_table(described(path), ("channel", "label", "unit"), ("role", "scale"))
-    called = {c.label: c for c in raw} | {str(k + 1): c for k, c in enumerate(raw)}
-    out = []
+    called = {c.label: k for k, c in enumerate(raw)} | {str(k + 1): k for k in range(len(raw))}
+    out, lines = [], dict[int, int]()
     for k, line in enumerate(table.line):
         where = f"{table.path.name}, line {line}"
         word = table.columns["channel"][k]
@@ -196,6 +228,10 @@ def _described(path: Path, raw: list[TimeChannel]) -> list[TimeChannel]:
             raise FileError(
                 f"{where}: no channel {word!r} in {path.name}; there are 1 to {len(raw)}"
             )
+        at = called[word]
+        if at in lines:
+            raise FileError(f"{where}: channel {word} is there twice, before in line {lines[at]}")
+        lines[at] = line
         role = table.columns["role"][k] if "role" in table else ""
         if role not in ("", "input", "output"):
             raise FileError(f"{where}: role {role!r}; there are input and output")
@@ -203,6 +239,6 @@ def _described(path: Path, raw: list[TimeChannel]) -> list[TimeChannel]:
         label = table.columns["label"][k]
         if not label:
             raise FileError(f"{where}: channel {word} has no label")
-        unit = table.columns["unit"][k] or called[word].unit
-        out.append(TimeChannel(label, unit, scale * called[word].values, role))
-    return out
+        unit = table.columns["unit"][k] or raw[at].unit
+        out.append(TimeChannel(label, unit, scale * raw[at].values, role))
+    return out, [c.label or str(k + 1) for k, c in enumerate(raw) if k not in lines]
