@@ -1,5 +1,6 @@
 """A case is resolved once; whatever is wrong with it is said in one sentence."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -127,11 +128,12 @@ def test_a_case_needs_little(folder: Path) -> None:
 
 def test_several_recordings_take_the_order_of_the_first(folder: Path) -> None:
     H = a_frf()
-    write_npz(folder / "b.npz", H.sel(H.outputs[::-1]))
+    again = replace(H, values=1.01 * H.values)
+    write_npz(folder / "b.npz", again.sel(H.outputs[::-1]))
     change(folder, '"a.npz"', '"a.npz", "b.npz"')
     first, second = load_case(folder).frfs
     assert first.outputs == second.outputs
-    np.testing.assert_array_equal(first.values, second.values)
+    np.testing.assert_allclose(1.01 * first.values, second.values)
 
 
 def test_the_base_moves_where_the_deck_holds_it(folder: Path) -> None:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from chladni.case import load_case
-from chladni.case.recording_groups import described, relation, stacked
+from chladni.case.recording_groups import described, refuse_copies, relation, stacked
+from chladni.case.recordings import notes_of
 from chladni.case.toml_sections import TomlSection
 from chladni.dynamics.frf import FRF
 from chladni.ema.setup import PoleTable, Recording
@@ -76,6 +77,31 @@ def test_what_differs_keeps_recordings_apart(more: dict, what: str) -> None:
     b = one("b.npz", "3:+Z" if more else "8:+Z", **more)
     assert relation(a, b) == what
     assert len(stacked([a, b])) == 2
+
+
+def test_the_same_numbers_are_no_repeat() -> None:
+    """Two measurements never agree to the digits of a text; a copy does, whatever it is called."""
+    a, b = one("a.npz", "8:+Z", level=1.0), one("b.npz", "8:+Z")
+    assert a.frf is not None
+    noisy = replace(b, frf=replace(a.frf, values=a.frf.values * (1 + 1e-3j)))
+    rounded = replace(b, frf=replace(a.frf, values=a.frf.values.astype(np.complex64)))
+    refuse_copies([a, noisy], "[test] recordings")
+    for copy in (b, rounded):
+        with pytest.raises(FileError, match=r"\[test\] recordings: b.npz holds the same .* a.npz"):
+            refuse_copies([a, noisy, copy], "[test] recordings")
+        refuse_copies([a, noisy, replace(copy, article="B")], "[test] recordings")
+    said = notes_of([a, replace(b, article="B")])
+    assert any("b.npz (article B; the same numbers: it is a copy" in note for note in said)
+
+
+def test_a_file_is_listed_once(tmp_path: Path) -> None:
+    (tmp_path / "plate.bdf").write_text(deck())
+    (tmp_path / "poles.csv").write_text("mode,frequency_hz\n1,20\n")
+    head = '[model]\ndeck = "plate.bdf"\nunits = "mm-t-s"\n'
+    listed = '[test]\nrecordings = ["poles.csv", "./poles.csv"]\n'
+    (tmp_path / "case.toml").write_text(head + listed)
+    with pytest.raises(FileError, match=r"line 5: .*recordings lists './poles.csv' twice"):
+        load_case(tmp_path)
 
 
 def test_a_word_is_said_once_and_not_against_the_file() -> None:

@@ -489,6 +489,7 @@ def test_a_folder_without_a_case_is_exit_2(tmp_path, command):
         (["frf", "--input", "base:+Z", "--input", "1:+Z", "--output", "1:+Z"], "alone"),
         (["frf", "--input", "1:up", "--output", "1:+Z"], "1:up"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "9"], "--band"),
+        (["frf", "--input", "1:+Z", "--output", "1:+Z", "--band", "1:inf"], "be finite"),
         (["frf", "--input", "1:+Z", "--output", "1:+Z", "--quantity", "force"], "mobility"),
         (["modes", "--units", "cubits"], "mm-t-s"),
         (["render", "--modes", "a-b"], "--modes"),

@@ -33,6 +33,9 @@ GOOD = {
     ("name", "value", "said"),
     [
         ("level", np.ones(3), "level holds 3 values"),
+        ("level", np.array(np.inf), "level is inf; an amplitude is finite and not negative"),
+        ("level", np.array(np.nan), "level is nan"),
+        ("level", np.array(-2.0), "level is -2"),
         ("level", np.array("2020-01-01", dtype="datetime64[s]"), "level holds datetime64"),
         ("values", np.full((6, 2, 1), "x"), "values holds <U1, not numbers"),
         ("variance", np.full((6, 2, 1), "<script>"), "variance holds <U8"),

@@ -118,6 +118,7 @@ def test_magnitude_and_phase_are_real_and_imaginary_part(
     [
         ("", "empty"),
         (HEAD, "no rows"),
+        (HEAD.strip() + ",level\n1,1:+Z,1:+Z,1,1,-2\n", "line 2: level is -2"),
         ("frequency_hz,level\n1,2\n", "line 1: neither FRFs .* nor poles .*; there are freq"),
         ("frequency_hz,magnitude\n1,2\n", "line 1: no column output, input, phase_deg; there are"),
         (HEAD.replace("real", "magnitude"), "line 1: no column phase_deg; there are"),

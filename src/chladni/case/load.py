@@ -27,7 +27,7 @@ from ..units import HERTZ, UNITS, Units
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
 from .mended_recordings import conjugated, in_hertz, mended, record_length, with_frf
-from .recording_groups import described, stacked
+from .recording_groups import described, refuse_copies, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
 from .sensor_places import ROLES, carried, carried_said, grid_row, labels, places, unrecorded
@@ -242,8 +242,14 @@ def _recordings(
             named.add(name)
             listed.append((section, "file", name))
     read: list[Recording] = []
+    paths: list[Path] = []
     for section, word, name in listed:
-        found = read_recordings(_file(section, word, name, outside), quantity)
+        paths.append(_file(section, word, name, outside).resolve())
+        if paths[-1] in paths[:-1]:
+            raise FileError(
+                f"{section.at(word)} lists {name!r} twice; a repeat is a measurement of its own"
+            )
+        found = read_recordings(paths[-1], quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
             alive = in_hertz(without_dead_channels(r), unit)
             alive = conjugated(alive) if turned else alive
@@ -252,7 +258,9 @@ def _recordings(
             read.append(mended(alive, 1.0 if factor is None else factor, delay, sensors))
     ranked = compared_first(test, stacked(read))
     held = [r for r in ranked if r.frf is not None]
-    return tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
+    alike = tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
+    refuse_copies(alike, test.at("recordings"))
+    return alike
 
 
 def _like(first: Recording, other: Recording, test: TomlSection) -> Recording:

@@ -19,6 +19,7 @@ from .toml_sections import TomlSection
 Relation = Literal["state", "article", "level", "repeat"]
 LEAST_SHARED = 0.5  # of the lines of each recording that all must have to be stacked
 SAME_LINE = 1e-6  # relative
+SAME_NUMBER = 1e-5  # relative: text keeps six digits
 
 
 def described(
@@ -73,6 +74,34 @@ def relation(first: Recording, other: Recording) -> Relation:
         return "article"
     levels = {first.level, other.level} - {None}
     return "level" if len(levels) > 1 else "repeat"
+
+
+def same_numbers(a: FRF, b: FRF) -> bool:
+    """Whether both hold the same responses at the same lines, to the digits of a text."""
+    if a.values.shape != b.values.shape:
+        return False
+    lines = np.allclose(a.frequency, b.frequency, rtol=SAME_LINE, atol=0)
+    return lines and np.allclose(a.values, b.values, rtol=SAME_NUMBER, atol=0)
+
+
+def refuse_copies(recordings: Sequence[Recording], where: str) -> None:
+    """Refuse a repeat that is no measurement of its own.
+
+    Raises
+    ------
+    FileError
+        Naming both recordings.
+    """
+    for k, b in enumerate(recordings):
+        for a in recordings[:k]:
+            if a.frf is None or b.frf is None or relation(a, b) != "repeat":
+                continue
+            if same_numbers(a.frf, b.frf):
+                raise FileError(
+                    f"{where}: {b.name} holds the same numbers as {a.name}; a repeat is a "
+                    "measurement of its own: leave one of them out, or name another article, "
+                    "level or state in [[recording]]"
+                )
 
 
 def states(recordings: Sequence[Recording]) -> tuple[str, ...]:

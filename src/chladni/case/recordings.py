@@ -9,7 +9,7 @@ from ..dynamics.frf import FRF
 from ..ema.response_correlations import responses
 from ..ema.setup import PoleTable, Recording
 from ..errors import FileError
-from .recording_groups import relation, states
+from .recording_groups import relation, same_numbers, states
 from .toml_sections import TomlSection
 
 DEAD = "is zero throughout and left out"  # so ends what is said of a dead channel
@@ -123,6 +123,8 @@ def _other(first: Recording, r: Recording) -> str:
     assert r.frf is not None
     away = deviation(first.frf, r.frf)
     far = "at other lines" if away is None else f"{away:.2g} decades rms off"
+    if same_numbers(first.frf, r.frf):
+        far = "the same numbers: it is a copy, or was made without noise"
     said = [f"state {r.state!r}"] * (r.state != first.state)
     said += [f"article {r.article}"] * (r.article != first.article)
     said += [f"level {r.level:g}"] if r.level is not None and r.level != first.level else []

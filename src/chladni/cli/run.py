@@ -223,8 +223,8 @@ def limits(text: str) -> tuple[float, float]:
         low, high = (float(x) for x in text.replace(",", ":").split(":"))
     except ValueError:
         raise FileError(f"--band {text!r} is not of the form 20:200") from None
-    if not 0 <= low < high:
-        raise FileError(f"--band {text!r} must increase and not be negative")
+    if not 0 <= low < high < float("inf"):
+        raise FileError(f"--band {text!r} must increase, be finite and not be negative")
     return low, high
 
 

@@ -107,6 +107,8 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
     values = _responses(table, parts)
     article = table.columns.get("article", [""] * len(table.line))
     level = numbers.get("level", np.full(len(table.line), np.nan))
+    for k in np.flatnonzero(level < 0):
+        _amplitude(f"{path.name}, line {table.line[k]}", level[k])
     groups: dict[tuple[str, float], list[int]] = {}
     for k, key in enumerate(zip(article, np.nan_to_num(level, nan=-1.0).tolist(), strict=True)):
         groups.setdefault(key, []).append(k)
@@ -285,9 +287,16 @@ def read_npz(path: str | Path, quantity: str | None = None) -> Recording:
     if "level" in arrays:
         if (found := _numbers(path, arrays, "level")).size != 1:
             raise FileError(f"{path.name}: level holds {found.size} values; it is one number")
-        level = float(found.reshape(-1)[0])
+        level = _amplitude(path.name, float(found.reshape(-1)[0]))
     article = _word(path, arrays, "article") if "article" in arrays else ""
     return Recording(path.name, frf, level=level, article=article)
+
+
+def _amplitude(where: str, level: float) -> float:
+    """The level, which is the amplitude of what was held."""
+    if not 0 <= level < np.inf:
+        raise FileError(f"{where}: level is {level:g}; an amplitude is finite and not negative")
+    return level
 
 
 def _only_known(path: Path, names: Sequence[str]) -> None:
