@@ -13,7 +13,7 @@ from chladni.ema.identification import identify
 from chladni.ema.level_fit import foretold
 from chladni.ema.level_modes import AtLevel, modes_over_levels
 from chladni.ema.level_study import _overlapped, decay_study, level_study
-from chladni.ema.level_table import level_tables
+from chladni.ema.level_table import NORMAL_95, damping_range, level_tables
 from chladni.ema.level_words import level_notes
 from chladni.ema.ring_down import ring_downs
 from chladni.ema.time_record import TimeRecord
@@ -330,3 +330,14 @@ def test_intervals_of_a_linear_object_hold_its_poles_at_every_level(control, kin
     assert len(held) > 200
     assert np.mean(held) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / len(held))
     assert np.sqrt(np.mean(np.square(scores))) < 1 + 3 / np.sqrt(2 * len(scores))
+
+
+def test_a_damping_that_is_hardly_known_has_a_range_of_what_oscillates():
+    """ln ζ ± 1.96 σ / ζ, which no σ takes below zero or above critical damping."""
+    known, unknown, none = np.array([0.02]), np.array([20.0]), np.array([0.0])
+    low, high = damping_range(known, 0.1 * known)
+    np.testing.assert_allclose(low * high, known**2)
+    np.testing.assert_allclose(np.log(high / low), 0.2 * NORMAL_95)
+    assert [x.item() for x in damping_range(known, unknown)] == [0.0, 1.0]
+    np.testing.assert_allclose(damping_range(known, none), [known, known])
+    np.testing.assert_allclose(damping_range(np.array([1.2]), none)[1], 1.2)

@@ -128,10 +128,16 @@ def _rows(one: ModeStudy) -> tuple[LevelRow, ...]:
     if held is not None:
         for k, f, zeta in zip(held.rows, held.frequency, held.damping, strict=True):
             fitted[2][k], fitted[3][k] = float(f), float(zeta)
-    half, factor = NORMAL_95 * m.frequency_sd, np.exp(NORMAL_95 * m.damping_sd / m.damping)
-    ends = (m.frequency - half, m.frequency + half, m.damping / factor, m.damping * factor)
-    ranges = [x.tolist() for x in ends]  # a damping ratio is above zero: its interval is of ln ζ
+    half = NORMAL_95 * m.frequency_sd
+    ends = (m.frequency - half, m.frequency + half, *damping_range(m.damping, m.damping_sd))
+    ranges = [x.tolist() for x in ends]
     return tuple(LevelRow(*row) for row in zip(*columns, *fitted, *ranges, strict=True))
+
+
+def damping_range(damping: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Interval of 95 % of ln ζ, as ζ (n,): above zero, and up to 1, where nothing oscillates."""
+    log, half = np.log(damping), NORMAL_95 * sd / damping
+    return np.exp(log - half), np.exp(np.minimum(log + half, np.maximum(log, 0.0)))
 
 
 def _tried(fit: ElementFit) -> TriedElement:
