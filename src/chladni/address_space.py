@@ -4,11 +4,14 @@ OpenBLAS ends the process or waits for ever where it gets no room for its thread
 read before NumPy is loaded.
 """
 
+import os
 import sys
 from itertools import pairwise
 from pathlib import Path
 
-LEAST = 1 << 30  # bytes that NumPy, SciPy and their threads need before anything is computed
+ALONE = 384 << 20  # bytes that NumPy and SciPy take with one thread before anything is computed
+EACH = 96 << 20  # more for each further thread: 41 MiB and its stack, in the OpenBLAS of both
+_THREADS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")  # the first one holds
 
 
 def limit() -> float:
@@ -34,8 +37,22 @@ def address_space_left() -> float:
     return most - taken
 
 
+def blas_threads() -> int:
+    """Threads that OpenBLAS starts: one a core, or fewer where the environment says so."""
+    cores = os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        cores = len(os.sched_getaffinity(0))
+    said = (os.environ.get(name, "").split(",")[0].strip() for name in _THREADS)
+    return next((min(int(n), cores) for n in said if n.isdigit() and int(n)), cores)
+
+
+def least_space(threads: int) -> int:
+    """Bytes of address space that NumPy and SciPy need to start with so many threads."""
+    return ALONE + (threads - 1) * EACH
+
+
 def refuse_small_limit() -> None:
-    """Refuse to load the package where the limit is below ``LEAST``.
+    """Refuse to load the package where the limit is below ``least_space``.
 
     Raises
     ------
@@ -44,12 +61,17 @@ def refuse_small_limit() -> None:
     SystemExit
         In the command ``chladni``, with exit code 2 after the sentence.
     """
-    if (most := limit()) >= LEAST:
+    threads = blas_threads()
+    least = least_space(threads)
+    if (most := limit()) >= least:
         return
     text = (
-        f"the limit on address space is {most / 2**20:.0f} MiB and NumPy needs "
-        f"{LEAST / 2**20:.0f} MiB to start; raise it by `ulimit -v {LEAST // 2**10}` or more"
+        f"the limit on address space is {most / 2**20:.0f} MiB and NumPy needs {least >> 20} MiB "
+        f"to start with {threads} thread{'s' * (threads > 1)}; raise it by "
+        f"`ulimit -v {least >> 10}` or more"
     )
+    if most >= ALONE:
+        text += ", or set OPENBLAS_NUM_THREADS=1"
     if not _is_command():
         raise MemoryError(text)
     sys.stderr.write(f"chladni: {text}\n")
