@@ -277,6 +277,24 @@ def test_sigterm_clears_up_and_says_what_is_kept(tmp_path, capsys):
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("own", [ImportError, SystemError, FileError])
+def test_a_library_that_makes_an_error_of_the_interruption_is_no_fault(number, own, capsys):
+    """As VTK does of a signal that comes while it is imported."""
+
+    def command():
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(5)
+        except KeyboardInterrupt as error:
+            raise own("initialization failed") from error
+
+    before = signal.getsignal(number)
+    assert code_of(command) == 130
+    assert capsys.readouterr().err == "chladni: interrupted; nothing was written\n"
+    assert signal.getsignal(number) is before
+
+
 MAIN = [sys.executable, "-m", "chladni"]
 
 

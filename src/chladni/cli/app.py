@@ -137,8 +137,8 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
     ) -> None:  # fmt: skip
         code = DONE
         try:
-            with opened_console(verbose, log, open_page), _ending():
-                code = _run(lambda: command(*args, **_finite(options)))
+            with opened_console(verbose, log, open_page), _ending() as stopped:
+                code = _run(lambda: _uninterrupted(command, stopped, *args, **_finite(options)))
         except ChladniError as error:  # the log itself
             code = _said(error, AT_FAULT)
         raise typer.Exit(code)
@@ -169,6 +169,21 @@ def _finite(options: dict[str, Any]) -> dict[str, Any]:
         for x in (x for x in numbers if isinstance(x, float) and not math.isfinite(x)):
             raise FileError(f"--{name.replace('_', '-')} {x:g} is not a finite number")
     return options
+
+
+def _uninterrupted(
+    command: Callable[..., Any], stopped: list[int], *args: object, **options: object
+) -> Any:
+    """The command's result; an error after a signal is the interruption itself.
+
+    A library that is being imported turns the KeyboardInterrupt into an error of its own.
+    """
+    try:
+        return command(*args, **options)
+    except Exception as error:
+        if stopped:
+            raise KeyboardInterrupt from error
+        raise
 
 
 def _run(command: Callable[[], Any]) -> int:
@@ -206,20 +221,28 @@ def _is_short_of_memory(error: Exception) -> bool:
 
 
 @contextmanager
-def _ending() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does, so that it clears up and says what is kept."""
+def _ending() -> Iterator[list[int]]:
+    """SIGTERM ends a command as Ctrl-C does, so that it clears up and says what is kept.
+
+    Yields the signals that came. Where Ctrl-C is ignored (nohup) it stays so.
+    """
+    stopped: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield stopped
         return
 
     def ended(number: int, frame: object) -> None:
+        stopped.append(number)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, ended)
+    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, ended)}
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, ended)
     try:
-        yield
+        yield stopped
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _said(error: object, code: int) -> int:
