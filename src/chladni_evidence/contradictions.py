@@ -1,7 +1,7 @@
 """Files whose every line is well formed and which may still be impossible, or no file of theirs.
 
-Sections without material, inertia of no body, sets that refer in a ring, records of a universal
-file of other types, heads of binary data that do not fit it, and a case that states what is not so.
+Sections without material, inertia of no body, sets that refer in a ring. Records of a universal
+file of other types, binary data under another head, and cases that declare what is not so.
 """
 
 import random

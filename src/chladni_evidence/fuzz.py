@@ -124,7 +124,7 @@ def _called(status: int, output: str, said: str, size: int, out: Path) -> str:
 
 
 def _whole(out: Path) -> str:
-    """Whether every JSON of a result is one, with numbers alone where numbers stand."""
+    """Check that every JSON of a result is one, and that its numbers are finite."""
     no_number: list[str] = []
     for path in out.rglob("*.json"):
         try:

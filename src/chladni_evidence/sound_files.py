@@ -234,7 +234,7 @@ def _time_table() -> bytes:
 
 
 def _write_meshes(folder: Path, made: Assembly) -> None:
-    """What `map` takes: forming results of the plate, and scans of it as a closed body [mm]."""
+    """Forming results of the plate, and scans of it as a closed body [mm]: the files of `map`."""
     cells = made.shells.nodes
     t = np.linspace(0.9, 1.0, len(made.points))
     part = np.ones(len(cells), np.int64)

@@ -77,7 +77,7 @@ def relation(first: Recording, other: Recording) -> Relation:
 
 
 def same_numbers(a: FRF, b: FRF) -> bool:
-    """Whether both hold the same responses at the same lines, to the digits of a text."""
+    """True where both hold the same responses at the same lines, to the digits of a text."""
     if a.values.shape != b.values.shape:
         return False
     lines = np.allclose(a.frequency, b.frequency, rtol=SAME_LINE, atol=0)

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import ModelError
 from .facets import cell_normals
 
-FARTHEST = 1e9  # [m] from the origin: beyond, a coordinate is none of a structure
+FARTHEST = 1e9  # [m] from the origin: no structure is larger
 
 
 def check_surface(points: np.ndarray, cells: np.ndarray) -> None:

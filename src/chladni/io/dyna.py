@@ -102,7 +102,8 @@ def _table(block: _Block, rows: np.ndarray, widths: Sequence[int], kind: type) -
         words = np.char.strip(np.column_stack([c.ravel().astype("U32") for c in columns]))
     words[words == ""] = "0"
     try:
-        if np.isfinite(values := words.astype(kind)).all():
+        values: np.ndarray = words.astype(kind)
+        if np.isfinite(values).all():
             return values
     except (ValueError, OverflowError):
         pass

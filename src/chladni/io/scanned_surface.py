@@ -78,8 +78,8 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
 def _refuse_cut(path: Path, held: int) -> None:
     """Refuse a file that does not hold what it says, which its reader passes over.
 
-    A binary STL states the number of its triangles, one of text has a line for each, a PLY of text
-    one for each element of its head; an OBJ numbers its vertices from 1.
+    A binary STL states the number of its triangles, and an STL of text has a line for each. A PLY
+    of text has a line for each element that its head states. An OBJ counts its vertices from 1.
     """
     data, suffix, due, what = path.read_bytes(), path.suffix.lower(), held, "triangles"
     if suffix == ".stl" and (facets := len(_FACET.findall(data))):

@@ -107,8 +107,8 @@ def read_csv(path: str | Path, quantity: str | None = None) -> tuple[Recording, 
     values = _responses(table, parts)
     article = table.columns.get("article", [""] * len(table.line))
     level = numbers.get("level", np.full(len(table.line), np.nan))
-    for k in np.flatnonzero(level < 0):
-        _amplitude(f"{path.name}, line {table.line[k]}", level[k])
+    for row in np.flatnonzero(level < 0):
+        _amplitude(f"{path.name}, line {table.line[row]}", level[row])
     groups: dict[tuple[str, float], list[int]] = {}
     for k, key in enumerate(zip(article, np.nan_to_num(level, nan=-1.0).tolist(), strict=True)):
         groups.setdefault(key, []).append(k)

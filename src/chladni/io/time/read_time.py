@@ -205,7 +205,7 @@ def described(path: Path) -> Path:
 
 
 def _assembled(path: Path, rate: float, raw: list[TimeChannel]) -> Read:
-    """The record of the channels, as the table beside the file has them where there is one."""
+    """The record of the channels, under the words of its table of channels, if it has one."""
     if not described(path).is_file():
         return assembled(path.name, rate, raw)
     channels, left = _described(path, raw)
@@ -217,7 +217,7 @@ def _assembled(path: Path, rate: float, raw: list[TimeChannel]) -> Read:
 
 
 def _described(path: Path, raw: list[TimeChannel]) -> tuple[list[TimeChannel], list[str]]:
-    """The channels as the table beside the file has them, and those it does not name."""
+    """The channels that the table of channels names, and the names of the others."""
     table = read_table(described(path), ("channel", "label", "unit"), ("role", "scale"))
     called = {c.label: k for k, c in enumerate(raw)} | {str(k + 1): k for k in range(len(raw))}
     out, lines = [], dict[int, int]()

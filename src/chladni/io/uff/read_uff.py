@@ -170,9 +170,9 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
     record = _complete(record, where)
     node, way = record.reference
     if kind in _REAL and (np.iscomplexobj(record.y) or (kind == 1 and record.abscissa.kind == 18)):
-        found = "a function of frequency" if kind == 1 else "complex"
+        they_are = "a function of frequency" if kind == 1 else "complex"
         raise FileError(
-            f"{where}: function type {kind} is a {_REAL[kind]}, but its values are {found}; a "
+            f"{where}: function type {kind} is a {_REAL[kind]}, but its values are {they_are}; a "
             "frequency response has function type 4"
         )
     try:
@@ -189,14 +189,14 @@ def _take_function(pile: Pile, record: FunctionSet, quantity: str | None) -> Non
             raise FileError(f"{where}: the coherence of {output} / {input} is there twice")
         pile.coherence[pair] = np.real(record.y)
     else:
-        named = _KINDS.get(kind, f"function type {kind}")
+        called = _KINDS.get(kind, f"function type {kind}")
         reference = input if node else ""
         try:
             x = hertz(record, where) if kind in _SPECTRA else record.x
         except FileError as error:  # nothing compares it: the rest of the file is of use
             pile.notes.append(f"left out: {error}")
             return
-        found = Function(named, output, reference, x, record.y, record.ordinate.unit)
+        found = Function(called, output, reference, x, record.y, record.ordinate.unit)
         pile.functions.append(found)
         if kind == 1:
             pile.time.append(TimeSignal(output, record.ordinate.kind, found))

@@ -69,10 +69,10 @@ def _refuse_untyped(path: Path, number: int, part: bytes) -> None:
 def _refuse_other_binary(where: str, part: bytes) -> None:
     """Refuse a dataset 58b whose first line is not that of what follows it.
 
-    The line holds, in columns 8 to 43, byte order, format of real numbers, lines of head and
-    bytes of numbers (SDRC dataset 58b); a count of zero is not stated.
+    Columns 8 to 43 of the line hold byte order, format of real numbers, lines of head and bytes of
+    numbers (SDRC dataset 58b). A count of zero is not stated.
     """
-    lines = part.lstrip(b"\r\n ").splitlines(keepends=True)
+    lines = part.lstrip(b"\r\n ").split(b"\n", 1 + _HEAD_LINES)
     try:
         order, form, head, count = (int(lines[0][a:b].strip() or 0) for a, b in _BINARY_FIELDS)
     except ValueError:
@@ -88,7 +88,7 @@ def _refuse_other_binary(where: str, part: bytes) -> None:
         )
     if head not in (0, _HEAD_LINES):
         raise FileError(f"{where}: it says its head has {head} lines; a head has {_HEAD_LINES}")
-    held = b"".join(lines[1 + _HEAD_LINES :])
+    held = b"".join(lines[1 + _HEAD_LINES :])  # one piece, or none
     extra = len(held) - count
     if count and not (0 <= extra <= 2 and not held[count:].strip(b"\r\n")):
         raise FileError(
