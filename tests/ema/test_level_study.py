@@ -10,10 +10,11 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.frf import FRF
 from chladni.ema.describing_functions import cubic, drag, gap_spring, micro_slip, slider
 from chladni.ema.identification import identify
-from chladni.ema.level_fit import foretold
+from chladni.ema.level_elements import SLIDER, Element
+from chladni.ema.level_fit import ElementFit, foretold
 from chladni.ema.level_modes import AtLevel, modes_over_levels
 from chladni.ema.level_study import _overlapped, decay_study, level_study
-from chladni.ema.level_table import NORMAL_95, damping_range, level_tables
+from chladni.ema.level_table import NORMAL_95, _tried, damping_range, level_tables
 from chladni.ema.level_words import level_notes
 from chladni.ema.ring_down import ring_downs
 from chladni.ema.time_record import TimeRecord
@@ -341,3 +342,11 @@ def test_a_damping_that_is_hardly_known_has_a_range_of_what_oscillates():
     assert [x.item() for x in damping_range(known, unknown)] == [0.0, 1.0]
     np.testing.assert_allclose(damping_range(known, none), [known, known])
     np.testing.assert_allclose(damping_range(np.array([1.2]), none)[1], 1.2)
+
+
+def test_a_number_that_no_data_bound_has_no_upper_end():
+    """exp(2 σ) of a logarithm that nothing is known of is infinite, and no fault."""
+    unknown = np.full(2, 1e3)
+    fit = ElementFit(Element((SLIDER,)), 40.0, 0.01, np.ones(2), unknown, 1.0, 1.0, 9)
+    number = _tried(fit).numbers[0]
+    assert (number.low, number.value, number.high) == (0.0, 1.0, np.inf)

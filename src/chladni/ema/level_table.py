@@ -143,7 +143,9 @@ def damping_range(damping: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.n
 def _tried(fit: ElementFit) -> TriedElement:
     numbers = []
     for n, value, sd in zip(fit.element.numbers, fit.values, fit.sd, strict=True):
-        ends = (value - 2 * sd, value + 2 * sd) if n.signed else value * np.exp([-2 * sd, 2 * sd])
+        with np.errstate(over="ignore"):  # no data says how large it may be: no upper end
+            factor = np.exp(2 * sd)
+        ends = (value - 2 * sd, value + 2 * sd) if n.signed else (value / factor, value * factor)
         scale = fit.largest**n.metres
         low, value, high = (float(scale * x) for x in (ends[0], value, ends[1]))
         numbers.append(ElementNumber(n.name, value, n.unit, low, high))
