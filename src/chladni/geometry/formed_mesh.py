@@ -40,8 +40,6 @@ class FormedMesh:
                 f"part {self.part.shape}; one row per cell is due"
             )
         check_surface(self.points, self.cells)
-        if len(wrong := np.flatnonzero(~np.isfinite(self.thickness).all(axis=1))):
-            raise ModelError(f"the thickness of cell {wrong[0]} (counted from 0) is no number")
         if not len(self.nodal):
             object.__setattr__(self, "nodal", self._nodal())
         known = self.nodal[np.isfinite(self.nodal)]

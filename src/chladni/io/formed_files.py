@@ -112,12 +112,15 @@ def _formed_of(path: Path, mesh: Any, unit: Units) -> FormedMesh:
             part.append(_part_of(mesh, k, len(nodes)))
     if not cells:
         raise FileError(f"{path} has no quads and no triangles")
+    thickness = np.vstack(t)
+    for wrong in np.flatnonzero(~np.isfinite(thickness).all(axis=1))[:1]:
+        raise FileError(f"{path}: the thickness of cell {wrong} (counted from 0) is no number")
     return FormedMesh(
         np.arange(1, len(points) + 1),
         points * unit.length,
         np.vstack(cells).astype(np.int64),
         np.concatenate(part),
-        np.vstack(t) * unit.length,
+        thickness * unit.length,
     )
 
 

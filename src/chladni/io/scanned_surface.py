@@ -1,5 +1,6 @@
 """Scans of real parts: triangulated surfaces in STL, PLY or OBJ files, looked over as they come."""
 
+import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,7 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
     if not path.is_file():
         raise FileError(f"no file {path}")
     refuse_large(path)
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())  # it logs what it passes over
     try:
         mesh = load_mesh(path, process=False)
     except (ValueError, KeyError, IndexError, NotImplementedError) as error:
