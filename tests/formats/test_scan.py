@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from chladni.errors import FileError
+from chladni.geometry.scan_alignment import as_sheet
 from chladni.io.scanned_surface import read_scan
 
 CORNERS = np.array([[0.0, 0, 0], [30, 0, 0], [30, 20, 0], [0, 20, 0]])
@@ -118,3 +119,9 @@ def test_a_binary_stl_is_as_long_as_it_says(tmp_path, change):
     }[change])  # fmt: skip
     with pytest.raises(FileError, match=r"says it holds \d+ triangles, but \d+ can be read"):
         read_scan(path, 1e-3)
+
+
+def test_a_scan_is_a_sheet_without_thickness(tmp_path):
+    """It is brought onto the deck before its thickness is known."""
+    scan = read_scan(_saved(tmp_path, CORNERS, np.array([[0, 1, 2], [0, 2, 3]]), "a.ply"))
+    assert not np.isfinite(as_sheet(scan.points, scan.cells).thickness).any()
