@@ -5,10 +5,15 @@ from threading import Barrier
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
+import chladni
 from chladni import side_by_side as module
+from chladni.dynamics import eigen
 from chladni.errors import ModelError
-from chladni.side_by_side import cores, side_by_side, threads
+from chladni.io.package_files import mesh_path
+from chladni.side_by_side import cores, one_blas_thread, side_by_side, threads
+from chladni.sparse.lanczos import block_lanczos
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 3])
@@ -72,3 +77,35 @@ def test_as_many_threads_as_the_user_allows(monkeypatch):
     assert threads() == 2
     monkeypatch.undo()
     assert cores() >= 1
+
+
+def blas_threads():
+    return {lib["num_threads"] for lib in threadpool_info() if lib["user_api"] == "blas"}
+
+
+def test_blas_keeps_one_thread_until_the_last_that_asks_for_it_has_left():
+    """Threads overlap as they please; the number is of the process."""
+    with threadpool_limits(2, user_api="blas"):
+        first, second = one_blas_thread(), one_blas_thread()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert blas_threads() == {1}
+        second.__exit__(None, None, None)
+        assert blas_threads() == {2}
+
+
+def test_a_model_is_solved_on_one_thread_of_blas_from_python_too(monkeypatch):
+    """The panel's modes, as a script asks for them: what commands do holds for whoever calls."""
+    seen = []
+
+    def looking(*args, **kwargs):
+        seen.append(blas_threads())
+        return block_lanczos(*args, **kwargs)
+
+    monkeypatch.setattr(eigen, "block_lanczos", looking)
+    with threadpool_limits(2, user_api="blas"):
+        chladni.load(mesh_path("demo/deck.bdf"), "mm-t-s").modes(8)
+        assert blas_threads() == {2}
+    assert seen == [{1}] * len(seen)
+    assert seen

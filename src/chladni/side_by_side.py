@@ -8,7 +8,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from contextvars import copy_context
+from threading import Lock
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -17,6 +19,27 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 MOST = 4  # at once: each has matrices of its own
+_ENTERED: list[threadpool_limits] = []  # one for each that asks for one thread of BLAS
+_LOCK = Lock()
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """One thread for BLAS within, as a block or as a decorator; after the last, as many as before.
+
+    Many small products follow each other here. Threads that share one of them wait for each other
+    longer than they work, on a busy machine twenty times as long. The number belongs to the whole
+    process, so threads that ask for it at the same time share it: the last to leave gives it back.
+    """
+    with _LOCK:
+        _ENTERED.append(_ENTERED[0] if _ENTERED else threadpool_limits(1))
+    try:
+        yield
+    finally:
+        with _LOCK:
+            limits = _ENTERED.pop()
+            if not _ENTERED:
+                limits.restore_original_limits()
 
 
 def cores() -> int:
@@ -54,7 +77,7 @@ def side_by_side(
         return
     pool = ThreadPoolExecutor(count)
     begun: deque[Future[B]] = deque()
-    with threadpool_limits(1):
+    with one_blas_thread():
         try:
             for item in items:
                 begun.append(pool.submit(copy_context().run, work, item))

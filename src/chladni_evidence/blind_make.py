@@ -11,10 +11,10 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from chladni.errors import FileError, LabelError
 from chladni.output import locked, make_folder, own_version, write_json, write_text
+from chladni.side_by_side import one_blas_thread
 
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
 from .evidence_sets import MEANT, Order, Purpose, purpose
@@ -118,7 +118,7 @@ def _made(name: str, order: Order, place: BlindFolder) -> bool:
 
 def made_of(order: Order, cache: Path | None = None) -> MadeCase:
     """The case of an order, made on one thread so that it is the same on every machine."""
-    with threadpool_limits(1):
+    with one_blas_thread():
         return made_case(order.bench(), order.kind, order.seed, order.mesh, cache, order.recorder)
 
 

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import eig
-from threadpoolctl import threadpool_limits
 
 from chladni.bench.accelerometers import AccelerometerType
 from chladni.bench.article_scatter import DAMPING, drawn_article, fitted
@@ -32,6 +31,7 @@ from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent
+from chladni.side_by_side import one_blas_thread
 from chladni.workflows.benched_article import benched, true_places
 from chladni.workflows.virtual_test import ABOVE_BAND
 from chladni_specimens.tailgate.design import TailgateDesign
@@ -132,7 +132,7 @@ def thesis_test(
     ----------
     resolution : of burst random [Hz]
     """
-    with threadpool_limits(1):
+    with one_blas_thread():
         return _tested(subject, rng, tuple(stages), resolution, progress)
 
 

@@ -10,6 +10,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
+from ..side_by_side import one_blas_thread
 from ..sparse.dissection import Fronts, analyse, pattern
 from ..sparse.factor import Backend, Factor, factorise, inertia
 from ..sparse.lanczos import Ritz, block_lanczos
@@ -34,6 +35,7 @@ Modes = tuple[np.ndarray, np.ndarray]  # λ (k,), Φ (n, k)
 _JUST_ABOVE = 1 + 1e-6  # a band that ends at a mode includes it, whatever the rounding
 
 
+@one_blas_thread()
 def normal_modes(
     system: System,
     count: int | None = None,

@@ -4,7 +4,6 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..dynamics.frf import FRF
@@ -13,6 +12,7 @@ from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
+from ..side_by_side import one_blas_thread
 from ..workflows.correlate import scored
 from ..workflows.frf import superposed
 from ..workflows.loaded_model import Model
@@ -75,7 +75,7 @@ def computed(study: StudyModel, number: int, values: np.ndarray) -> SampleResult
     """The sample with these values (d,), on one BLAS thread; an error becomes its ``why``."""
     begun = time.perf_counter()
     try:
-        with threadpool_limits(1), np.errstate(all="ignore"):
+        with one_blas_thread(), np.errstate(all="ignore"):
             columns, frf = _computed(study, values)
     except FAULTS as error:
         why = " ".join(str(error).split()) or type(error).__name__

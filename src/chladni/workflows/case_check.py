@@ -11,6 +11,7 @@ from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
 from ..progress import Progress, silent, within
+from ..side_by_side import one_blas_thread
 from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model
@@ -74,6 +75,7 @@ class CaseCheck:
         return tuple(f for f in self.findings if f.fault)
 
 
+@one_blas_thread()
 def check(case: Case, progress: Progress = silent) -> CaseCheck:
     """Units, mass, size, places, band and words of a case, with the model's lowest modes."""
     progress("modes of the model", 0.1)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..dynamics.frf import FRF
@@ -19,6 +18,7 @@ from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
+from ..side_by_side import one_blas_thread
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf
@@ -84,7 +84,7 @@ def correlate(case: Case, progress: Progress = silent, every_line: bool = True) 
         If the deck's unit system cannot be right, or there is nothing to compare with.
     """
     refuse_other_units(case)
-    with threadpool_limits(1):
+    with one_blas_thread():
         return _correlated(with_natural_frequencies(case), progress, every_line)
 
 

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from threadpoolctl import threadpool_limits
-
 from ..case import Case
 from ..case.mended_recordings import with_frf
 from ..ema.finding import Check, Finding, Screening, notes_of_all
@@ -18,6 +16,7 @@ from ..ema.setup import Recording
 from ..errors import ChladniError, FileError
 from ..fem.modelled import modelled
 from ..progress import Progress, silent
+from ..side_by_side import one_blas_thread
 from .case_model import REACH
 from .identify import without_window
 from .screening_of_case import screened_by_model
@@ -84,7 +83,7 @@ def evaluate_recordings(
             "free decays identify gives poles and damping"
         )
     found = []
-    with threadpool_limits(1):
+    with one_blas_thread():
         for k, (r, e) in enumerate(held):
             progress(f"screening {r.name}", k / len(held))
             others = [] if k else [other for other, _ in held[1:]]

@@ -9,6 +9,7 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..fem.energy import mass_properties, part_energies
 from ..fem.loose_parts import loose_grids
 from ..progress import Progress, silent
+from ..side_by_side import one_blas_thread
 from .loaded_model import LEAST, Model, as_model
 
 
@@ -39,6 +40,7 @@ class NormalModes:
     notes: tuple[str, ...] = ()
 
 
+@one_blas_thread()
 def modes(source: Case | Model, count: int = 20, progress: Progress = silent) -> NormalModes:
     """The ``count`` lowest modes, fewer where the model has fewer."""
     model = as_model(source)

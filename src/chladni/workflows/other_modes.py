@@ -15,6 +15,7 @@ from ..io.nastran.results.punch import PunchModes
 from ..io.uff.read_uff import read_uff
 from ..model.assembly import Assembly
 from ..progress import Progress, silent
+from ..side_by_side import one_blas_thread
 from .loaded_model import Model, beside
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
@@ -91,6 +92,7 @@ def _universal(path: Path) -> PunchModes:
     return PunchModes(np.asarray(shapes.frequency), ids, values)
 
 
+@one_blas_thread()
 def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherModes:
     """Pair the modes of a file with the model's, by frequency and by shape at common grids.
 

@@ -4,9 +4,11 @@ from ..case import Case
 from ..planning import Plan, PlanSettings
 from ..planning import plan as planned
 from ..progress import Progress, silent
+from ..side_by_side import one_blas_thread
 from .loaded_model import Model, as_model
 
 
+@one_blas_thread()
 def plan(
     source: Case | Model, settings: PlanSettings | None = None, progress: Progress = silent
 ) -> Plan:

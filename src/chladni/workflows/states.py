@@ -8,11 +8,10 @@
 
 from dataclasses import replace
 
-from threadpoolctl import threadpool_limits
-
 from ..case import Case
 from ..case.recording_groups import of_state, states
 from ..progress import Progress, within
+from ..side_by_side import one_blas_thread
 from ..updating.diagnosis import Diagnosis
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import JointFit, joint_fit
@@ -28,7 +27,7 @@ from .screening_of_case import RecordingAtFault, at_fault
 
 def answered(case: Case, diagnosing: bool, progress: Progress) -> DiagnosisResult:
     """Diagnose (or, without ``diagnosing``, only calibrate) a case, on one BLAS thread."""
-    with threadpool_limits(1):
+    with one_blas_thread():
         case = with_natural_frequencies(case)
         names = states(case.recordings)
         try:
