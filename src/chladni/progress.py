@@ -23,6 +23,36 @@ def within(progress: Progress, low: float, high: float) -> Progress:
     return lambda what, fraction: progress(what, low + (high - low) * fraction)
 
 
+def counted(progress: Progress, what: str, n: int) -> Callable[[int], None]:
+    """Return what reports that so many of ``n`` steps are done, with the time that is left.
+
+    >>> step = counted(lambda what, x: print(what, x), "band", 4)
+    band 0 of 4 0.0
+    >>> step(4)
+    band 4 of 4 1.0
+    """
+    begun = time.monotonic()
+
+    def step(done: int) -> None:
+        left = (time.monotonic() - begun) * (n - done) / max(done, 1)
+        said = f", about {remaining(left)} left" if done and left >= 1 else ""
+        progress(f"{what} {done} of {n}{said}", done / n)
+
+    step(0)
+    return step
+
+
+def remaining(seconds: float) -> str:
+    """A duration in words, in the most readable unit.
+
+    >>> remaining(40), remaining(200), remaining(9000)
+    ('40 s', '3 min', '2.5 h')
+    """
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
 @contextmanager
 def terminal(patience: float = 2.0) -> Iterator[Progress]:
     """A bar on standard error if that is a terminal and work lasts longer than ``patience`` s."""

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from chladni.ema import identification, pole_fitting, pole_search_by_parts
+from chladni.ema.condensed_lines import condensed
 from chladni.ema.identification import identify, kept_lines, pole_data
 from chladni.ema.outer_poles import outside, with_outer_poles
-from chladni.ema.pole_fitting import PoleData, linear, normal_matrices
+from chladni.ema.pole_fitting import PoleData, linear, normal_matrices, polish, solve
 from chladni.ema.pole_search_by_parts import core_bands, few_channels
-from chladni.ema.pole_selection import Rule
+from chladni.ema.pole_selection import Rule, uncertainty
 from chladni_evidence.identification_evidence import held_against, recording, structure
 
 
@@ -131,3 +132,38 @@ def test_normal_matrices_are_the_weighted_sums(
     t = g[:, None] * np.concatenate([data.y.real, data.y.imag])[:, at]
     np.testing.assert_allclose(G, np.einsum("ki,kc,kj->cij", Q, v**2, Q), atol=1e-12)
     np.testing.assert_allclose(b, np.einsum("ki,kc,kc->ci", Q, v**2, t), atol=1e-12)
+
+
+def test_bins_of_lines_know_the_poles_as_well_as_the_lines_do() -> None:
+    """From poles that are off by many standard deviations both fits arrive at the same place."""
+    known = structure(589, 6, 4)
+    frf, _ = recording(known, "share", 589, lines=4000)
+    data, _ = pole_data(frf, kept_lines(frf))
+    inner = known.inside / (2 * np.pi * frf.frequency[-1])
+    p = with_outer_poles(data, inner, Rule(4, len(data.s)))[0].p
+    off = np.where(outside(data, p), p, p * (1 + 3e-4))
+    few = condensed(data, solve(data, off)[0])
+    assert len(few.s) < len(data.s) / 8
+    assert (few.w**2).sum() == pytest.approx((data.w**2).sum())
+    (a, slope_a), (b, slope_b) = polish(data, off, tol=1e-3), polish(few, off, tol=1e-3)
+    sd, its = (uncertainty(p, slope, 1.0)[0] for slope in (slope_a, slope_b))
+    within = ~outside(data, p)
+    assert (np.abs(off - a.p) > 5 * sd)[within].all()
+    assert (np.abs(b.p - a.p) < 0.25 * sd)[within].all()
+    np.testing.assert_allclose(its[within], sd[within], rtol=0.03)
+
+
+def test_a_long_identification_says_how_long_it_takes_and_is_the_same_in_threads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its size before, a count and the time that is left during; the order of work changes none."""
+    monkeypatch.setattr(identification, "is_large", lambda data: True)
+    monkeypatch.setattr(pole_search_by_parts, "PER_BAND", 300)
+    frf, _ = recording(structure(7, 9, 5), "share", 7, lines=900)
+    seen: list[tuple[str, float]] = []
+    found = identify(frf, progress=lambda what, x: seen.append((what, x)))
+    assert seen[0] == ("identifying 5 channels x 900 lines: band 0 of 3", 0.0)
+    assert [what.split(",")[0][-6:] for what, _ in seen[1:4]] == ["1 of 3", "2 of 3", "3 of 3"]
+    assert all(a[1] <= b[1] for a, b in pairwise(seen))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    np.testing.assert_array_equal(identify(frf).poles, found.poles)

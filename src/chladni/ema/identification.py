@@ -11,6 +11,7 @@ import numpy as np
 
 from ..dynamics.frf import FRF
 from ..errors import FileError, ShapeError
+from ..progress import Progress, silent
 from .modal_covariance import ModalCovariance, modal_covariance
 from .pole_choice import by_subspace, edited
 from .pole_fitting import PoleData, solve
@@ -20,6 +21,7 @@ from .pole_selection import ORDERS, Rule
 from .response_variance import frf_variance
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2, "transmissibility": 2}
+LEAST_LINES = 12  # to identify from
 AWAY = 3.0  # times the band, above or below: of a pole there damping moves H by ζ of a small part
 
 
@@ -103,6 +105,7 @@ def identify(
     states: int | None = None,
     drop: Sequence[float] = (),
     pick: Sequence[float] = (),
+    progress: Progress = silent,
 ) -> Identified:
     """Modes of a recording.
 
@@ -132,7 +135,7 @@ def identify(
     if states is not None:
         solution = by_subspace(data, rule, stated, states)
     elif is_large(data):
-        solution = searched_by_parts(data, rule, stated, orders, tries)
+        solution = searched_by_parts(data, rule, stated, orders, tries, progress)
     else:
         solution = searched(data, rule, stated, orders, tries)
     if len(drop) or len(pick):
@@ -172,7 +175,7 @@ def kept_lines(
         keep &= (band[0] <= frf.frequency) & (frf.frequency <= band[1])
     if use is not None:
         keep &= use
-    if keep.sum() < 12:
+    if keep.sum() < LEAST_LINES:
         asked = "" if band is None else " between {:g} and {:g} Hz".format(*band)
         raise FileError(
             f"{int(keep.sum())} lines{asked} are too few to identify from; the "

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from .condensed_lines import affordable
 from .pole_fitting import (
     PoleData,
     basis,
@@ -25,7 +26,6 @@ from .pole_fitting import (
 
 _RIDGE = 1e-12  # of the orthonormal basis, as the fit has it
 _SINGULAR = 1e-12  # of the largest: directions of the poles that the data do not know
-WORK = 2e10  # multiplications: some ten seconds; larger recordings are thinned
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +60,13 @@ def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float)
 
     Parameters
     ----------
-    p, x : (r,), (2 r + 2, n_c)   the fit; lines of large recordings are ``thinned``
+    p, x : (r,), (2 r + 2, n_c)   the fit
     noise : χ² by degree of freedom
     """
-    data = thinned(data, p)
+    s, w = affordable(data.s, data.w, p)
+    data = replace(
+        data, s=s, y=np.zeros(w.shape, complex), w=w
+    )  # of samples the noise alone counts
     A = linear(data.s, p, data.q)
     n, r, n_c = A.shape[1], len(p), x.shape[1]
     Q, R = orthonormal(data, np.concatenate([A, basis(data.s, p, data.q, 2)], axis=1))
@@ -87,22 +90,6 @@ def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float)
     shared = (slope @ root).reshape(n_c, r, 2, 2 * r).transpose(1, 0, 2, 3)
     scale = np.sqrt(noise)
     return ModalCovariance(scale * root.reshape(r, 2, 2 * r), scale * shared, noise * local)
-
-
-def thinned(data: PoleData, p: np.ndarray, work: float = WORK) -> PoleData:
-    """Every k-th line with k times its weight, so that ``work`` multiplications are enough.
-
-    No fewer than two lines stay in any half-bandwidth, so that the information is nearly all there.
-    """
-    if not len(p):
-        return data
-    cost = 2 * data.y.size * (4 * len(p) + 2) ** 2
-    f = np.abs(data.s)
-    at = np.clip(np.searchsorted(f, np.abs(p)), 1, len(f) - 1)
-    inside = (f[0] <= np.abs(p)) & (np.abs(p) <= f[-1])
-    lines = (np.abs(p.real) / np.maximum(f[at] - f[at - 1], 1e-300))[inside]
-    k = max(1, int(min(cost / work, lines.min(initial=np.inf) / 2)))
-    return replace(data, s=data.s[::k], y=data.y[::k], w=np.sqrt(k) * data.w[::k])
 
 
 def _inverse_root(H: np.ndarray) -> np.ndarray:

@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
+from ..progress import Progress, counted, silent, within
+from ..side_by_side import side_by_side
+from .condensed_lines import condensed
 from .outer_poles import outside, with_outer_poles
 from .pole_fitting import PoleData, PoleFit, basis, polish, solve, stacked
 from .pole_search import (
@@ -31,6 +34,7 @@ MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
 POLISH = 3  # steps on all channels: they begin within the noise of the answer
 PASSES = 2  # each takes off what rings in other bands, better known than before
+SEARCH = 0.8  # of the time goes into choosing the poles
 TRIES = 4  # poles sought in what all channels leave
 
 
@@ -54,35 +58,53 @@ class BandPoles:
 
 
 def searched_by_parts(
-    data: PoleData, rule: Rule, stated: bool, orders: tuple[int, ...], tries: int
+    data: PoleData,
+    rule: Rule,
+    stated: bool,
+    orders: tuple[int, ...],
+    tries: int,
+    progress: Progress = silent,
 ) -> Solution:
     """As :func:`.pole_search.searched`, of poles that are chosen band by band."""
-    parts = [_part(data, low, high, rule, stated, orders, tries) for low, high in core_bands(data)]
-    whole, whole_spread = _with_outer(data, _once(parts), rule, stated)
+    bands = core_bands(data)
+    size = f"{data.y.shape[1]} channels x {len(data.s)} lines"
+    step = counted(within(progress, 0.0, SEARCH), f"identifying {size}: band", len(bands))
+    parts = []
+    for part in side_by_side(lambda band: _part(data, *band, rule, stated, orders, tries), bands):
+        parts.append(part)
+        step(len(parts))
+    progress(f"identifying {size}: all bands together", SEARCH)
+    lines, whole, whole_spread = _with_outer(data, _once(parts), rule, stated)
     beside = outside(data, whole.p)
     of_part = [
         np.flatnonzero(~beside & (one.begin <= np.abs(whole.p)) & (np.abs(whole.p) < one.end))
         for one in parts
     ]
     p, delta_chi2, spread = whole.p.copy(), whole.delta_chi2.copy(), np.array(whole_spread)
-    fit, _ = solve(data, p)
-    for _ in range(PASSES):
+    for k in range(PASSES):
+        progress(f"identifying {size}: every band again", 0.9 + 0.1 * k / PASSES)
+        fit, _ = solve(lines, p)
         for part, own in zip(parts, of_part, strict=True):
             p[own], delta_chi2[own], spread[:, own] = _polished(data, fit, part, own, rule, stated)
-        fit, _ = solve(data, p)
+    fit, _ = solve(data, p)
     return Solution(replace(fit, delta_chi2=delta_chi2), (spread[0], spread[1]), chi_of(data, fit))
 
 
 def _with_outer(
     data: PoleData, parts: list[BandPoles], rule: Rule, stated: bool
-) -> tuple[PoleFit, Spread]:
-    """Poles of all bands and beside them, polished together in few combinations of channels."""
+) -> tuple[PoleData, PoleFit, Spread]:
+    """Poles of all bands and beside them, polished together: condensed lines, few combinations.
+
+    The condensed lines of all channels go before, for what rings in other bands.
+    """
     p = np.concatenate([one.poles for one in parts])
-    if not stated and chi_of(data, fit := solve(data, p)[0]) > ROUNDING:
-        data = with_noise_left(data, data, fit)
-    few = few_channels(data)
+    fit, _ = solve(data, p)
+    lines = condensed(data, fit)
+    few = few_channels(lines)
+    if not stated and chi_of(data, fit) > ROUNDING:
+        few = few_channels(condensed(with_noise_left(data, data, fit), fit))
     fit, slope = with_outer_poles(few, p, replace(rule, channels=few.y.shape[1]))
-    return fit, uncertainty(fit.p, slope, max(1.0, chi_of(few, fit)) ** 2)
+    return lines, fit, uncertainty(fit.p, slope, max(1.0, chi_of(few, fit)) ** 2)
 
 
 def core_bands(data: PoleData) -> list[tuple[int, int]]:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from ..dynamics.frf import FRF
+from .condensed_lines import affordable
 from .identification import DERIVATIVES, Identified
 from .pole_fitting import basis, linear, residual_terms, stacked
 from .response_variance import frf_variance
@@ -58,6 +59,7 @@ def equalised_error(
     p = identified.poles / omega_max
     R = identified.by_channel / omega_max
     line = 2j * np.pi * frf.frequency[keep] / omega_max
+    line, w = affordable(line, w, p)
     F, second = linear(line, p, q), basis(line, p, q, 2)
     known = [_channel(w[:, c, None], F, _moved(second, R[:, c])) for c in range(w.shape[1])]
     information = np.linalg.pinv(sum(own for _, _, own in known), hermitian=True)

@@ -21,7 +21,7 @@ from ..errors import ChladniError, FileError, Interrupted
 from ..io.nastran import units_of
 from ..model.assembly import Assembly
 from ..output import own_version
-from ..progress import Progress, silent
+from ..progress import Progress, remaining, silent
 from ..workflows.case_model import REACH
 from ..workflows.frf import refuse_unknown
 from ..workflows.loaded_model import DeckModels, Model, as_model
@@ -376,14 +376,3 @@ def per_time(rate: float) -> str:
         if rate * factor >= 1:
             return f"{rate * factor:.2g} {word}"
     return f"{rate * 3600:.2g} an hour"
-
-
-def remaining(seconds: float) -> str:
-    """A duration in words, in the most readable unit.
-
-    >>> remaining(40), remaining(200), remaining(9000)
-    ('40 s', '3 min', '2.5 h')
-    """
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -7,12 +7,13 @@ import numpy as np
 from ..dynamics.frf import FRF
 from ..ema.identification import Identified, identify
 from ..errors import FileError
+from ..progress import Progress, silent
 from .pole_assignment import FAINTEST
 from .question import Question
 
 
 def frequencies(
-    question: Question, uncertain: bool
+    question: Question, uncertain: bool, progress: Progress = silent
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Identified | None, tuple[str, ...]]:
     """Natural frequencies of the test, standard deviations [Hz], relative peak heights."""
     frf = question.frf
@@ -32,7 +33,8 @@ def frequencies(
         note = "no FRF exists: natural frequencies were compared"
         return f[inside][order], sd[inside][order], np.ones(len(order)), None, (note,)
     band = band_of(question, frf)
-    found = identify(frf, widened(frf, band), use=counted(frf, question.exclude))
+    use = counted(frf, question.exclude)
+    found = identify(frf, widened(frf, band), use=use, progress=progress)
     f = found.frequency
     keep = _prominent(found, band)
     why = []

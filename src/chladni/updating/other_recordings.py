@@ -13,6 +13,7 @@ from ..ema.identification import equalised, identify
 from ..ema.level_modes import AtLevel
 from ..errors import ChladniError
 from ..fem.modelled import Modelled
+from ..progress import Progress, silent, within
 from .likelihood import LN10, Responses
 from .measured_frequencies import counted, widened
 from .question import OtherTest, Prepared, Question
@@ -24,14 +25,16 @@ WINDOW = 9  # lines over which a spread is averaged: a few half-bandwidths of th
 
 
 def others_identified(
-    question: Question, band: tuple[float, float]
+    question: Question, band: tuple[float, float], progress: Progress = silent
 ) -> tuple[list[OtherTest], list[str]]:
     """Modes of the recordings that are not fitted, and a sentence on each without modes."""
     found, notes = [], []
-    for other in question.others:
-        frf = other.frf
+    n = len(question.others)
+    for k, other in enumerate(question.others):
+        frf, use = other.frf, counted(other.frf, question.exclude)
+        part = within(progress, k / n, (k + 1) / n)
         try:
-            modes = identify(frf, widened(frf, band), use=counted(frf, question.exclude))
+            modes = identify(frf, widened(frf, band), use=use, progress=part)
         except ChladniError as error:
             notes.append(f"{other.name} ({other.relation}) is not used: {error}")
             continue

@@ -26,7 +26,7 @@ from ..errors import FileError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled, modelled
 from ..model.free_parameter import FreeParameter
-from ..progress import Progress, silent
+from ..progress import Progress, silent, within
 from .complex_modes import mode_coupling
 from .damping_scatter import modal_damping
 from .hypothesis_fit import UpdatingProblem
@@ -53,7 +53,7 @@ def prepare(question: Question, progress: Progress = silent) -> Prepared:
     """Identify, decide how to compare, choose the held-out data, build the reduced problem."""
     uncertain = _place_sd(question) > POSITION_UNCERTAIN
     if question.frf is None or uncertain:
-        return _by_poles(question, uncertain)
+        return _by_poles(question, uncertain, progress)
     return _by_responses(question, progress)
 
 
@@ -70,7 +70,8 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     held_band = question.held_band or _upper_part(question, low, high)
     fit_max = min(high, held_band[0]) if question.held_band is None else high
     reach = (low, max(high, held_band[1]))
-    found = identify(frf, widened(frf, reach), use=counted(frf, question.exclude))
+    use, seen_to = counted(frf, question.exclude), within(progress, 0.0, 0.3)
+    found = identify(frf, widened(frf, reach), use=use, progress=seen_to)
     f_max = reach[1]
     if question.held_band is None and not _modes_seen(found, low, fit_max):
         held_band, fit_max = (high, high), high  # all modes lie in the band that was to be held out
@@ -96,7 +97,7 @@ def _by_responses(question: Question, progress: Progress) -> Prepared:
     progress("the reduced model", 0.8)
     reduced = ready_for_responses(question, nominal, f_max)
     held_sensors = _held_sensors(question)
-    others, said = others_identified(question, reach)
+    others, said = others_identified(question, reach, within(progress, 0.8, 1.0))
     data, spreads = [], []
     for zeta, f in zip((ZETA, ZETA_Q), lines, strict=True):
         s = 2 * np.pi * f * (zeta + 1j)
@@ -252,8 +253,8 @@ def _swapped(problem: UpdatingProblem, held: np.ndarray) -> np.ndarray:
     return out
 
 
-def _by_poles(question: Question, uncertain: bool) -> Prepared:
-    frequency, sd, strength, found, notes = frequencies(question, uncertain)
+def _by_poles(question: Question, uncertain: bool, progress: Progress) -> Prepared:
+    frequency, sd, strength, found, notes = frequencies(question, uncertain, progress)
     f_max = float(frequency[-1]) * 1.15
     highest = f_max if question.frf is None else max(f_max, band_of(question, question.frf)[1])
     nominal = modelled(question.searched(question.assembly), max(FAR * f_max, SOLVED * highest))

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..case import Case
 from ..case.mended_recordings import with_frf
@@ -21,7 +20,8 @@ from ..ema.response_variance import noise_source
 from ..ema.setup import PoleTable, Recording
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
-from ..progress import Progress, silent
+from ..progress import Progress, silent, within
+from ..side_by_side import one_blas_thread
 from ..updating.measured_frequencies import LEAST_DELTA_CHI2
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted
@@ -154,11 +154,12 @@ def identify(
         where = f"{source.path} " if isinstance(source, Case) else "what was recorded "
         raise FileError(f"{where}holds no frequency responses to identify from{_has(recordings)}")
     found = []
-    with threadpool_limits(1):
+    with one_blas_thread():
         for k, recording in enumerate(held):
             progress(f"poles of {recording.name}", k / len(held))
+            part = within(progress, k / len(held), (k + 1) / len(held))
             others = ((), held) if k else (held, ())
-            found.append(_modes(recording, band, gaps, averages, others, choice))
+            found.append(_modes(recording, band, gaps, averages, others, choice, part))
     screenings = notes_of_all([r.screening for r in found])
     levels = _levels(found, averages)
     said = [*screenings, *said]
@@ -192,6 +193,7 @@ def _modes(
     averages: int,
     others: tuple[Sequence[Recording], Sequence[Recording]],
     choice: PoleChoice,
+    progress: Progress,
 ) -> RecordingModes:
     frf = recording.frf
     assert frf is not None
@@ -200,7 +202,7 @@ def _modes(
         use &= (frf.frequency < low) | (frf.frequency > high)
     found = identified(
         frf, band, averages=averages, use=use,
-        states=choice.states, drop=choice.drop, pick=choice.pick,
+        states=choice.states, drop=choice.drop, pick=choice.pick, progress=progress,
     )  # fmt: skip
     if all(name.startswith(RELEASE) for name in frf.inputs):
         found = found.sel(~found.inside | clear(found))
