@@ -58,6 +58,7 @@ class Case:
     gain_known : bool         else one real factor common to all channels is free
     notes : tuple of str      what was read otherwise than it stands there
     given : (section, key)    every word the file holds
+    keys : KeyFile            the same with what they say
     carried : (grid, kg)      sensors of known mass: on the article while it was measured
     """
 
@@ -79,6 +80,7 @@ class Case:
     gain_known: bool = True
     notes: tuple[str, ...] = field(default=())
     given: tuple[tuple[str, str], ...] = ()
+    keys: KeyFile = field(default_factory=lambda: KeyFile(Path(), {}))
     carried: tuple[tuple[int, float], ...] = ()
 
     @property
@@ -180,6 +182,7 @@ def load_case(path: str | Path) -> Case:
         gain_known=test.text("gain", among=key("test", "gain").choices) != "unknown",
         notes=tuple(notes),
         given=keys.given(),
+        keys=keys,
         carried=carried(made, outputs, inputs),
     )
 

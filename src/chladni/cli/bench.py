@@ -173,8 +173,9 @@ def _case(
     write_text(
         scratch / "case.toml",
         f"[model]\ndeck = {json.dumps(str(source.resolve()))}\noutside = true\n"
-        f'units = "{units}"\nallow = {json.dumps(allow)}\n'
-        f"[test]\nsensors = {json.dumps(str(table))}\n{hangers}",
+        f'units = "{units}"\n'
+        + f"allow = {json.dumps(allow)}\n" * bool(allow)
+        + f"[test]\nsensors = {json.dumps(str(table))}\n{hangers}",
     )
     case = load_case(scratch)
     own = (note for note in case.notes if note != OUTSIDE)  # no word of the user's

@@ -5,6 +5,7 @@ import json
 from collections import Counter
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..bench.bench_recording import BenchRecording
 from ..case import Case
 from ..fem.measured_dofs import MeasuredDofs
 from ..io.nastran import write_deck
+from ..io.nastran.edit.model_changes import changes
 from ..io.uff.estimate_stamp import stamp
 from ..io.uff.write_time import write_time_uff
 from ..io.uff.write_uff import write_uff
@@ -20,6 +22,14 @@ from ..workflows.virtual_test import BenchResult, level_unit
 
 Files = list[tuple[str, str]]
 CLEAR = 0.04  # of a cord's frequency to either side: two of its half-bandwidths
+RENEWED = {  # words that do not hold for the new recordings, or stand in the deck that is written
+    "model": {"deck", "thickness", "thickness_units", "thickness_place", "outside"},
+    "test": {
+        *("recordings", "use", "quantity", "factor", "delay"),
+        *("sensors", "mass", "mass_sd"),
+    },
+    "held_out": {"band"},
+}
 LEAST = 0.5  # of a band of the case must be in the test's, or all of the test's in it
 
 
@@ -27,7 +37,9 @@ def write_bench(folder: Path, case: Case, found: BenchResult) -> Files:
     """``case/`` with deck, sensors and recordings, ``sealed/truth.json``; what was written."""
     place = folder / "case"
     place.mkdir(parents=True, exist_ok=True)
-    write_deck(case.deck, place / "deck.bdf", [])
+    formed = case.assembly is not case.as_deck
+    edits = changes(case.deck, case.as_deck, case.assembly, case.units) if formed else []
+    write_deck(case.deck, place / "deck.bdf", edits)
     write_text(place / "sensors.csv", _sensors(found))
     names = file_names(found.recordings)
     files: Files = [("case/case.toml", "a case with these recordings")]
@@ -61,14 +73,16 @@ def _sensors(found: BenchResult) -> str:
     """The table of sensors, with the masses they were told to have."""
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
-    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass"])
+    uncertain = ["position_sd"] * bool((found.outputs.sd > 0).any() or (found.inputs.sd > 0).any())
+    write(["label", "grid", "x", "y", "z", "nx", "ny", "nz", "role", "mass", *uncertain])
     usual, shaker = found.setup.accelerometer.mass, found.setup.shaker
     behind = shaker.gauge.mass * shaker.gauge.beyond if shaker else 0.0
     masses = np.where(found.outputs.mass > 0, found.outputs.mass, usual)
-    for row in _rows(found.outputs, "output", masses):
-        write(row)
+    rows = _rows(found.outputs, "output", masses)
     if not found.inputs.base[0]:  # its label says all there is to a table
-        write(_rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[0])
+        rows += _rows(found.inputs, "input", np.full(len(found.inputs.labels), behind))[:1]
+    for row in rows:
+        write(row if uncertain else row[:-1])
     return text.getvalue()
 
 
@@ -78,54 +92,56 @@ def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:
         grid = int(dofs.grids[k])
         place = [""] * 3 if grid else [f"{x:.7g}" for x in dofs.points[k]]
         way = [f"{x:.9g}" for x in dofs.directions[k]]
-        out.append([label, str(grid) if grid else "", *place, *way, role, f"{masses[k]:.6g}"])
+        own = [role, f"{masses[k]:.6g}", f"{dofs.sd[k]:.6g}"]
+        out.append([label, str(grid) if grid else "", *place, *way, *own])
     return out
 
 
 def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
-    files = ", ".join(json.dumps(f"{n}.uff") for n in names)
-    lines = [
-        "[model]",
-        'deck = "deck.bdf"',
-        f'units = "{case.units.name}"',
-        *([f"damping = {case.damping:g}"] if case.damping is not None else []),
-        "",
-        "[test]",
-        f"recordings = [{files}]",
-        'sensors = "sensors.csv"',
-        f"mass = {found.mass:.5f}",
-        f"mass_sd = {1e-3 * found.mass:.5f}",
-        *([f"hangers = {list(case.setup.hangers)}"] if case.setup.hangers else []),
-    ]
+    """Every word of the case as it stands, but for those that the test has made anew."""
+    files = [f"{n}.uff" for n in names]
+    weighed = {"mass": float(f"{found.mass:.6g}"), "mass_sd": float(f"{1e-3 * found.mass:.2g}")}
+    lines = ["[model]", *_words({"deck": "deck.bdf"} | _kept(case, "model"))]
+    test = {"recordings": files, "sensors": "sensors.csv"} | weighed | _kept(case, "test")
+    lines += ["", "[test]", *_words(test)]
     if len(names) > 1:
-        for name, r in zip(names, found.recordings, strict=True):
-            lines += ["", "[[recording]]", f"file = {json.dumps(name + '.uff')}",
-                      f'article = "{r.article}"', f"level = {r.test.level:.6g}"]  # fmt: skip
-    band, held = _covered(case.band, found.band), _covered(case.held_band, found.band)
-    if band is not None:
-        lines += ["", "[band]", f"fit = [{band[0]:g}, {band[1]:g}]"]
-    lines += _left_out(case, found, band)
-    if held is not None or case.held_sensors is not None:
-        lines += ["", "[held_out]"]
-        if case.held_sensors is not None:
-            kept = case.held_sensors
-            lines.append(f"sensors = {json.dumps(kept if isinstance(kept, int) else list(kept))}")
-        if held is not None:
-            lines.append(f"band = [{held[0]:g}, {held[1]:g}]")
+        for name, r in zip(files, found.recordings, strict=True):
+            level = float(f"{r.test.level:.6g}")
+            said = {"file": name, "article": r.article, "level": level}
+            lines += ["", "[[recording]]", *_words(said)]
+    band = _covered(case.band, found.band) or found.band
+    lines += ["", "[band]", f"fit = [{band[0]:g}, {band[1]:g}]", *_left_out(case, found, band)]
+    held, kept = _covered(case.held_band, found.band), _kept(case, "held_out")
+    if held is not None or kept:
+        lines += ["", "[held_out]", *_words(kept)]
+        lines += [f"band = [{held[0]:g}, {held[1]:g}]"] if held is not None else []
+    for section in case.keys.tables.get("parameter", []):
+        lines += ["", "[[parameter]]", *_words(section.values)]
     return "\n".join([*lines, ""])
 
 
-def _left_out(case: Case, found: BenchResult, band: tuple[float, float] | None) -> list[str]:
+def _kept(case: Case, section: str) -> dict[str, Any]:
+    """Words of a section that hold for the new recordings as they did for the old."""
+    found = case.keys.tables.get(section, [])
+    return {k: v for s in found for k, v in s.values.items() if k not in RENEWED[section]}
+
+
+def _words(values: dict[str, Any]) -> list[str]:
+    """Lines of TOML; text, numbers and lists of them are written as JSON has them."""
+    return [f"{k} = {json.dumps(v)}" for k, v in values.items()]
+
+
+def _left_out(case: Case, found: BenchResult, band: tuple[float, float]) -> list[str]:
     """Bands the case leaves out, and that of the cords, which anyone can tap."""
     out = [list(b) for b in case.exclude]
-    low, high = band or found.band
+    low, high = band
     tapped = [f for f in found.cords if low <= f <= high]
     if tapped:
         out.append([round((1 - CLEAR) * min(tapped), 2), round((1 + CLEAR) * max(tapped), 2)])
     if not out:
         return []
     rung = f"  # the cords ring at {', '.join(f'{f:.3g}' for f in tapped)} Hz" * bool(tapped)
-    return [*([] if band else ["", "[band]"]), f"exclude = {out}{rung}"]
+    return [f"exclude = {out}{rung}"]
 
 
 def _covered(

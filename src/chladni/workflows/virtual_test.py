@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..bench.article_scatter import Scatter, drawn_article, fitted
 from ..bench.bench_article import BenchArticle
@@ -27,12 +26,14 @@ from ..case import Case
 from ..dynamics.modes import rigid_modes
 from ..effects.family import Article
 from ..effects.registry import family
+from ..ema.identification import LEAST_LINES
 from ..errors import FileError, LabelError
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.refine import refined
 from ..geometry.sampling import nearest_points
 from ..io.file_size import OVERRIDE, most_gigabytes
 from ..progress import Progress, silent, within
+from ..side_by_side import one_blas_thread
 from .benched_article import benched, true_places
 from .loaded_model import as_model
 from .local_sites import LOCAL, local_site
@@ -132,7 +133,7 @@ def virtual_test(
     settings = settings or BenchSettings()
     _known(settings)
     _places_known(case, settings)
-    with threadpool_limits(1):
+    with one_blas_thread():
         return _tested(case, settings, progress)
 
 
@@ -178,6 +179,9 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
     progress("modes", 0.0)
     band = settings.band or _band(case)
     _refuse_long(settings, band, 1 + len(case.outputs.labels))
+    swept_sine = settings.excitation == "stepped-sine"
+    schedule = dwells_of(stages_for(*band, settings.delay)) if swept_sine else ()
+    _refuse_few(len(schedule) or int((band[1] - band[0]) / settings.resolution) + 1, band)
     setup = BenchSetup(rubber=settings.rubber, room=settings.room)
     if settings.excitation == "hammer" or case.inputs.base[0]:
         setup = replace(setup, shaker=None)
@@ -191,11 +195,6 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
         truth["local"] = sites
     differ = ABOVE_BAND * band[1]
     articles = _drawn(nominal, settings, scatter, differ, rng)
-    schedule = (
-        dwells_of(stages_for(*band, settings.delay))
-        if settings.excitation == "stepped-sine"
-        else ()
-    )
     channels = channels_of(plain, rng)
     truth["sensitivity"] = channels.true / channels.stated
     recordings: list[BenchRecording] = []
@@ -234,6 +233,16 @@ def _refuse_long(settings: BenchSettings, band: tuple[float, float], channels: i
             f"{limit:g} GB that are kept: take lines of --resolution "
             f"{settings.resolution * gigabytes / limit:.2g} Hz or a band below {band[1]:g} Hz; "
             f"{OVERRIDE}={int(gigabytes) + 1} in the environment allows it"
+        )
+
+
+def _refuse_few(lines: int, band: tuple[float, float]) -> None:
+    """Refuse a recording that nothing could be identified from."""
+    if lines < LEAST_LINES:
+        raise FileError(
+            f"{lines} lines between {band[0]:g} and {band[1]:g} Hz are too few to identify from, "
+            f"which takes {LEAST_LINES}: widen the band, or take lines closer together "
+            "(--resolution, of bursts, multisines and blows)"
         )
 
 

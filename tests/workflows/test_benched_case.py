@@ -1,0 +1,121 @@
+"""The case that the bench leaves says all that its user said, and can be diagnosed."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import chladni
+from chladni.case.schema import SCHEMA
+from chladni.cli.app import application
+from chladni.io.package_files import mesh_path
+from chladni.report.bench_folder import RENEWED
+from chladni.workflows.question_of_case import prepared
+
+QUICK = ("--resolution", "1", "--averages", "2", "--exact")
+
+
+def bench(source, out, *words):
+    done = CliRunner().invoke(
+        application(), ["bench", str(source), *QUICK, *words, "--out", str(out)]
+    )
+    assert done.exit_code == 0, (done.output, done.exception)
+    return chladni.load_case(out / "case")
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return mesh_path("demo/case.toml").parent
+
+
+@pytest.fixture(scope="module")
+def deck(demo, tmp_path_factory):
+    """A bare deck with a card that nobody understands, and where it is measured."""
+    folder = tmp_path_factory.mktemp("bare")
+    text = (demo / "deck.bdf").read_text(encoding="latin-1")
+    (folder / "deck.bdf").write_text(text.replace("ENDDATA", "GENEL,99,1\nENDDATA"), "latin-1")
+    rows = [r for r in (demo / "sensors.csv").read_text().splitlines() if r]
+    rows = [f"{rows[0]},position_sd", *(f"{r},0.002" for r in rows[1:])]
+    (folder / "sensors.csv").write_text("\n".join(rows) + "\n")
+    return folder / "deck.bdf"
+
+
+BARE = ("--units", "mm-t-s", "--allow", "GENEL")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        (),
+        ("--band", "20:90"),
+        ("--excitation", "stepped-sine", "--sweeps", "1"),
+        ("--excitation", "hammer"),
+        ("--excitation", "multisine", "--levels", "1,2", "--articles", "2"),
+        ("--room", "0.001", "--rubber", "--time"),
+        ("--finer", "--hide", "point-mass"),
+    ],
+    ids=" ".join,
+)
+def test_a_bare_deck_leaves_a_case_that_can_be_diagnosed(deck, tmp_path, words):
+    """Options that the deck needs to be read stand in the case, and so does the band."""
+    band = () if "--band" in words else ("--band", "15:80")
+    table = deck.with_name("sensors.csv")
+    made = bench(deck, tmp_path / "o", *BARE, "--sensors", str(table), *band, *words)
+    low, high = map(float, (*band, *words)[1].split(":"))
+    assert made.band == pytest.approx((low, high), abs=0.5)
+    assert (made.outputs.sd == 0.002).all()
+    assert prepared(made).identified.order > 2
+
+
+def test_the_case_keeps_every_word_that_still_holds(demo, tmp_path):
+    """What is not made anew by the test stands as it stood; thickness stands in the deck."""
+    case = tmp_path / "mine"
+    shutil.copytree(demo, case)
+    base = chladni.load_case(demo)
+    named = [p.name for p in base.assembly.parts][:1]
+    (case / "t.csv").write_text(
+        "x,y,z,t\n" + "\n".join(f"{x},{y},{z},1.25" for x, y, z in 1e3 * base.assembly.points)
+    )
+    words = {
+        "model": {"deck": "deck.bdf", "units": "mm-t-s", "thickness": "t.csv", "damping": 0.02,
+                  "thickness_units": "mm-t-s", "thickness_place": "as it lies",
+                  "allow": ["GENEL"], "outside": False},
+        "test": {"recordings": ["recording.uff"], "use": "recording.uff", "gain": "unknown",
+                 "quantity": "accelerance", "factor": 1.0, "delay": 0.0, "sensors": "sensors.csv",
+                 "mass": 1.9, "mass_sd": 0.1, "gain_sd": 0.02, "direction_sd": 2.0,
+                 "position_sd": 0.002, "hangers": [1, 620]},
+        "band": {"fit": [15.0, 110.0], "exclude": [[50.0, 51.0]]},
+        "held_out": {"sensors": ["240:+Y"], "band": [110.0, 119.0]},
+        "[parameter]": {"name": "mine", "parts": named, "field": "E", "sd": 0.1, "low": 0.5,
+                        "high": 2.0},
+    }  # fmt: skip
+    held = {(s.strip("[]"), k) for s, all in words.items() for k in all}
+    assert held == {(k.section, k.name) for k in SCHEMA if k.section != "recording"}
+    lines = [
+        line
+        for name, values in words.items()
+        for line in (f"[{name}]", *(f"{k} = {json.dumps(v)}" for k, v in values.items()))
+    ]
+    (case / "case.toml").write_text("\n".join(lines))
+    before = chladni.load_case(case)
+    made = bench(case, tmp_path / "o", "--band", "12:120")
+    renewed = {(s, k) for s, all in RENEWED.items() for k in all}
+    assert {w for w in before.given if w not in renewed} <= set(made.given)
+    for name in ("damping", "band", "held_sensors", "held_band", "parameters", "gain_known"):
+        assert getattr(made, name) == getattr(before, name), name
+    assert made.setup.accuracy == before.setup.accuracy
+    assert made.setup.hangers == before.setup.hangers
+    assert made.exclude[:1] == before.exclude
+    thickness = made.assembly.shells.thickness
+    np.testing.assert_allclose(thickness, before.assembly.shells.thickness, rtol=1e-4)
+    assert np.abs(thickness / base.assembly.shells.thickness - 1).max() > 0.01
+
+
+def test_a_recording_of_too_few_lines_is_refused_before_it_is_made(demo, tmp_path):
+    words = ["bench", str(demo), "--band", "20:21", "--resolution", "0.5"]
+    done = CliRunner().invoke(application(), [*words, "--out", str(tmp_path / "o")])
+    assert done.exit_code == 2
+    assert "3 lines between 20 and 21 Hz are too few" in done.output
+    assert not (tmp_path / "o").exists()
