@@ -34,12 +34,20 @@ def counted(progress: Progress, what: str, n: int) -> Callable[[int], None]:
     begun = time.monotonic()
 
     def step(done: int) -> None:
-        left = (time.monotonic() - begun) * (n - done) / max(done, 1)
-        said = f", about {remaining(left)} left" if done and left >= 1 else ""
-        progress(f"{what} {done} of {n}{said}", done / n)
+        progress(f"{what} {done} of {n}{time_left(begun, done / n)}", done / n)
 
     step(0)
     return step
+
+
+def time_left(begun: float, fraction: float) -> str:
+    """Words on the rest of work that began at ``begun`` (monotonic clock) and is so far.
+
+    >>> time_left(time.monotonic(), 0.0), time_left(time.monotonic() - 20, 0.5)
+    ('', ', about 20 s left')
+    """
+    left = (time.monotonic() - begun) * (1 - fraction) / fraction if fraction > 0 else 0.0
+    return f", about {remaining(left)} left" if left >= 1 else ""
 
 
 def remaining(seconds: float) -> str:

@@ -63,6 +63,25 @@ def test_a_gap_that_never_closes_and_a_slider_that_sticks_are_linear():
     assert np.abs(stuck - due).max() < 1e-3 * np.abs(due).max()
 
 
+@pytest.mark.parametrize(
+    ("law", "leaves"),
+    [(Clearance(2e-3, W**2), 100), (JenkinsSlider(0.5 * W**2, 8e-4 * W**2), 100)],
+    ids=lambda x: getattr(x, "name", ""),
+)
+def test_steps_taken_at_once_are_the_steps_one_by_one(law, leaves):
+    """The same recursion to rounding, over blocks of any length, on and off every piece."""
+    rng, h, n = np.random.default_rng(0), 1 / 2000, 6000
+    u = 0.3 * np.cumsum(rng.normal(size=n)) + 2 * W * np.sin(0.05 * np.arange(n))
+    together, alone = (LocalRun(oscillator().outputs([1]), (law,), h) for _ in range(2))
+    blocks = [u[None, a:b] for a, b in ((0, 5), (5, 2777), (2777, n))]
+    f = np.hstack([together.on(x)[0] for x in blocks])
+    due = np.hstack([alone._by_steps(alone.free.on(x))[0] for x in blocks])
+    kinks = np.abs(np.diff(due, 2)) > 0.01 * np.abs(due).max()
+    assert kinks.sum() > leaves
+    np.testing.assert_allclose(f, due, atol=1e-11 * np.abs(due).max())
+    np.testing.assert_allclose(together.state, alone.state, rtol=1e-9)
+
+
 def test_the_scheme_is_of_second_order():
     """A smooth law: halving the step leaves a quarter of the error."""
     T, ends = 0.5, []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chladni.bench.first_order_hold import HeldRun
+from chladni.bench.first_order_hold import STRIDE, HeldRun
 from chladni.bench.front_end import PASS, STOP, anti_alias
 from chladni.bench.pole_model import PoleFilter, by_poles, filtered
 from chladni.errors import ShapeError
@@ -91,6 +91,19 @@ def test_blocks_carry_on_where_the_last_one_ended():
     run = HeldRun(model, h)
     parts = [run.on(u[:, a:b]) for a, b in ((0, 7), (7, 200), (200, 300))]
     np.testing.assert_allclose(np.hstack(parts), held(model, h, u), rtol=1e-10, atol=1e-12)
+
+
+def test_outputs_between_states_are_those_of_every_step():
+    """States far apart and products between, or a step a sample; every third is every third."""
+    model, h = by_poles(*made()), 0.01
+    u = np.random.default_rng(3).normal(size=(2, 3 * (STRIDE + 7)))
+    run = HeldRun(model, h)
+    due = np.hstack([run.on(now[:, None]) for now in u.T])
+    np.testing.assert_allclose(held(model, h, u), due, rtol=1e-9, atol=1e-11)
+    third = HeldRun(model, h).on(u, 3)
+    np.testing.assert_allclose(third, due[:, 2::3], rtol=1e-9, atol=1e-11)
+    with pytest.raises(ShapeError, match="no multiple of 2"):
+        HeldRun(model, h).on(u[:, :3], 2)
 
 
 def test_a_curved_input_is_met_to_second_order():

@@ -2,7 +2,8 @@
 
 Each answers x = a + S f with f = -law(x): a is where it would be without a force at the end of a
 step, S > 0 what a unit of force moves it in that step. All three are solved in closed form or to
-rounding, so that no step depends on an iteration's tolerance.
+rounding, so that no step depends on an iteration's tolerance. A law of straight pieces says on
+which one it is, f = F - k x, so that many steps are taken at once until it leaves that piece.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,16 @@ class LocalForce(Protocol):
 
     def solve(self, a: float, S: float, memory: float) -> tuple[float, float]:
         """(force [N], memory after the step) of x = a + S f."""
+        ...
+
+    def piece(self, f: float, memory: float) -> tuple[float, float] | None:
+        """(k, F) of the straight piece f = F - k x it is on after a step; None of a curve."""
+        ...
+
+    def followed(
+        self, k: float, a: np.ndarray, f: np.ndarray, S: float, memory: float
+    ) -> tuple[int, float]:
+        """How many steps a, f (n,) stay on the piece of slope k, and the memory after them."""
         ...
 
     @property
@@ -42,6 +53,16 @@ class Clearance:
         over = a - self.gap
         return (-self.k * over / (1 + S * self.k) if over > 0 else 0.0), memory
 
+    def piece(self, f: float, memory: float) -> tuple[float, float]:
+        """Closed or open."""
+        return (self.k, self.k * self.gap) if f else (0.0, 0.0)
+
+    def followed(
+        self, k: float, a: np.ndarray, f: np.ndarray, S: float, memory: float
+    ) -> tuple[int, float]:
+        """Closed beyond the gap."""
+        return _leading((a > self.gap) == bool(k)), memory
+
     @property
     def stiffness(self) -> float:
         """Closed."""
@@ -65,6 +86,15 @@ class CubicSpring:
             if abs(step) <= 1e-15 * abs(x):
                 break
         return -self.k3 * x**3, memory
+
+    def piece(self, f: float, memory: float) -> None:
+        """It has none."""
+
+    def followed(
+        self, k: float, a: np.ndarray, f: np.ndarray, S: float, memory: float
+    ) -> tuple[int, float]:
+        """No step."""
+        return 0, memory
 
     @property
     def stiffness(self) -> float:
@@ -92,7 +122,28 @@ class JenkinsSlider:
         f = float(np.sign(f)) * self.limit
         return f, a + S * f + f / self.k
 
+    def piece(self, f: float, memory: float) -> tuple[float, float]:
+        """It sticks, or slips under its limit."""
+        return (self.k, self.k * memory) if abs(f) < self.limit else (0.0, f)
+
+    def followed(
+        self, k: float, a: np.ndarray, f: np.ndarray, S: float, memory: float
+    ) -> tuple[int, float]:
+        """It sticks within the limit; it slips on as long as it moves on."""
+        if k:
+            return _leading(np.abs(f) <= self.limit), memory
+        slider = a + (S * f + f / self.k)
+        before = np.concatenate([[memory], slider[:-1]])
+        held = -self.k * (a - before) / (1 + S * self.k)
+        n = _leading(np.sign(f) * held > self.limit)
+        return n, float(slider[n - 1]) if n else memory
+
     @property
     def stiffness(self) -> float:
         """Sticking."""
         return self.k
+
+
+def _leading(held: np.ndarray) -> int:
+    """How many are true before the first that is not."""
+    return len(held) if held.all() else int(held.argmin())

@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import toeplitz
 
-from .first_order_hold import HeldRun, HeldStep
+from .first_order_hold import HeldRun
 from .local_forces import LocalForce
 from .pole_model import PoleModel
 
+TOGETHER, LEAST = 64, 8  # steps taken at once on a straight piece of a law
 ROUNDS = 3  # Gauss-Seidel over the sites of one step: they couple by h² / m only
 
 
@@ -45,31 +47,112 @@ class LocalRun:
         """Forces (sites, n) at every sample of the driving inputs u (n_in, n).
 
         With r = E q + G_0 b f, what the sites would do without a force at the next sample, the
-        recursion is r ← E r + (E G_1 + G_0) b f: two products and a sum a step.
+        recursion is r ← E r + (E G_1 + G_0) b f.
         """
+        free = self.free.on(u)
+        if len(self.laws) == 1 and self.laws[0].piece(float(self.force[0]), self.memory[0]):
+            return self._by_pieces(self.laws[0], free[0])[None]
+        return self._by_steps(free)
+
+    def _by_steps(self, free: np.ndarray) -> np.ndarray:
+        """Any laws at any number of sites: two products and a sum a step."""
         sites = len(self.laws)
-        s = HeldStep.of(self.openings.poles, self.h)
-        b, c = self.openings.b[:, -sites:], self.openings.c
-        S = (c @ (s.G1[:, None] * b)).real
-        W = list(((s.E * s.G1 + s.G0)[:, None] * b).T.copy())
-        seen = np.stack([c.real, -c.imag], axis=-1).reshape(sites, -1)
-        free = self.free.on(u).T.tolist()
+        W, S, c = self._step()
+        pushes = list(W.T.copy())
+        seen = c.T.conj().copy().view(float)  # Re c r, of real and imaginary parts in turn
         r, pushed = self.state, np.empty_like(self.state)
-        flat, out, f = r.view(float), np.empty((len(free), sites)), self.force.tolist()
-        # flat: real and imaginary parts of r in turn, as ``seen`` takes them
+        flat, out, f = r.view(float), np.empty(free.T.shape), self.force.tolist()
         memory = self.memory
-        for n, x in enumerate(free):
+        for n, x in enumerate(free.T.tolist()):
             own = seen @ flat
             a = [x[i] + float(own[i]) for i in range(sites)]
             f, memory = _solved(self.laws, a, S, f, memory)
-            np.multiply(r, s.E, out=r)
+            np.multiply(r, self.free.step.E, out=r)
             for i in range(sites):
                 if f[i]:
-                    np.multiply(W[i], f[i], out=pushed)
+                    np.multiply(pushes[i], f[i], out=pushed)
                     r += pushed
             out[n] = f
         self.force, self.memory = np.array(f), memory
         return out.T
+
+    def _by_pieces(self, law: LocalForce, free: np.ndarray) -> np.ndarray:
+        """One site and a law of straight pieces: at once all steps that stay on a piece (n,).
+
+        There f_j = (F - k a_j) / (1 + S k) and a = free + O r + H f, with O_j = Re c Eʲ and H what
+        forces of earlier steps move: (I + k H / (1 + S k)) a = free + O r + H F / (1 + S k).
+        """
+        W, S, c = (x[..., 0] for x in self._step())
+        one = _Together.of(self.free.step.E, W, c, float(S[0]))
+        r, f, memory = self.state, float(self.force[0]), self.memory[0]
+        out, n, most = np.empty(len(free)), 0, TOGETHER
+        while n < len(free):
+            k, F = law.piece(f, memory) or (0.0, 0.0)
+            x = free[n : n + most] + one.seen[: len(free) - n][:most] @ r.view(float)
+            a, forces = one.on_piece(x, k, F)
+            m, memory = law.followed(k, a, forces, one.S, memory)
+            if m == 0:
+                forces[0], memory = law.solve(float(x[0]), one.S, memory)
+                m = 1
+            out[n : n + m] = forces[:m]
+            r = one.after(r, forces[:m])
+            f, n = float(forces[m - 1]), n + m
+            most = min(TOGETHER, max(LEAST, 2 * m))
+        self.state, self.force, self.memory = r, np.array([f]), [memory]
+        return out
+
+    def _step(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What a force adds to r (m, sites) and to x (sites, sites) in a step; c (m, sites)."""
+        s, sites = self.free.step, len(self.laws)
+        b, c = self.openings.b[:, -sites:], self.openings.c
+        S = (c @ (s.G1[:, None] * b)).real
+        return (s.E * s.G1 + s.G0)[:, None] * b, S, c.T
+
+
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Several steps of one site at once.
+
+    Attributes
+    ----------
+    powers : (n + 1, m)   Eʲ
+    W : (m,)              what a unit of force adds to r in a step
+    S : float             what it moves the site in that step
+    seen : (n, 2 m)       a of r, as real and imaginary parts in turn
+    H : (n, n)            a of the forces of earlier steps
+    """
+
+    powers: np.ndarray
+    W: np.ndarray
+    S: float
+    seen: np.ndarray
+    H: np.ndarray
+    back: np.ndarray = field(init=False)
+    inverses: dict[float, np.ndarray] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "back", self.powers[-2::-1].copy().view(float))
+
+    @classmethod
+    def of(cls, E: np.ndarray, W: np.ndarray, c: np.ndarray, S: float) -> "_Together":
+        """Of the factors E, W, c (m,) of a step."""
+        powers = E ** np.arange(TOGETHER + 1)[:, None]
+        moved = np.append(0.0, (powers[: TOGETHER - 1] @ (c * W)).real)
+        H = toeplitz(moved, np.zeros(TOGETHER))
+        return cls(powers, W, S, (c * powers[:-1]).conj().view(float), H)
+
+    def on_piece(self, x: np.ndarray, k: float, F: float) -> tuple[np.ndarray, np.ndarray]:
+        """(a, f) of as many steps on f = F - k x; without forces the site would be at ``x``."""
+        n, g = len(x), 1 / (1 + self.S * k)
+        if k not in self.inverses:
+            self.inverses[k] = np.linalg.inv(np.eye(TOGETHER) + g * k * self.H)
+        a = self.inverses[k][:n, :n] @ (x + g * F * self.H[:n, :n].sum(axis=1))
+        return a, g * (F - k * a)
+
+    def after(self, r: np.ndarray, f: np.ndarray) -> np.ndarray:
+        """State (m,) after the forces f of as many steps."""
+        pushed = (f @ self.back[TOGETHER - len(f) :]).view(complex)
+        return self.powers[len(f)] * r + self.W * pushed
 
 
 def _solved(

@@ -7,13 +7,14 @@ so a sweep of an hour is exact and takes no steps in time. With local forces it 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from time import monotonic
 
 import numpy as np
 
 from ..dynamics.frf import FRF
 from ..ema.signals import Spectra, estimated
 from ..ema.time_record import TimeRecord
-from ..progress import Progress, silent
+from ..progress import Progress, silent, time_left
 from .bench_recording import (
     BenchRecording,
     BenchTest,
@@ -74,11 +75,13 @@ def swept(
     control = _Force(float(np.abs(rig.measured.response(2j * np.pi * f[:1])[0, 0, 0])))
     found = np.empty((test.sweeps, len(lines), len(channels.true)), complex)
     over = np.zeros(len(channels.true), int)
+    begun = monotonic()
     for k in range(test.sweeps):
         for n, line in enumerate(lines):
             if n % 50 == 0:
                 done = (k + n / len(lines)) / test.sweeps
-                progress(f"{rig.article.name}: sweep {k + 1}, {line.frequency:.1f} Hz", done)
+                at = f"{rig.article.name}: sweep {k + 1} of {test.sweeps}, {line.frequency:.1f} Hz"
+                progress(f"{at}{time_left(begun, done)}", done)
             drive = control.drive(n, test.level * line.share)
             found[k, n], high = sweep.line(line, drive, rng)
             control.seen(n, float(np.abs(found[k, n, 0])) / drive)
