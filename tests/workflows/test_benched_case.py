@@ -64,7 +64,7 @@ def test_a_bare_deck_leaves_a_case_that_can_be_diagnosed(deck, tmp_path, words):
     table = deck.with_name("sensors.csv")
     made = bench(deck, tmp_path / "o", *BARE, "--sensors", str(table), *band, *words)
     low, high = map(float, (*band, *words)[1].split(":"))
-    assert made.band == pytest.approx((low, high), abs=0.5)
+    assert made.band == pytest.approx((low, high), abs=1.0)  # to a line
     assert (made.outputs.sd == 0.002).all()
     assert prepared(made).identified.order > 2
 
