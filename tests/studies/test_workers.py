@@ -6,6 +6,10 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
+from operator import call, is_
+from types import SimpleNamespace
 
 import numpy as np
 import psutil
@@ -14,7 +18,8 @@ from distributed import Client
 
 import chladni
 from chladni.errors import FileError
-from chladni.studies import StudySettings
+from chladni.studies import StudySettings, local_workers
+from chladni.studies.local_workers import ENDED, local_results
 from chladni.studies.study_store import ROWS
 from chladni.studies.workers import _AHEAD, NO_WORKER
 
@@ -70,22 +75,28 @@ def test_a_worker_killed_costs_no_other_sample(deck, straight, tmp_path):
     assert not [p for p in children if p.is_running()], "workers outlived the study"
 
 
-@pytest.mark.parametrize("ended", [2, 3])
+@pytest.mark.parametrize("ended", [2, 99])
 def test_a_worker_that_ends_in_its_start(model, straight, monkeypatch, ended):
-    """Started again twice; then it is one sentence, and no fault of chladni."""
-    import distributed
+    """Others are started in its place, two in turn; then it is one sentence."""
+    made, tries = local_workers._work, []
 
-    made, tries = distributed.LocalCluster, []
+    def work():
+        tries.append(1)
+        return is_ if len(tries) <= ended else made
 
-    def started(**options):
-        tries.append(options)
-        if len(tries) <= ended:
-            raise RuntimeError("Nanny failed to start.") from RuntimeError("Worker died")
-        return made(**options)
+    class Started:
+        """The worker's work, drawn anew for each."""
 
-    monkeypatch.setattr(distributed, "LocalCluster", started)
-    if ended == 3:
-        with pytest.raises(FileError, match=r"2 local workers could not .* 3 tries \(Worker died"):
+        def __init__(self, context):
+            self.Pipe = context.Pipe
+            self.Process = lambda target, **options: context.Process(target=work(), **options)
+
+    def context(kind):
+        return Started(get_context(kind))
+
+    monkeypatch.setattr(local_workers, "get_context", context)
+    if ended == 99:
+        with pytest.raises(FileError, match=r"2 local workers could not be started in 3 tries"):
             chladni.study(model, RANGES, SETTINGS, workers=2)
         return
     found = chladni.study(model, RANGES, SETTINGS, workers=2)
@@ -206,3 +217,21 @@ def test_jobs_of_a_batch_system(deck, straight, tmp_path):
         said, _ = study.communicate()
     assert study.returncode == 0, said
     agrees(tmp_path / "out", straight)
+
+
+def test_a_sample_that_ends_every_worker_has_failed_and_costs_no_other():
+    """Each time the sample that waited behind it goes to the next worker."""
+    study = SimpleNamespace(assembly=call)  # a sample of which does what its values say
+    X = [partial(int, "no number")] * 8
+    X[3] = partial(os._exit, 1)
+    found = {r.number: r.why for r in local_results(study, X, range(8), 2)}
+    assert found.pop(3) == ENDED
+    assert sorted(found) == [0, 1, 2, 4, 5, 6, 7]
+    assert all("no number" in why for why in found.values())
+
+
+def test_a_fault_of_the_program_ends_the_study(capfd):
+    study = SimpleNamespace(assembly=call)
+    with pytest.raises(TypeError, match="NoneType"):
+        list(local_results(study, [partial(int, None)] * 3, range(3), 2))
+    assert "Traceback" not in capfd.readouterr().err

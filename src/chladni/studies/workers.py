@@ -10,11 +10,11 @@ import numpy as np
 
 from ..errors import FileError
 from ..side_by_side import cores
+from .local_workers import ENDED, local_results
 from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory
 
 PATIENCE = 15  # seconds a scheduler may take to answer
-STARTS = 3  # tries to start local workers
 MOST = 4  # local processes a core
 WORTH = 10.0  # seconds in one process above which others are started
 NO_WORKER = "the scheduler has no worker yet; waiting until one joins it"
@@ -68,8 +68,7 @@ def results(
     if scheduler is not None:
         yield from _distributed(scheduler, study, X, todo, told)
         return
-    with _local(workers) as client:
-        yield from _distributed(client, study, X, todo, told)
+    yield from local_results(study, X, todo, workers)
 
 
 @contextmanager
@@ -91,36 +90,6 @@ def client_of(scheduler: Any) -> Iterator[Any]:
         return
     with _quiet("distributed", "distributed.client"), _connected(str(scheduler)) as client:
         yield client
-
-
-@contextmanager
-def _local(workers: int) -> Iterator[Any]:
-    """A client of local processes that start and end with this study."""
-    from distributed import Client
-
-    quiet = _quiet("distributed", "distributed.client")
-    with quiet, _local_cluster(workers) as cluster, Client(cluster) as client:
-        yield client
-
-
-def _local_cluster(workers: int) -> Any:
-    """Processes of this machine; starting is tried again where a process dies on start."""
-    from distributed import LocalCluster
-
-    for again in reversed(range(STARTS)):
-        try:
-            return LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )  # fmt: skip
-        except (RuntimeError, OSError, TimeoutError) as error:
-            if not again:
-                why = " ".join(str(error.__cause__ or error).split())[:120]
-                raise FileError(
-                    f"{workers} local workers could not be started in {STARTS} tries ({why}); "
-                    "--workers 1 needs none"
-                ) from error
-    raise AssertionError
 
 
 @contextmanager
@@ -224,8 +193,7 @@ def _result(future: Any, k: int) -> SampleResult:
     try:
         found = future.result()
     except KilledWorker:
-        why = "its worker ended without a word each time it was tried: is there memory enough?"
-        return SampleResult(k, {}, why)
+        return SampleResult(k, {}, ENDED)
     except (FutureCancelledError, OSError) as error:
         raise FileError("the connection to the scheduler was lost") from error
     except Exception as error:
