@@ -3,7 +3,7 @@
     python benchmarks/study.py [tailgate] [WORKERS ...]        # a panel; 1 and 2
 
 A folded panel, or the tailgate at 32 mm; ten modes of every sample. "alone" computes the samples in
-one process without Dask; efficiency is its time over workers times their time, from the first
+one process; efficiency is its time over workers times their time, from the first
 sample that is back, so that the start of the workers, given beside it, is not in it. "work" is the
 processor time of a sample alone over that of all processes with workers: what the efficiency could
 be at most, and on a machine that has other things to do the only one of the two that says anything.
