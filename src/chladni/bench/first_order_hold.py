@@ -72,11 +72,11 @@ class HeldRun:
         return np.asarray(_seen(self.model.c, q) + self.model.d @ u[:, every - 1 :: every])
 
     def _within(self, u: np.ndarray) -> np.ndarray:
-        """Outputs at all samples of states that are ``STRIDE`` samples apart.
+        """Outputs at all samples from states that are ``STRIDE`` samples apart.
 
-        y(t + i h) = Re c Eⁱ q(t) + Σ_j κ_ij u(t + j h) + D u(t + i h), where κ_ij is what a hat at
-        sample j moves: Re c E^{i-j-1} (E G_1 + G_0) b after it, Re c G_1 b at it; of the hat at 0
-        only its falling half is in the stride.
+        y(t + i h) = Re c Eⁱ q(t) + Σ_j κ_ij u(t + j h) + D u(t + i h). Straight lines between
+        samples are a sum of hats. A hat at j moves κ_ij = Re c E^{i-j-1} (E G_1 + G_0) b after it
+        and Re c G_1 b at it. The hat at 0 has only its falling half within the stride.
         """
         m, s = self.model, self.step
         held = np.hstack([self.last[:, None], u])

@@ -2,8 +2,9 @@
 
 Each answers x = a + S f with f = -law(x): a is where it would be without a force at the end of a
 step, S > 0 what a unit of force moves it in that step. All three are solved in closed form or to
-rounding, so that no step depends on an iteration's tolerance. A law of straight pieces says on
-which one it is, f = F - k x, so that many steps are taken at once until it leaves that piece.
+rounding, so that no step depends on an iteration's tolerance.
+
+A law of straight pieces names the one it is on, f = F - k x. Many steps on it are taken at once.
 """
 
 from dataclasses import dataclass

@@ -77,10 +77,10 @@ class LocalRun:
         return out.T
 
     def _by_pieces(self, law: LocalForce, free: np.ndarray) -> np.ndarray:
-        """One site and a law of straight pieces: at once all steps that stay on a piece (n,).
+        """Forces (n,) of one site and a law of straight pieces, all steps on a piece at once.
 
-        There f_j = (F - k a_j) / (1 + S k) and a = free + O r + H f, with O_j = Re c Eʲ and H what
-        forces of earlier steps move: (I + k H / (1 + S k)) a = free + O r + H F / (1 + S k).
+        On a piece f_j = (F - k a_j) / (1 + S k). Earlier forces move a = free + O r + H f, with
+        O_j = Re c Eʲ. Together: (I + k H / (1 + S k)) a = free + O r + H F / (1 + S k).
         """
         W, S, c = (x[..., 0] for x in self._step())
         one = _Together.of(self.free.step.E, W, c, float(S[0]))
@@ -102,7 +102,7 @@ class LocalRun:
         return out
 
     def _step(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What a force adds to r (m, sites) and to x (sites, sites) in a step; c (m, sites)."""
+        """Gains of a force in a step, on r (m, sites) and on x (sites, sites); c (m, sites)."""
         s, sites = self.free.step, len(self.laws)
         b, c = self.openings.b[:, -sites:], self.openings.c
         S = (c @ (s.G1[:, None] * b)).real
@@ -135,7 +135,7 @@ class _Together:
 
     @classmethod
     def of(cls, E: np.ndarray, W: np.ndarray, c: np.ndarray, S: float) -> "_Together":
-        """Of the factors E, W, c (m,) of a step."""
+        """From the factors E, W, c (m,) of one step."""
         powers = E ** np.arange(TOGETHER + 1)[:, None]
         moved = np.append(0.0, (powers[: TOGETHER - 1] @ (c * W)).real)
         H = toeplitz(moved, np.zeros(TOGETHER))

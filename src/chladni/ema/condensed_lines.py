@@ -1,8 +1,7 @@
 """Fewer lines that say the same: away from its poles a response is smooth, and lines repeat it.
 
-Lines are summed in bins narrower than their distance to any pole. A response that is known but for
-a small error is summed as data minus what is known, so that the curvature of the response itself
-does not bend the mean of a bin.
+Lines are summed in bins narrower than their distance to any pole. The sum is of data minus a known
+fit: the curvature of the response then bends no mean of a bin.
 """
 
 from dataclasses import replace

@@ -93,9 +93,9 @@ def searched_by_parts(
 def _with_outer(
     data: PoleData, parts: list[BandPoles], rule: Rule, stated: bool
 ) -> tuple[PoleData, PoleFit, Spread]:
-    """Poles of all bands and beside them, polished together: condensed lines, few combinations.
+    """Poles of all bands and outside of them, polished together: condensed lines, few combinations.
 
-    The condensed lines of all channels go before, for what rings in other bands.
+    The first result is the condensed lines of all channels.
     """
     p = np.concatenate([one.poles for one in parts])
     fit, _ = solve(data, p)
