@@ -124,7 +124,8 @@ def first_of(folder: Path, held: bool = True) -> np.ndarray:
 
 def test_recordings_without_a_mode_are_said_to_have_none(tmp_path: Path) -> None:
     f = np.linspace(5, 60, 300)
-    flat = FRF(np.full((300, 2, 1), 0.7 + 0j), f, ("3:+Z", "12:+Z"), ("8:+Z",), "accelerance")
+    values = np.array([0.7, 0.9])[:, None] * np.ones((300, 1, 1)) + 0j
+    flat = FRF(values, f, ("3:+Z", "12:+Z"), ("8:+Z",), "accelerance")
     write_npz(tmp_path / "a.npz", flat)
     case = load_case(case_of(tmp_path, "a.npz", plate_deck()))
     assert len(correlate(case).f_test) == 0

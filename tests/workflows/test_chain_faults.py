@@ -9,10 +9,11 @@ from typer.testing import CliRunner
 
 import chladni
 from chladni.cli.app import application
+from chladni.dynamics.frf import FRF
 from chladni.effects.points import with_masses
 from chladni.ema.finding import Finding, Screening
 from chladni.io.nastran import write_assembly
-from chladni.updating.chain_hypotheses import chain_faults
+from chladni.updating.chain_hypotheses import chain_faults, without_modes
 from chladni.workflows.screening_of_case import instead_of_effects
 
 from .conftest import write_case
@@ -201,3 +202,13 @@ def test_a_verdict_without_a_cause_says_what_looks_wrong():
     assert "7:+Z" in said
     assert instead_of_effects("missing physics", turned) == ()
     assert instead_of_effects("not in catalogue", Screening("a.uff")) == ()
+
+
+def test_a_response_without_a_mode_tells_nothing_of_its_unit():
+    """A power of frequency explains it as well as any unit."""
+    f = np.linspace(20, 200, 200)
+    every, names = np.ones(200, bool), (("1:+Z",), ("1:+Z",), "accelerance")
+    rigid = FRF(3e-4 * f[:, None, None] ** 2 + 0j, f, *names)
+    assert without_modes(rigid, every) == pytest.approx(0.0, abs=1e-12)
+    peak = FRF(1 / (100**2 - f**2 + 2j * f)[:, None, None], f, *names)
+    assert without_modes(peak, every) > 0.1

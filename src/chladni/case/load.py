@@ -26,7 +26,7 @@ from ..model.point_masses import with_masses
 from ..units import HERTZ, UNITS, Units
 from .free_parameters import free_parameters
 from .mapped_thickness import PLACES, formed_thickness
-from .mended_recordings import conjugated, in_hertz, mended, record_length, with_frf
+from .mended_recordings import mended, read_as, record_length, with_frf
 from .recording_groups import described, refuse_copies, stacked
 from .recordings import compared_first, notes_of, without_dead_channels
 from .schema import key, known, sections, unread
@@ -201,9 +201,8 @@ def _file(section: TomlSection, key: str, name: str, outside: bool) -> Path:
     if not path.is_file():
         there = sorted(p.name for p in section.file.parent.glob("*") if p.is_file())
         hint = did_you_mean(Path(name).name, there)
-        raise FileError(
-            f"{section.at(key)}: there is no file {name!r}; {hint}there are {named(there, 8)}"
-        )
+        said = f"there is no file {name!r}; {hint}there are {named(there, 8)}"
+        raise FileError(f"{section.at(key)}: {said}")
     return path
 
 
@@ -232,11 +231,9 @@ def _recordings(
 ) -> tuple[Recording, ...]:
     """All recordings, what is one test stacked, the FRFs with the labels of the first."""
     quantity = test.text("quantity", among=get_args(Quantity))
-    factor = test.number("factor")
-    if factor == 0:
+    if (factor := test.number("factor")) == 0:
         raise FileError(f"{test.at('factor')} = 0 leaves nothing of the recording")
-    unit = test.text("frequency_unit", among=tuple(HERTZ)) or "Hz"
-    turned = test.flag("conjugated")
+    how = test.text("frequency_unit", among=tuple(HERTZ)) or "Hz", test.flag("conjugated")
     listed = [(test, "recordings", name) for name in test.list("recordings", str) or []]
     named = {name for _, _, name in listed}
     for section in more:
@@ -249,19 +246,17 @@ def _recordings(
     for section, word, name in listed:
         paths.append(_file(section, word, name, outside).resolve())
         if paths[-1] in paths[:-1]:
-            raise FileError(
-                f"{section.at(word)} lists {name!r} twice; a repeat is a measurement of its own"
-            )
+            said = f"lists {name!r} twice; a repeat is a measurement of its own"
+            raise FileError(f"{section.at(word)} {said}")
         found = read_recordings(paths[-1], quantity)
         for r in described(more, name, [with_frf(r)[0] for r in found]):
-            alive = in_hertz(without_dead_channels(r), unit)
-            alive = conjugated(alive) if turned else alive
-            most = record_length(alive)
-            delay = test.number("delay", low=-most, high=most) or 0.0
+            alive = read_as(without_dead_channels(r), *how)
+            longest = record_length(alive)
+            delay = test.number("delay", low=-longest, high=longest) or 0.0
             read.append(mended(alive, 1.0 if factor is None else factor, delay, sensors))
     ranked = compared_first(test, stacked(read))
-    held = [r for r in ranked if r.frf is not None]
-    alike = tuple(_like(held[0], r, test) if r.frf is not None else r for r in ranked)
+    first = next((r for r in ranked if r.frf is not None), None)
+    alike = tuple(r if first is None or r.frf is None else _like(first, r, test) for r in ranked)
     refuse_copies(alike, test.at("recordings"))
     return alike
 

@@ -96,26 +96,20 @@ def mended(r: Recording, factor: float, delay: float, sensors: Sequence[Sensor])
     return replace(r, frf=frf, notes=tuple(notes))
 
 
-def in_hertz(r: Recording, unit: str) -> Recording:
-    """FRFs and poles whose frequencies are in a unit of ``HERTZ``, in Hz."""
-    if HERTZ[unit] == 1:
-        return r
-    frf, poles, k = r.frf, r.poles, HERTZ[unit]
-    if frf is not None:
-        frf = replace(frf, frequency=frf.frequency * k)
-    if poles is not None:
-        poles = replace(poles, frequency=poles.frequency * k, frequency_sd=poles.frequency_sd * k)
-    note = f"{r.name}: frequencies read in {unit}, as [test] frequency_unit says"
-    return replace(r, frf=frf, poles=poles, notes=(*r.notes, note))
-
-
-def conjugated(r: Recording) -> Recording:
-    """The FRFs with phases that turn the other way."""
-    if r.frf is None:
-        return r
-    note = f"{r.name}: all FRFs conjugated, as [test] conjugated says"
-    frf = replace(r.frf, values=r.frf.values.conj())
-    return replace(r, frf=frf, notes=(*r.notes, note))
+def read_as(r: Recording, unit: str, conjugated: bool) -> Recording:
+    """A recording whose frequencies are in a unit of ``HERTZ``, or whose phases are reversed."""
+    frf, poles, k, notes = r.frf, r.poles, HERTZ[unit], list(r.notes)
+    if k != 1:
+        notes.append(f"{r.name}: frequencies read in {unit}, as [test] frequency_unit says")
+        if frf is not None:
+            frf = replace(frf, frequency=frf.frequency * k)
+        if poles is not None:
+            f, sd = poles.frequency * k, poles.frequency_sd * k
+            poles = replace(poles, frequency=f, frequency_sd=sd)
+    if conjugated and frf is not None:
+        frf = replace(frf, values=frf.values.conj())
+        notes.append(f"{r.name}: all FRFs conjugated, as [test] conjugated says")
+    return replace(r, frf=frf, poles=poles, notes=tuple(notes))
 
 
 def _row(table: dict[tuple[str, Role], Sensor], output: str) -> Sensor:

@@ -216,6 +216,7 @@ class HypothesisTable:
     decks : Q of each calibration, with and without the mesh error; () where there is no such fit;
         of ``GIVEN`` that of the given deck
     families : number of known families, used where none was tried
+    known_noise : whether evidence counts the covariance of the identification
     """
 
     rows: Mapping[str, Row]
@@ -227,6 +228,7 @@ class HypothesisTable:
     leaning: bool = False
     decks: Mapping[CalibratedDeck, tuple[float, ...]] = field(default_factory=dict)
     families: int = 1
+    known_noise: bool = False
 
     @property
     def null(self) -> Row:

@@ -25,7 +25,7 @@ CLEAR = 0.04  # of a cord's frequency to either side: two of its half-bandwidths
 RENEWED = {  # words that do not hold for the new recordings, or stand in the deck that is written
     "model": {"deck", "thickness", "thickness_units", "thickness_place", "outside"},
     "test": {
-        *("recordings", "use", "quantity", "factor", "delay"),
+        *("recordings", "use", "quantity", "factor", "delay", "frequency_unit", "conjugated"),
         *("sensors", "mass", "mass_sd"),
     },
     "held_out": {"band"},

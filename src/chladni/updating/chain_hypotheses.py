@@ -39,6 +39,7 @@ REACH = 2.0  # times the highest line: modes the model must have
 EXPLAINED = 1 / 2  # of Q as declared, and of ``CHANCE``: what an error that is named may leave
 PLACES = 400  # where the force may act
 LN10 = np.log(10.0)
+FLAT = 1e-3  # of that Q: responses that vary by 7 % about a power of frequency show no mode
 TINY = 1e-9  # Q of a recording that is the model's own
 SURE = ("wrong quantity", "delay")  # where the recording alone says so, whatever the model says
 CHANCE = (np.pi / LN10) ** 2 / 3  # Q of responses of one size whose phases have nothing in common
@@ -186,9 +187,21 @@ def chain_faults(
     best = min(tried, key=lambda h: h.share)
     among = [h for h in tried if h.finding.kind in {f.kind for f in before if f.kind in SURE}]
     said = f"Q {declared:.2g} as declared, {best.Q:.2g} at best of {len(tried)} other readings"
-    named = [best] if explains(best.Q, best.Q / best.share) else among
+    better = explains(best.Q, best.Q / best.share) and without_modes(frf, lines) > FLAT
+    named = [best] if better else among
     findings = [h.finding for h in sorted(named, key=lambda h: h.share)[:1]]
     return findings, Check(name, said, not findings)
+
+
+def without_modes(frf: FRF, lines: np.ndarray) -> float:
+    """Q of the recording against a power of frequency, another one for each channel.
+
+    Below all modes a structure is rigid, and no reading can be told from another.
+    """
+    k = lines & (frf.frequency > 0)
+    H, f = frf.values[k].reshape(k.sum(), -1), frf.frequency[k]
+    x, level = np.stack([np.ones(len(f)), np.log(f)], axis=1), _log10(np.abs(H))
+    return float(np.median(_squares(level - x @ np.linalg.lstsq(x, level, rcond=None)[0])))
 
 
 def explains(Q: float, declared: float) -> bool:

@@ -82,8 +82,7 @@ def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decisio
     renew : fits a hypothesis again on a reduced model that is accurate enough for it
     """
     known = begun(prepared, found)
-    noise = getattr(prepared.problem.data, "identified", None)
-    rules = RULES if noise is None else WITH_KNOWN_NOISE
+    rules = WITH_KNOWN_NOISE if known.table.known_noise else RULES
     while isinstance(decision := decide(known.table, rules), Wanted):
         known = measured(prepared, found, renew, known, decision)
     return decision, known

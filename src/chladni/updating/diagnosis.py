@@ -166,6 +166,7 @@ def _called(problem: UpdatingProblem, found: Diagnosis) -> Diagnosis:
         poles=isinstance(found.null.data, Poles),
         leaning=bool(leaning(found.plain.fit)),
         families=len(families()),
+        known_noise=getattr(found.null.data, "identified", None) is not None,
     )
     tests = dict(found.tests)
     while isinstance(said := called(table), Wanted):

@@ -57,6 +57,8 @@ class MeasuredModes:
         if self.damping is None or not len(self.frequency):
             return damping
         s, modes = model.structure, self.near(model)
+        if not len(modes):
+            return damping
         found = self.pairs(outputs, model, modes)
         phi, omega = modes.shapes[:, found.model], 2 * np.pi * modes.frequency[found.model]
         loss = sp.csr_array(s.hysteretic().K.imag)
