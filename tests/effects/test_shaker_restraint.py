@@ -1,6 +1,7 @@
 """A stinger and a gauge at the drive point: limits, the full structure, and only there."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.ordinary import ordinary
+from chladni.effects.search_context import best_starts
 from chladni.effects.shaker_restraint import MOST, shaker_restraint
 from chladni.effects.surroundings import Setup, Surroundings
 from chladni.fem.assemble import structure
@@ -140,3 +142,15 @@ def test_a_gauge_is_not_on_the_scales(problem, restraint):
     added = mass_properties(restraint.apply(deck, x))[0] - mass_properties(deck)[0]
     assert_allclose(restraint.off_the_scales(x), added)
     assert restraint.weight(x)[0] == 0.0
+
+
+def test_it_begins_at_its_prior_mean_as_well(restraint):
+    """Scores about a model without a strong effect misjudge its several numbers."""
+    context = SimpleNamespace(
+        scan=object(), bases=(np.zeros(1), np.ones(1)),
+        scores=lambda effect, starts: np.arange(len(starts))[None],
+    )  # fmt: skip
+    scored, mean = best_starts(context, [restraint])
+    np.testing.assert_array_equal(scored.start, restraint.starts()[0])
+    np.testing.assert_array_equal(mean.start, [p.mean for p in restraint.parameters])
+    assert mean.base is context.bases[0]

@@ -157,7 +157,9 @@ APART = 1 / 6  # of the structure's size: least distance between places that are
 def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candidate]:
     """Candidates for effects of known place, each from the best of its starts.
 
-    With poles only, an effect of many parameters starts in each of its lowest local minima.
+    With poles only, an effect of many parameters starts in each of its lowest local minima. With
+    responses it starts at its prior mean as well: scores about a model without a strong effect say
+    little of its several numbers, and a fit that begins far from them stays there.
     """
     out: list[Candidate] = []
     for effect in effects:
@@ -167,6 +169,10 @@ def best_starts(context: SearchContext, effects: Sequence[Effect]) -> list[Candi
         starts = effect.starts()
         for scores in context.scores(effect, starts):
             out.append(Candidate(effect, starts[int(np.argmin(scores))], context.bases[-1]))
+        if len(effect.parameters) > 2:
+            mean = np.array([p.mean for p in effect.parameters])
+            if not np.array_equal(mean, out[-1].start):
+                out.append(Candidate(effect, mean, context.bases[0]))
     return out
 
 
