@@ -49,6 +49,17 @@ def test_triangles_without_area_are_left_out_and_counted(tmp_path):
     assert "1 triangles of the scan have no area" in scan.notes[0]
 
 
+MISPLACED = b"""ply
+format ascii 1.0
+element vertex 1
+property float x
+element face 1
+end_header
+0
+property list uchar int vertex_indices
+"""
+
+
 @pytest.mark.parametrize(
     ("name", "data", "sentence"),
     [
@@ -56,6 +67,7 @@ def test_triangles_without_area_are_left_out_and_counted(tmp_path):
         ("a.stl", bytes(200), "holds no triangles"),
         ("a.ply", b"garbage", "cannot be read as a triangulated surface"),
         ("a.ply", b"ply\nformat ascii 1.0\nend_header\n", "holds no triangles"),
+        ("a.ply", MISPLACED, "cannot be read as a triangulated surface"),
         ("a.step", b"ISO-10303-21;", "one of .stl, .ply, .obj"),
     ],
 )

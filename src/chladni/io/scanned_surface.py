@@ -4,6 +4,7 @@ import logging
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from struct import error
 
 import numpy as np
 
@@ -18,6 +19,15 @@ _STL_HEAD = 84  # bytes of a binary STL up to its first triangle; the last four 
 _NOT_COUNTED = re.compile(rb"(?m)^f\b[^\n]*?\s(-\d+|0+)(?=[/\s]|\Z)")
 _ELEMENT = re.compile(rb"(?m)^element +\S+ +(\d+)")
 SUFFIXES = (".stl", ".ply", ".obj")
+UNREADABLE = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    RuntimeError,
+    error,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +66,8 @@ def read_scan(path: Path, length: float = 1.0) -> ScannedSurface:
     logging.getLogger("trimesh").addHandler(logging.NullHandler())  # it logs what it passes over
     try:
         mesh = load_mesh(path, process=False)
-    except (ValueError, KeyError, IndexError, NotImplementedError) as error:
-        raise FileError(f"{path} cannot be read as a triangulated surface: {error}") from error
+    except UNREADABLE as broken:
+        raise FileError(f"{path} cannot be read as a triangulated surface: {broken}") from broken
     held = len(mesh.faces) if isinstance(mesh, Trimesh) else 0
     _refuse_cut(path, held)
     if not held:
