@@ -1,7 +1,8 @@
-"""What the identified modes say of the measuring chain: delay, quantity, units, polarity.
+"""Check the measuring chain by the identified modes: delay, quantity, units, polarity.
 
-The modal constants A_r = 2i Im(p_r) R_r of a normal mode are real. A delay τ turns them by -ω_r τ,
-a derivative too many or too few by 90 degrees and a power of ω_r; a wrong unit scales all alike.
+The modal constants A_r = 2i Im(p_r) R_r of a normal mode are real. A delay τ turns them by -ω_r τ.
+A derivative too many or too few turns them by 90 degrees and scales them by a power of ω_r. A wrong
+unit multiplies all of them by one factor.
 """
 
 from dataclasses import dataclass
@@ -73,9 +74,9 @@ def fitted_delay(omega: np.ndarray, theta: np.ndarray) -> DelayFit:
 
 
 def hinted_delay(identified: Identified) -> float:
-    """A delay that the phases of the modes hint at [s]; 0 where they do not.
+    """Return the delay that the phases of the modes suggest [s], 0 if they suggest none.
 
-    Poles of a delayed recording are bent themselves, so this is where to look again, no result.
+    A delay distorts the identified poles too. The value is a start for a second identification.
     """
     if identified.order <= LEAST_MODES:
         return 0.0
@@ -136,7 +137,7 @@ def _quarter(quantity: str) -> Finding:
 
 
 def other_quantity(identified: Identified, others: dict[str, Identified]) -> list[Finding]:
-    """The quantity as which a recording without modes is full of them.
+    """Find the quantity under which a recording without clear modes has many.
 
     Parameters
     ----------
@@ -219,9 +220,9 @@ def level_checks(
 
 
 def _derivative(size: np.ndarray, w: np.ndarray, known_gain: bool) -> tuple[int, np.ndarray]:
-    """Derivatives that the recording has too many (negative: too few), and what is left of ln|g|.
+    """Return the surplus derivatives of the recording (negative: missing) and the rest of ln|g|.
 
-    Where the level is known it says so by far: ω is hundreds of radians per second.
+    A known level shows them clearly, because ω is hundreds of radians per second.
     """
     from scipy.stats import theilslopes
 

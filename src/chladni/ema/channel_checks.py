@@ -1,4 +1,4 @@
-"""What a recording says of its own channels: dead, doubled, incoherent, reversed, reciprocal.
+"""Check the channels of a recording: dead, doubled, incoherent, reversed, reciprocal.
 
 Ewins (2000), Modal Testing, sections 3.10 and 4.2 (checks of measured FRFs).
 """
@@ -57,8 +57,8 @@ def channel_checks(
 def dead(frf: FRF, alive: Collection[str] = ()) -> tuple[list[Finding], Check]:
     """Channels far below the others, or that hold noise alone.
 
-    Noise is the variance that the recording brings. Without one it is what follows no curve, though
-    a structure that is not linear answers so as well.
+    The noise is the variance stored with the recording, otherwise the roughness of the FRF over
+    frequency. The response of a nonlinear structure is rough as well.
     """
     rms = np.sqrt((np.abs(frf.values) ** 2).mean(axis=(0, 2)))
     typical = np.median(rms)
@@ -81,7 +81,7 @@ def dead(frf: FRF, alive: Collection[str] = ()) -> tuple[list[Finding], Check]:
 
 
 def left_out(label: str) -> str:
-    """The repair of a channel that is of no use."""
+    """Return the repair that excludes a useless channel."""
     return f'in sensors.csv give {label} the cell use = "no"'
 
 
@@ -124,7 +124,7 @@ def driving_share(frf: FRF, i: int, j: int, sign: int) -> float:
 
 
 def reversed_drive(frf: FRF) -> tuple[list[Finding], Check]:
-    """The power that the force puts in is positive at every line, Re(mobility) > 0."""
+    """Check that the input power is positive at every spectral line, Re(mobility) > 0."""
     points = drive_points(frf)
     if not points:
         return [], Check("drive point", "no output is where the force acts", None)

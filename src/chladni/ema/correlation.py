@@ -1,6 +1,7 @@
-"""How alike two sets of modes, or a model's and a recording's responses, are.
+"""Correlation of two sets of modes, or of the responses of a model and a recording.
 
-Sources: Allemang (2003), Sound and Vibration 37(8), 14-23 (MAC, COMAC, FRAC);
+Sources:
+Allemang (2003), Sound and Vibration 37(8), 14-23 (MAC, COMAC, FRAC);
 Hunt (1992), IMAC X, 66-71 (enhanced COMAC);
 Echaniz Granado (2015), section 2.7.2.1 (the deviation δ and Q, eq. 4).
 """
@@ -20,8 +21,8 @@ _LN10 = np.log(10.0)
 def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     """Modal assurance criterion |φᴴψ|² / (φᴴφ ψᴴψ), every mode of Φ against every mode of Ψ.
 
-    Echaniz Granado (2015), eq. 7, prints the numerator without square and conjugate; that form
-    depends on the shapes' scale and sign, so its numbers must be those of this one.
+    Echaniz Granado (2015), eq. 7, prints the numerator without square and conjugate. That form
+    depends on scale and sign of the shapes, so its published values must come from this one.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
 
 
 def auto_mac(phi: np.ndarray) -> np.ndarray:
-    """MAC of a set with itself: off-diagonal entries say which modes the sensors cannot tell."""
+    """MAC of a set with itself: off-diagonal entries show modes the sensors cannot separate."""
     return mac(phi, phi)
 
 
@@ -60,7 +61,7 @@ def _ratio(above: np.ndarray, below: np.ndarray) -> np.ndarray:
 def subspace_mac(phi: np.ndarray, psi: np.ndarray) -> np.ndarray:
     """Share of each shape of Φ inside span Ψ, ‖QᴴΦ_r‖² / ‖Φ_r‖² with Ψ = QR (r,).
 
-    The MAC for close modes: shapes of a cluster may mix, the space they span may not.
+    Use it for close modes: the shapes of a cluster may mix, but the space that they span is kept.
 
     >>> subspace_mac(np.array([[1.0], [1.0]]), np.eye(2))
     array([1.])

@@ -1,4 +1,4 @@
-"""What the screening of a recording finds: sentences with their channels, size and repair."""
+"""Findings of the screening of a recording: sentences with channels, size and repair."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def probability(p: float) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a recording, or looks it.
+    """One fault, or possible fault, of a recording.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked at: what came out, in words; ``passed`` None: it could not be."""
+    """One check and its result in words; ``passed`` is None if the check was not possible."""
 
     name: str
     result: str
@@ -53,7 +53,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Screening:
-    """What was looked at in a recording, and what was found."""
+    """Checks of a recording and their findings."""
 
     name: str
     findings: tuple[Finding, ...] = ()
@@ -61,12 +61,12 @@ class Screening:
 
     @property
     def faults(self) -> tuple[Finding, ...]:
-        """What is to be mended before anything is fitted."""
+        """Findings to repair before any fit."""
         return tuple(f for f in self.findings if f.severity == "fault")
 
     @property
     def sentence(self) -> str:
-        """All of it in one sentence."""
+        """Summary of the findings in one sentence."""
         done = [c for c in self.checks if c.passed is not None]
         if not self.findings:
             return f"{self.name}: nothing found in {len(done)} checks"
@@ -85,14 +85,14 @@ class Screening:
         )
 
     def with_more(self, findings: Sequence[Finding], checks: Sequence[Check]) -> "Screening":
-        """The same with more of both; a channel that is known as bad is not named again."""
+        """Add findings and checks; a fault already known for a channel is not repeated."""
         known = {(f.kind, f.channels) for f in self.findings}
         fresh = tuple(f for f in findings if (f.kind, f.channels) not in known)
         return Screening(self.name, (*self.findings, *fresh), (*self.checks, *checks))
 
 
 def of_all(screenings: Sequence[Screening]) -> str:
-    """What was found in several recordings, each kind once, in one sentence; "" where nothing.
+    """Summarise the findings of several recordings in one sentence, each kind once; "" if none.
 
     >>> turned, late = Finding("reversed sign", "..."), Finding("delay", "...", "warning")
     >>> of_all([Screening("a", (turned,)), Screening("b", (turned, late)), Screening("c")])
@@ -111,7 +111,7 @@ def of_all(screenings: Sequence[Screening]) -> str:
 
 
 def notes_of_all(screenings: Sequence[Screening]) -> list[str]:
-    """One sentence a finding, said once of all recordings that have it; which, where not all."""
+    """Return one sentence per finding, with the recordings that have it if there are several."""
     where: dict[str, list[str]] = {}
     for s in screenings:
         for note in s.notes:
@@ -123,7 +123,7 @@ def notes_of_all(screenings: Sequence[Screening]) -> list[str]:
 
 
 def which(names: Sequence[str], every: Sequence[object]) -> str:
-    """Recordings by name; all of them, where it is all of three or more."""
+    """Name the recordings, or return "all n recordings" if they are all of three or more."""
     each = list(dict.fromkeys(names))
     if len(each) == len(every) > 2:
         return f"all {len(every)} recordings"

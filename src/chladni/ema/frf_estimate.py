@@ -1,4 +1,4 @@
-"""From a time recording to FRFs: what excited it, how it is cut and windowed, what is noted.
+"""Estimate FRFs from a time recording: detect the excitation, cut, apply windows and average.
 
 Ewins (2000), Modal Testing, sections 3.7 to 3.11 (excitation, windows, averages); Bendat and
 Piersol (2010), chapters 7 and 9; Pintelon and Schoukens (2012), System Identification, section 7.2.
@@ -51,7 +51,7 @@ class EstimateSettings:
 
 @dataclass(frozen=True, eq=False)
 class FrfEstimate:
-    """FRFs of a time recording, and how they came about.
+    """FRFs of a time recording, and the method of their estimation.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def refuse_unknown(settings: EstimateSettings) -> None:
 
 
 def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()) -> FrfEstimate:
-    """FRFs by the road that suits the excitation.
+    """Estimate FRFs by the method that suits the excitation.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def estimate(record: TimeRecord, settings: EstimateSettings = EstimateSettings()
 
 
 def excitation_of(record: TimeRecord) -> Excitation:
-    """What the first driven input of the recording looks like."""
+    """Classify the excitation by the input of largest power."""
     powers = (record.force**2).mean(axis=(0, 2))
     x = record.force[:, int(powers.argmax())]
     if (np.abs(x) > 0.1 * np.abs(x).max()).mean() < PULSE:
@@ -136,7 +136,7 @@ def excitation_of(record: TimeRecord) -> Excitation:
 
 
 def _is_sine(x: np.ndarray) -> bool:
-    """Whether most short stretches hold one frequency each."""
+    """Return True if most short stretches contain a single frequency."""
     n = max(256, min(4096, len(x) // 50))
     pieces = x[: len(x) // n * n].reshape(-1, n) * np.hanning(n)
     power = np.abs(np.fft.rfft(pieces)) ** 2
@@ -147,7 +147,7 @@ def _is_sine(x: np.ndarray) -> bool:
 
 
 def _onsets(x: np.ndarray) -> np.ndarray:
-    """Samples of a single stretch (1, n) where, after silence, the input begins."""
+    """Return the samples of a single stretch (1, n) at which the input starts after silence."""
     if len(x) != 1:
         return np.zeros(0, int)
     size = np.abs(x[0])
@@ -187,7 +187,7 @@ def _averaged(
 
 
 def _hammer(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
-    """Force window about each pulse, an exponential one where the response has not rung down."""
+    """Window the force about each pulse; add an exponential window if the response is cut off."""
     record = _cut(record, "hits")
     force, spoilt = _pulses(record.force)
     notes = []
@@ -215,7 +215,7 @@ def _hammer(record: TimeRecord, settings: EstimateSettings) -> FrfEstimate:
 
 
 def _pulses(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces that are zero but about their pulse, and which blocks hold a second one (b,)."""
+    """Set forces to zero outside their pulse and mark blocks that contain a second one (b,)."""
     out, spoilt = np.zeros_like(force), np.zeros(len(force), bool)
     n = force.shape[2]
     for b, block in enumerate(force):

@@ -73,7 +73,7 @@ class Identified:
 
     @property
     def inside(self) -> np.ndarray:
-        """True for poles within the band; those beside it stand for what rings next door (r,)."""
+        """True for poles within the band; the others represent modes outside it (r,)."""
         return (self.band[0] <= self.frequency) & (self.frequency <= self.band[1])
 
     @property
@@ -147,7 +147,7 @@ def identify(
 def _covariance(
     data: PoleData, solution: Solution, stated: bool, omega_max: float
 ) -> ModalCovariance:
-    """Of the solution's poles and residues, in order and in rad/s, by the noise of their spread."""
+    """Covariance of poles and residues, sorted, in rad/s, with the noise used for their spread."""
     fit, chi = solution.fit, solution.chi
     own, noise = data, max(1.0, chi) if stated else STEADY
     if not stated and chi > ROUNDING and len(fit.p):
@@ -163,7 +163,7 @@ def _covariance(
 def kept_lines(
     frf: FRF, band: tuple[float, float] | None = None, use: np.ndarray | None = None
 ) -> np.ndarray:
-    """Lines that are identified from (n_f,) bool.
+    """Select the spectral lines for the identification (n_f,) bool.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _result(
     solution: Solution,
     rule: Rule,
 ) -> Identified:
-    """Back to rad/s and labels, poles in order."""
+    """Convert a solution to rad/s and labels, with sorted poles."""
     n_out, n_in = len(frf.outputs), len(frf.inputs)
     fit, (sd_f, sd_z) = solution.fit, solution.spread
     order = np.argsort(np.abs(fit.p))
@@ -252,8 +252,8 @@ def equalised(identified: Identified, s: np.ndarray) -> np.ndarray:
     Evaluated on s = ω(ζ_e + i) it meets the undamped model Σ φ φᵀ / (ω_r² + s²) on the same
     line, with no pairing of modes. The residue φφᵀ / 2i Im p becomes φφᵀ / 2i |p|.
 
-    Poles beyond ``AWAY`` of the band stay: what they bring there hardly knows their damping, and
-    several that stand for one smooth rest are large and cancel only where they are.
+    Poles beyond ``AWAY`` of the band are not moved, because their damping hardly changes H there.
+    Several of them may represent one smooth residual with large terms that cancel only in place.
 
     Abrahamsson and Kammer (2015), IMAC XXXIII, eqs. 26.14-26.28 (damping equalisation).
     """

@@ -1,6 +1,6 @@
-"""Nonlinear elements a mode may hold, as shares of its stiffness.
+"""Nonlinear elements of a mode, relative to its stiffness.
 
-Amplitudes are over the largest that was measured, so that bounds and starts suit any object.
+Amplitudes are relative to the largest measured one, so that bounds and starts suit any object.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ POWER = (0.1, 2.5)  # of amplitude: from Coulomb's own to beyond what any joint 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of an element: positive within ``bounds``, or of either sign up to the last of them.
+    """A parameter of an element: positive within ``bounds``, or signed, up to the last of them.
 
-    What is told has ``unit`` and is the fitted one times (largest amplitude) ** ``metres``.
+    The reported value, in ``unit``, is the fitted one times (largest amplitude) ** ``metres``.
     """
 
     name: str
@@ -45,23 +45,23 @@ class BasicElement:
 
 @dataclass(frozen=True)
 class Element:
-    """Pieces side by side; without any the mode is linear. The first says what it means."""
+    """Basic elements in parallel; none: a linear mode. The first one determines the kind."""
 
     pieces: tuple[BasicElement, ...]
 
     @property
     def name(self) -> str:
-        """What a test engineer calls it."""
+        """Name in the terms of a test engineer."""
         return " and ".join(p.name for p in self.pieces) or "linear"
 
     @property
     def kind(self) -> Kind:
-        """What its presence means."""
+        """Kind of nonlinearity that it indicates."""
         return self.pieces[0].kind if self.pieces else "linear"
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """Those of all pieces."""
+        """Parameters of all pieces."""
         return tuple(n for p in self.pieces for n in p.numbers)
 
     def kappa(self, amplitude: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """One mode's frequency and damping against amplitude, explained by a nonlinear element.
 
-Single-nonlinear-mode method: about its resonance the mode is one oscillator whose stiffness is
-k (1 + κ(A)), κ the element's describing function (Szemplińska-Stupnicka 1979; Göge, Sinapius,
-Füllekrug and Link 2005, for modal tests at several levels).
+Single-nonlinear-mode method: near resonance the mode is one oscillator of stiffness k (1 + κ(A)).
+κ is the describing function of the element. Sources: Szemplińska-Stupnicka (1979); Göge, Sinapius,
+Füllekrug and Link (2005), for modal tests at several levels.
 """
 
 from collections.abc import Sequence
@@ -71,10 +71,11 @@ class ElementFit:
 def _with(
     element: Element, a: np.ndarray, s: np.ndarray | float, values: np.ndarray, damping: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """f/f_0 = √(1 + κ') and ζ = ζ_0 f_0/f + κ''/2 (f_0/f)²; the viscous part stays as it is.
+    """f/f_0 = √(1 + κ') and ζ = ζ_0 f_0/f + κ''/2 (f_0/f)²; the viscous part is constant.
 
-    The mean over relative amplitudes of mean a and standard deviation s, by the two points a ± s:
-    what lines of one peak show on average, where a slider gives way or a gap closes among them.
+    Relative amplitudes have mean a and standard deviation s; the mean of f and ζ uses the two
+    points a ± s. It approximates the average over the spectral lines of one peak. Among these
+    lines a slider may begin to slide, or a gap may close.
     """
     kappa = element.kappa(np.maximum([a - s, a + s], 1e-9), values)
     f = np.sqrt(np.maximum(1 + kappa.real, 1e-6))
@@ -90,9 +91,9 @@ def weights(mode: ModeLevels) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
-    """Every element that the levels can bear, fitted to them; best (by BIC) first.
+    """Fit every element for which there are enough levels; return the best (by BIC) first.
 
-    What dissipates is tried where damping moves.
+    Elements that dissipate are fitted only if the damping changes.
     """
     if len(set(mode.level)) < LEAST:
         return ()
@@ -103,7 +104,7 @@ def fitted_elements(mode: ModeLevels) -> tuple[ElementFit, ...]:
 
 
 def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
-    """The best of fits from the best starts."""
+    """Fit an element from its best starting values and keep the best fit."""
     largest = float(mode.amplitude.max())
     s_f, s_z = weights(mode)
     a, s = mode.amplitude / largest, mode.amplitude_sd / largest
@@ -142,7 +143,7 @@ def _fitted(element: Element, mode: ModeLevels) -> ElementFit:
 
 
 def _bounds(element: Element, signed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of θ: logarithms of positive numbers, signed ones as they are."""
+    """Bounds of θ: logarithms of positive parameters; signed ones without a logarithm."""
     ends = np.array([n.bounds for n in element.numbers]).reshape(-1, 2)
     low = np.where(signed, -ends[:, 1] / 2, np.log(np.where(signed, 1.0, ends[:, 0])))
     return low, np.where(signed, ends[:, 1], np.log(ends[:, 1]))
@@ -150,14 +151,14 @@ def _bounds(element: Element, signed: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class HeldOutLevels:
-    """Levels that no fit saw: what was measured there, and what was foretold.
+    """Held-out levels: predictions at their measured amplitudes.
 
     Attributes
     ----------
     rows : (m,)                    positions among the levels of the mode
-    fit : the best element by the levels that were seen
-    frequency, damping : (m,)      foretold at the measured amplitude [Hz], of critical
-    mean : (f, ζ)                  of the levels that were seen: what one linear model says
+    fit : the best element by the fitted levels
+    frequency, damping : (m,)      predicted at the measured amplitude [Hz], of critical
+    mean : (f, ζ)                  of the fitted levels: the prediction of one linear model
     """
 
     rows: np.ndarray
@@ -167,7 +168,7 @@ class HeldOutLevels:
     mean: tuple[float, float]
 
     def misses(self, mode: ModeLevels) -> tuple[float, float, float, float]:
-        """Rms of ln f and ln ζ foretold over measured, then of the mean over measured."""
+        """Rms of ln (predicted / measured) of f and ζ, then of ln (mean / measured)."""
         f, z = mode.frequency[self.rows], mode.damping[self.rows]
         off = (self.frequency / f, self.damping / z, self.mean[0] / f, self.mean[1] / z)
         a, b, c, d = (float(np.sqrt((np.log(x) ** 2).mean())) for x in off)
@@ -175,7 +176,7 @@ class HeldOutLevels:
 
 
 def foretold(mode: ModeLevels, held: Sequence[int] | None = None) -> HeldOutLevels | None:
-    """The levels between, foretold by an element chosen and fitted on the others.
+    """Predict held-out levels by an element chosen and fitted on the others.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from .response_variance import frf_variance, left_scatter
 from .setup import Control
 
 PARTNER = 0.05  # of a frequency: farther away is another mode
-STANDS_OUT = 3.0  # of χ² a pole must bring, over what it pays, to be followed
+STANDS_OUT = 3.0  # fall of χ² due to a pole over its required gain, for a mode to be followed
 KNOWN = 0.5  # standard deviation over its damping: a mode of which less is known is not followed
 NEAR = 5.0  # half-bandwidths of the level's own pole: lines beyond are another mode's
 ABOUT = 0.75  # of a peak: lines above are averaged; there D is known best
@@ -44,17 +44,17 @@ class AtLevel:
 
     @cached_property
     def variance(self) -> np.ndarray:
-        """Of every sample of the FRF (n_f, n_out, n_in), once for all modes that are followed."""
+        """Variance of every FRF sample (n_f, n_out, n_in), computed once for all modes."""
         return frf_variance(self.frf, self.averages)
 
     @property
     def stated(self) -> bool:
-        """Whether the recording itself says how large its noise is."""
+        """True if the recording states its noise, as a variance or a coherence."""
         return self.frf.variance is not None or self.frf.coherence is not None
 
     @cached_property
     def left(self) -> tuple[np.ndarray, np.ndarray]:
-        """a², b² (n_out, n_in) of noise a²|H|² + b²: what its modes leave, where nobody says it."""
+        """a², b² (n_out, n_in) of the noise a²|H|² + b², from the residual of the modes."""
         low, high = self.modes.band
         f, H = self.frf.frequency, self.frf.values
         near = (low <= f) & (f <= high)
@@ -99,27 +99,27 @@ class ModeLevels:
 
     @property
     def p_frequency(self) -> float:
-        """Chance of frequencies so far apart, were they the same."""
+        """Probability of such a scatter of frequencies if they were equal."""
         return _p(self.frequency, self.frequency_own)
 
     @property
     def p_damping(self) -> float:
-        """Chance of dampings so far apart, were they the same."""
+        """Probability of such a scatter of damping ratios if they were equal."""
         return _p(self.damping, self.damping_own)
 
     @property
     def frequency_moves(self) -> bool:
-        """Whether the natural frequency goes with the level."""
+        """True if the natural frequency changes with the level."""
         return self.p_frequency < CHANCE and _range(self.frequency) > MOVED_FREQUENCY
 
     @property
     def damping_moves(self) -> bool:
-        """Whether the damping goes with the level."""
+        """True if the damping changes with the level."""
         return self.p_damping < CHANCE and _range(self.damping) > MOVED_DAMPING
 
     @property
     def moves(self) -> bool:
-        """Whether either does."""
+        """True if frequency or damping changes with the level."""
         return self.frequency_moves or self.damping_moves
 
 
@@ -139,7 +139,7 @@ def _range(value: np.ndarray) -> float:
 
 
 def modes_over_levels(recordings: Sequence[AtLevel]) -> tuple[ModeLevels, ...]:
-    """The modes that are found at two levels or more; those of the lowest level are followed."""
+    """Follow the modes of the lowest level; return the modes found at two levels or more."""
     known = sorted((r for r in recordings if r.level), key=lambda r: r.level or 0.0)
     if len({r.level for r in known}) < 2:
         return ()
@@ -178,7 +178,7 @@ def _track(
 
 
 def _partner(first: Identified, mode: int, other: Identified) -> int | None:
-    """The mode of another level that is this one: the nearest of its shape, and it of that."""
+    """Return the partner at another level: each is the nearest mode of the other with its shape."""
     alike = alike_shapes(first, other) & _clear(first)[:, None] & _clear(other)[None, :]
     far = np.abs(np.log(other.frequency[None, :] / first.frequency[:, None]))
     far = np.where(alike & (far < PARTNER), far, np.inf)
@@ -191,9 +191,9 @@ Seen = tuple[float, float, float, float, float, float, float, float]  # as `Mode
 
 
 def _pole(one: AtLevel, k: int, i: int, j: int) -> Seen:
-    """Of a mode under a held response, as of its lines below: all have one amplitude and one pole.
+    """Amplitude, frequency and damping under a held response; all lines share amplitude and pole.
 
-    What was held is the response of the drive point, else of the first output.
+    The held response is that of the drive point, otherwise that of the first output.
     """
     m, drive = one.modes, one.modes.inputs[j]
     held = m.outputs.index(drive) if drive in m.outputs else 0
@@ -207,14 +207,15 @@ def _pole(one: AtLevel, k: int, i: int, j: int) -> Seen:
 def _lines(
     first: Identified, mode: int, one: AtLevel, noise: np.ndarray, pole: complex, i: int, j: int
 ) -> Seen:
-    """A mode at a level by the lines about its peak, the amplitude that of output i.
+    """Estimate a mode at a level from the lines about its peak; the amplitude is that of output i.
 
-    Under a constant force every line has an amplitude of its own, a peak leans, and one pole would
-    call that damping. So lines are asked, not the pole: with the residue R and all else as the
-    lowest level has them, y = Rᴴ (H - rest) of input j gives D = 2i ω_d RᴴR / y, which is
-    ω_r² (1 + κ') - ω² + i (2 ζ ω_r ω + ω_r² κ'') at that line's amplitude (inverse of the FRF:
-    Worden and Tomlinson 2001, section 2.2). Lines about the peak are averaged, amplitudes too.
-    What the lowest level is not sure of is in the spread of every level.
+    Under a constant force every line has its own amplitude. The peak leans, and one pole would
+    represent this as damping. Therefore each line is evaluated by itself. Residue R and all other
+    modes are those of the lowest level. With y = Rᴴ (H - rest) of input j, D = 2i ω_d RᴴR / y.
+    It equals ω_r² (1 + κ') - ω² + i (2 ζ ω_r ω + ω_r² κ'') at the amplitude of that line (inverse
+    of the FRF: Worden and Tomlinson 2001, section 2.2). The result averages the lines about the
+    peak and their amplitudes.
+    The spread of every level includes the uncertainty of the lowest one.
     """
     omega, y, variance = _modal_lines(first, mode, one, noise, pole, j)
     top = _about_peak(np.abs(y))
@@ -243,9 +244,9 @@ def _lines(
 def _spread_of_reference(first: Identified, mode: int, j: int) -> np.ndarray:
     """Covariance (2, 2) of real and imaginary part of δ ln D = Rᴴ δR / RᴴR + δω_d / ω_d.
 
-    That is what the pole and the residues R of the lowest level leave in D = 2i ω_d RᴴR / y, y = Rᴴ
-    (H - rest), at any level; zero of modes without a covariance. What they leave in ``rest`` is
-    small beside the peak.
+    It is the error of D = 2i ω_d RᴴR / y, y = Rᴴ (H - rest), at any level. The cause is the error
+    of pole and residues R of the lowest level. It is zero for modes without a covariance. The
+    error of ``rest`` is small compared with the peak.
     """
     if first.covariance is None:
         return np.zeros((2, 2))
@@ -261,8 +262,8 @@ def _spread_of_reference(first: Identified, mode: int, j: int) -> np.ndarray:
 def _noise(lowest: AtLevel, one: AtLevel) -> np.ndarray:
     """Variance of every sample of a level (n_f, n_out, n_in).
 
-    It is no less than what the lowest level leaves, where the object is nearest to linear; where
-    the recordings state none it is that.
+    It is at least the residual of the lowest level, where the object is nearest to linear. If the
+    recordings state no noise, it equals that residual.
     """
     if one.stated and lowest.stated:
         return max(1.0, lowest.modes.chi) ** 2 * one.variance

@@ -1,4 +1,4 @@
-"""What levels of excitation tell: is the object linear, and if not, what its modes are known by."""
+"""Study of several excitation levels: is the object linear, and which element explains a change."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ EFFECT: dict[Signature, str] = {"friction": "joint-friction", "clearance": "ratt
 REPEATED = 0.01  # chance of runs that differ so much, below which levels are why they do
 ALIKE = 0.05  # of a drift: as near do modes follow it (E falls with warmth as rho does not)
 POOR = 0.01  # chance of a right element's χ², below which an element explains nothing
-AS_GOOD = 6.0  # of BIC (e^3): elements nearer than that are not told apart (Kass and Raftery 1995)
+AS_GOOD = 6.0  # of BIC (e^3): elements nearer than that are not separated (Kass and Raftery 1995)
 SETTLED_BY = (
     "measure the lowest level once more at the end: other frequencies there are a drift of the "
     "object (warmth, a bolt that settles), the same are the level's doing"
@@ -56,14 +56,14 @@ SETTLED_BY = (
 
 @dataclass(frozen=True, eq=False)
 class ModeStudy:
-    """One mode over levels and what that is a sign of.
+    """One mode over levels and the nonlinearity that it indicates.
 
     Attributes
     ----------
     mode : ModeLevels
     signature : Signature
     fits : elements fitted to all levels, best first; none where they are fewer than three
-    held_out : levels between, foretold from the others; None where they are fewer than four
+    held_out : intermediate levels, predicted from the others; None for fewer than four levels
     """
 
     mode: ModeLevels
@@ -79,7 +79,7 @@ class ModeStudy:
 
     @property
     def as_good(self) -> tuple[str, ...]:
-        """Other elements that the levels do not tell from the best."""
+        """Other elements that the levels cannot separate from the best one."""
         best = self.explained
         others = self.fits[1:] if best is not None else ()
         return tuple(f.element.name for f in others if best and f.bic < best.bic + AS_GOOD)
@@ -94,17 +94,17 @@ class LevelStudy:
 
     @property
     def moving(self) -> tuple[ModeStudy, ...]:
-        """Modes whose frequency or damping goes with the level; none where all of them drifted."""
+        """Modes whose frequency or damping changes with the level; none if all of them drifted."""
         return () if self.drift else tuple(m for m in self.modes if m.signature not in CALM)
 
     @property
     def nonlinear(self) -> bool:
-        """Whether any mode goes with the level."""
+        """True if any mode changes with the level."""
         return bool(self.moving)
 
 
 def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
-    """Follow the modes over levels, say what moves, and what would move so.
+    """Follow the modes over levels, find those that change, and fit elements to them.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def level_study(recordings: Sequence[AtLevel]) -> LevelStudy:
 
 
 def _overlapped(one: ModeStudy, every: Sequence[ModeStudy]) -> bool:
-    """Whether a mode moves beside one that moves too and is better explained, or larger."""
+    """Return True if a changing mode overlaps a changing one that is better explained or larger."""
     return one.signature not in CALM and any(
         other is not one
         and other.signature not in CALM
@@ -134,15 +134,15 @@ def _hertz(one: ModeStudy) -> tuple[float, float]:
 
 
 def _weight(one: ModeStudy) -> tuple[bool, int, float]:
-    """Whether an element explains it; at how many levels it was found; how far it swings."""
+    """Return (explained by an element, number of levels, amplitude at the lowest) for ranking."""
     return one.explained is not None, len(one.mode.level), float(one.mode.amplitude[0])
 
 
 def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:
-    """The same of free decays: each falls through levels of its own, its amplitudes [m].
+    """Study free decays as levels: the levels of each are its own falling amplitudes [m].
 
-    Stretches of a decay are taken to be as well known as runs repeat to. A neighbour that beats
-    moves them as well, so that nothing is a sign of anything but what an element explains.
+    Each stretch of a decay has the uncertainty of the repeatability between runs. Beating with a
+    neighbour also changes it. Therefore a change counts only if an element explains it.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def decay_study(decays: Sequence[RingDown], quantity: Quantity) -> LevelStudy:
 
 
 def _falling(decay: RingDown, quantity: Quantity) -> ModeLevels:
-    """A decay as levels that rise."""
+    """Convert a decay to rising levels."""
     rise = np.argsort(decay.amplitude)
     f, zeta = decay.frequency_at[rise], decay.damping_at[rise]
     A = decay.amplitude[rise] / (2 * np.pi * decay.frequency) ** DERIVATIVES[quantity]
@@ -184,7 +184,7 @@ def _p_of_runs(mode: ModeLevels) -> float:
 
 
 def _of(fit: ElementFit) -> Signature:
-    """What an element is a sign of."""
+    """Return the signature of an element."""
     kind = fit.element.kind
     if kind == "cubic":
         return "stiffening" if fit.values[0] > 0 else "softening"
@@ -192,7 +192,7 @@ def _of(fit: ElementFit) -> Signature:
 
 
 def _trend(mode: ModeLevels) -> Signature:
-    """What the lowest and the other levels are a sign of, without any element."""
+    """Return the signature by the trend from the lowest level, without any element."""
     f = mode.frequency
     softer = mode.frequency_moves and f[1:].min() / f[0] < 1 - 5e-4
     if mode.damping_moves:
@@ -201,9 +201,9 @@ def _trend(mode: ModeLevels) -> Signature:
 
 
 def _drifts(modes: Sequence[ModeLevels]) -> bool:
-    """Whether all modes move by one factor a level and keep their damping: warmth, not level.
+    """Return True if all modes change by one factor per level and keep their damping (warming).
 
-    ln f_r(level) = a_r + d(level) is fitted to the modes seen at every level, and must hold.
+    The model ln f_r(level) = a_r + d(level) is fitted to modes seen at every level. It must fit.
     """
     most = max((len(m.level) for m in modes), default=0)
     whole = [m for m in modes if len(m.level) == most]

@@ -1,4 +1,4 @@
-"""A study of levels as plain numbers: what pages show and JSON holds (SI, Hz)."""
+"""Study of levels as plain numbers for report pages and JSON (SI, Hz)."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,10 @@ NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 
 @dataclass(frozen=True)
 class LevelRow:
-    """A mode at one level: measured, by the best element, and foretold where it was held out.
+    """A mode at one level: measured, by the best element, and predicted if it was held out.
 
-    ``stiffness`` and ``loss`` are what the element adds at that amplitude, κ' and κ'' over the
-    stiffness of the mode. ``..._low`` and ``..._high`` are 95 % intervals by the recording's noise.
+    ``stiffness`` and ``loss`` are the effect of the element at that amplitude: κ' and κ'' over the
+    stiffness of the mode. ``..._low`` and ``..._high`` bound the 95 % interval due to noise.
     """
 
     level: float
@@ -67,8 +67,8 @@ class LevelTable:
 
     Attributes
     ----------
-    sentence : what it does and what that is a sign of; "" where it does nothing
-    explained : whether the first element explains it
+    sentence : its change with level and the nonlinearity indicated; "" if it does not change
+    explained : True if the first element explains it
     rows, elements : levels rising; elements, best first
     foretold_by : the element chosen and fitted without the levels that were held out
     mean_hz, mean_damping : of the levels it was fitted to: one linear model

@@ -7,7 +7,7 @@ from .level_study import CALM, MEANING, SETTLED_BY, LevelStudy, ModeStudy
 
 
 def level_notes(study: LevelStudy) -> list[str]:
-    """A sentence a mode that moves, else one that none does; nothing where levels are too few."""
+    """Return a sentence per changing mode, or one that none changes; [] if levels are too few."""
     if not study.modes:
         return []
     said = ", ".join(f"{x:g}" for x in sorted({x for m in study.modes for x in m.mode.level}))
@@ -24,7 +24,7 @@ def level_notes(study: LevelStudy) -> list[str]:
 
 
 def mode_sentence(study: ModeStudy) -> str:
-    """What a mode does over levels, what that is a sign of, and what was foretold."""
+    """Describe the change of a mode over levels, its signature, and the prediction."""
     m = study.mode
     at = f"{m.level[0]:g} to {m.level[-1]:g}"
     what = []
@@ -42,7 +42,7 @@ def mode_sentence(study: ModeStudy) -> str:
 
 
 def _elements(study: ModeStudy) -> str:
-    """What fits, what fits as well, and how levels that no fit saw were foretold."""
+    """Name the element that fits, its equals, and the prediction of held-out levels."""
     best = study.explained
     if study.signature in CALM:
         return ""
@@ -60,7 +60,7 @@ def _elements(study: ModeStudy) -> str:
 
 
 def held_out_sentence(study: ModeStudy) -> str:
-    """How well the levels between were foretold, beside what one linear model says."""
+    """Compare the prediction of held-out levels with that of one linear model."""
     held = study.held_out
     if held is None:
         return ""

@@ -1,8 +1,8 @@
-"""What a MAC is worth: what noise leaves of it, what chance reaches, what neighbours share.
+"""Significance of a MAC value: limit by noise, probability by chance, share of near modes.
 
-A MAC can be had as high as one pleases by leaving channels out (Echaniz Granado 2015, section
-5.1.4, has 0.77 on all, 0.96 on ten). Here channels go by a rule that does not look at the model,
-and the result stands beside what random shapes reach by the same rule.
+Removal of channels can raise a MAC to any value. Echaniz Granado (2015), section 5.1.4, has 0.77 on
+all, 0.96 on ten. Here channels are removed by a rule that does not use the model. The result is
+compared with the value that random shapes reach by the same rule.
 """
 
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ class Likeness:
 def likeness(
     phi: np.ndarray, psi: np.ndarray, covariance: np.ndarray, model: int, near: np.ndarray
 ) -> Likeness:
-    """Of one mode of the test and one of the model.
+    """Compare one mode of the test with one of the model.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def _mac(a: np.ndarray, b: np.ndarray) -> float:
 def effective_channels(phi: np.ndarray) -> float:
     """Number of independent channels of shapes like these, (tr Σ)² / tr Σ², Σ = Σ_r φφᵀ/φᵀφ.
 
-    Channels that move together in every mode count as one; n channels and m modes have no more than
-    the smaller of both.
+    Channels that move together in every mode count as one. The number is at most the smaller one of
+    n channels and m modes.
 
     >>> effective_channels(np.eye(4))
     4.0

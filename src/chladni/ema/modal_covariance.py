@@ -1,10 +1,10 @@
-"""Covariance of identified poles, residues and shapes: what the noise leaves them.
+"""Covariance of identified poles, residues and shapes, due to noise.
 
-Of the weighted least-squares problem w(H - Φ(p) x_c) over all channels c, poles p common, residues
-x_c of each channel: δp has the inverse of the Gauss-Newton matrix with the residues eliminated,
-δx_c = D_c δp + (ΦᵀW²Φ)⁻¹ΦᵀW e_c, D_c = dx_c/dp (Golub and Pereyra 1973; Pintelon and Schoukens
-2012, System Identification, section 9.12). So C = local + root rootᵀ with a root of as many columns
-as there are unknowns of poles, and no matrix of all residues is ever formed.
+The weighted least-squares problem is w(H - Φ(p) x_c) over all channels c. The poles p are common;
+each channel has its residues x_c. Cov δp is the inverse of the Gauss-Newton matrix with the
+residues eliminated. δx_c = D_c δp + (ΦᵀW²Φ)⁻¹ΦᵀW e_c, D_c = dx_c/dp (Golub and Pereyra 1973;
+Pintelon and Schoukens 2012, System Identification, section 9.12). Therefore C = local + root rootᵀ.
+The root has one column per real unknown of the poles. No matrix of all residues is formed.
 """
 
 from dataclasses import dataclass, replace
@@ -35,8 +35,8 @@ class ModalCovariance:
     Attributes
     ----------
     pole : (r, 2, m)           L, roots: Cov(p_i, p_j) = L_i L_jᵀ [rad/s]
-    shared : (r, n_c, 2, m)    S: what poles that are uncertain do to all residues at once
-    local : (r, n_c, 2, 2)     Cov e: what a channel's own noise does to its residue
+    shared : (r, n_c, 2, m)    S: effect of the uncertain poles on all residues together
+    local : (r, n_c, 2, 2)     Cov e: effect of a channel's own noise on its residue
     """
 
     pole: np.ndarray
@@ -56,7 +56,7 @@ class ModalCovariance:
 
 
 def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float) -> ModalCovariance:
-    """All modes at once.
+    """Compute the covariance of all modes.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def modal_covariance(data: PoleData, p: np.ndarray, x: np.ndarray, noise: float)
 
 
 def _inverse_root(H: np.ndarray) -> np.ndarray:
-    """L with L Lᵀ = H⁻¹; directions that are not known at all have none."""
+    """L with L Lᵀ = H⁻¹; unobservable directions are left out."""
     if not len(H):
         return H
     d = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))

@@ -1,4 +1,4 @@
-"""Which mode of the model is which mode of the test."""
+"""Pairing of the modes of the model with the modes of the test."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from ..errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class ModePairs:
-    """Positions that belong together, in order of the test's frequency, and who stays alone.
+    """Positions of paired modes, in order of the test's frequency, and of modes without partner.
 
     Attributes
     ----------
@@ -40,9 +40,9 @@ def pair(
     """One-to-one pairing of modes.
 
     With shapes: the assignment of largest Σ MAC - (Δ ln f / 4 width)² (Hungarian method, Kuhn
-    1955); pairs below ``least_mac`` are dissolved, and the farther apart in frequency, the more
-    alike two modes must be (0.95 at ``farthest``). Without: the cheapest *monotone* path with
-    free skips (Needleman and Wunsch 1970), so modes a test could not see do not shift the rest.
+    1955). Pairs below ``least_mac`` are separated. The least MAC increases with the distance in
+    frequency (0.95 at ``farthest``). Without shapes: the cheapest *monotone* path with free skips
+    (Needleman and Wunsch 1970). Modes that a test could not see then do not shift the rest.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def pair(
 def _assigned(
     gap: np.ndarray, mac: np.ndarray, width: float, least: float, farthest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Hungarian assignment; what is not alike or too far off is dissolved."""
+    """Hungarian assignment; pairs of low MAC or large distance are separated."""
     from scipy.optimize import linear_sum_assignment
 
     due = least + max(0.95 - least, 0.0) * np.abs(gap) / farthest
@@ -101,8 +101,8 @@ def _aligned(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cheapest monotone path; both sides in order of frequency.
 
-    A common factor between model and test (a wrong modulus) is free: the path is sought about
-    several of them, and the cheapest wins.
+    A common factor between model and test (a wrong modulus) costs little. The path is computed for
+    several factors, and the cheapest is used.
     """
     if gap.size == 0:
         return np.zeros(0, int), np.zeros(0, int)
