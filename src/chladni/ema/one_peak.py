@@ -1,4 +1,4 @@
-"""Poles that stand in one peak and move alike: what shapes a peak that no single pole has."""
+"""Poles of similar shape within one peak: the peak does not fit a single pole."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,7 +13,7 @@ TWIN = 1.5  # half-bandwidths: poles of one shape nearer than that are one mode
 
 
 def alike_shapes(a: Identified, b: Identified) -> np.ndarray:
-    """Whether modes of two recordings are of one shape, as far as channels tell (r_a, r_b)."""
+    """Compare the shapes of modes of two recordings; True if similar or unknown (r_a, r_b)."""
     if (a.outputs, a.inputs) != (b.outputs, b.inputs) or len(a.outputs) * len(a.inputs) < 3:
         return np.ones((a.order, b.order), bool)
     return mac(a.by_channel.T, b.by_channel.T) > SAME_SHAPE
@@ -33,9 +33,9 @@ def peaks(found: Identified) -> Iterator[np.ndarray]:
 
 
 def twins_joined(found: Identified) -> Identified:
-    """Poles of one peak made one mode, of the residues of all.
+    """Merge the poles of each peak into one mode with the sum of their residues.
 
-    A peak that leans is fitted better by two poles than by one; neither has its residue.
+    Two poles fit a leaning peak better than one, but neither has the residue of the mode.
     """
     residues, kept = found.residues.copy(), np.zeros(found.order, bool)
     for first, *twins in peaks(found):
@@ -45,7 +45,7 @@ def twins_joined(found: Identified) -> Identified:
 
 
 def peak_notes(found: Identified) -> list[str]:
-    """A sentence a peak that several poles shape."""
+    """Return one sentence for each peak with several poles."""
     out = []
     for several in peaks(found):
         if len(several) > 1:

@@ -1,8 +1,8 @@
-"""Poles beside the band: what rings next door, told so finely that it bends no mode inside.
+"""Poles outside the band: they represent outer modes, so that these do not distort inner ones.
 
-Inside, a mode beyond the band is a smooth curve. The residual terms L / s² and U hold its first
-order; where lines are many the rest stands out of the noise, and the poles inside would take it
-up. So poles stand beside the band, as many as pay. They are no modes by themselves.
+Within the band, a mode outside it is a smooth curve. The residual terms L / s² and U represent its
+first order. With many spectral lines the rest exceeds the noise and would distort the inner poles.
+Therefore outer poles are added, as many as reduce χ² by their cost. They are not modes.
 """
 
 import numpy as np
@@ -24,10 +24,10 @@ def outside(data: PoleData, p: np.ndarray) -> np.ndarray:
 
 
 def with_outer_poles(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit, PoleSystem]:
-    """All poles polished, beside the band those that pay and no others.
+    """Polish all poles and keep the outer ones that reduce χ² by their cost.
 
-    Of ``p`` those nearer to the band than the first of ``ABOVE`` and ``BELOW`` stay; farther ones
-    served a part of the band, and are begun anew.
+    Outer poles of ``p`` nearer to the band than the first of ``ABOVE`` and ``BELOW`` are kept.
+    Farther ones served only a part of the band and are replaced by new starting values.
     """
     f, size = np.abs(data.s), np.abs(p)
     inner = p[~outside(data, p)]
@@ -44,9 +44,9 @@ def with_outer_poles(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit
 
 
 def _idle(data: PoleData, fit: PoleFit, inner: int, rule: Rule) -> int | None:
-    """Of the poles from ``inner`` on that which pays least, if less than its price, or is inside.
+    """Return the outer pole (from ``inner`` on) of least gain, if below its cost or in the band.
 
-    One that came inside is no mode: those were sought band by band.
+    A pole that moved inside is not a mode, because modes were searched band by band.
     """
     gain = np.where(outside(data, fit.p), fit.delta_chi2, 0.0)[inner:]
     if not len(gain) or gain.min() >= rule.after(data, fit).price:

@@ -1,7 +1,7 @@
 """FRFs of periodic excitation: whole periods, only the lines that are driven, no window.
 
-Lines between them that answer nevertheless were made by the structure: of an odd multisine even
-lines hold even distortion (Pintelon and Schoukens 2012, System Identification, section 4.3).
+A response at undriven lines comes from the structure. With an odd multisine, even lines contain
+even distortion (Pintelon and Schoukens 2012, System Identification, section 4.3).
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ ABOUT = 9  # lines
 
 
 def is_periodic(record: TimeRecord) -> bool:
-    """Whether every block of the recording is a period of one signal."""
+    """Return True if every block of the recording is a period of one signal."""
     if len(record.force) < 2:
         return False
     F = np.fft.rfft(record.force)[:, :, 1:]
@@ -28,12 +28,12 @@ def is_periodic(record: TimeRecord) -> bool:
 
 
 def of_periods(record: TimeRecord, method: Estimator) -> tuple[FRF, float, str]:
-    """FRF at the driven lines, averages, and what the other lines hold, in words.
+    """Estimate the FRF at the driven lines; return averages and a sentence on the other lines too.
 
     Raises
     ------
     FileError
-        If there is more than one input, or hardly a line is driven.
+        If there is more than one input, or too few lines are driven.
     """
     if len(record.inputs) > 1:
         raise FileError("periodic excitation drives one input at a time; give each its own file")
@@ -55,7 +55,7 @@ def of_periods(record: TimeRecord, method: Estimator) -> tuple[FRF, float, str]:
 
 
 def _between(f: np.ndarray, power: np.ndarray, driven: np.ndarray) -> str:
-    """How strong undriven lines answer, within the driven band."""
+    """Describe the response at undriven lines within the driven band."""
     inside = np.arange(driven[0], driven[-1] + 1)
     idle = np.setdiff1d(inside, driven)
     said = f"{len(driven)} driven lines from {f[driven[0]]:.4g} to {f[driven[-1]]:.4g} Hz"

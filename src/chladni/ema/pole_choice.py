@@ -1,4 +1,4 @@
-"""Poles chosen otherwise than by what they pay: by the order of a state space, or by hand."""
+"""Poles chosen without the χ² criterion: by the order of a state space, or by hand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,7 +26,7 @@ COMBINATIONS = 24  # of channels
 
 
 def by_subspace(data: PoleData, rule: Rule, stated: bool, states: int) -> Solution:
-    """All lightly damped poles of the order asked for, residues and residual terms refitted.
+    """Take all lightly damped poles of the given order; refit residues and residual terms.
 
     Echaniz Granado (2015), section 5.1: the order is chosen by the user, twins and all.
 
@@ -51,10 +51,10 @@ def edited(
     drop: Sequence[float],
     pick: Sequence[float],
 ) -> Solution:
-    """Without the poles nearest to ``drop``, with ones begun at ``pick`` [Hz].
+    """Remove the poles nearest to ``drop`` and add poles started at ``pick`` [Hz].
 
-    ``f_max`` is the frequency that scaled s. Those beside the band are sought anew: left alone they
-    would come in and take the place of one that was dropped.
+    ``f_max`` is the frequency that scaled s. Poles outside the band are searched again. Otherwise
+    one could move inside and replace a removed pole.
     """
     p = solution.fit.p[~outside(data, solution.fit.p)]
     for f in drop:
@@ -84,7 +84,7 @@ def _nearest(p: np.ndarray, f: float, f_max: float) -> int:
 
 
 def _solution(data: PoleData, fit: PoleFit, slope: PoleSystem, stated: bool) -> Solution:
-    """With the spread, by the noise stated or by that which is left."""
+    """Add the spread, from the stated noise or from the residual."""
     chi = chi_of(data, fit)
     if stated or chi < ROUNDING:
         noise = max(1.0, chi) if stated else STEADY

@@ -49,7 +49,7 @@ class Solution:
 def searched(
     data: PoleData, rule: Rule, stated: bool, orders: tuple[int, ...] = ORDERS, tries: int = 12
 ) -> Solution:
-    """The poles that pay; ``stated``: the weights are the recording's own, not assumed."""
+    """Search the significant poles; ``stated``: the recording states its noise."""
     fit, slope = selected(data, orders, rule, tries)
     if chi_of(data, fit) > UNSETTLED and orders == ORDERS:
         other = selected(data, OTHERS, rule, tries)
@@ -63,7 +63,7 @@ def searched(
 def selected(
     data: PoleData, orders: tuple[int, ...], rule: Rule, tries: int
 ) -> tuple[PoleFit, PoleSystem]:
-    """A sweep over orders, then the poles that pay, polished; those beside the band as well."""
+    """Sweep over orders, then polish the significant poles, inside and outside the band."""
     sweep = swept(data, orders, rule.largest)
     fit, slope = settled(data, start(data, sweep, rule), rule)
     fit, slope = extended(data, fit, slope, rule, tries)
@@ -77,10 +77,10 @@ def selected(
 def with_those_beside(
     data: PoleData, alone: tuple[PoleFit, PoleSystem], rule: Rule
 ) -> tuple[PoleFit, PoleSystem]:
-    """The solution with poles beside the band, where these leave little but noise.
+    """Add poles outside the band if the residual is then close to the noise.
 
-    All its own stay. Where much is left with them it is not what rings next door: of a peak that
-    leans they would make a smooth rest, of a pole taken out by hand another pole.
+    All inner poles are kept. A large residual shows a cause other than outer modes. The outer poles
+    would then hide a leaning peak, or replace a pole removed by hand.
     """
     found = with_outer_poles(data, alone[0].p, rule)
     if chi_of(data, found[0]) > UNSETTLED:
@@ -89,10 +89,10 @@ def with_those_beside(
 
 
 def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int) -> Solution:
-    """The poles with the noise that they leave, where nobody states it.
+    """Repeat the fit with the noise of its residual, if the recording states none.
 
-    A wrong noise costs accuracy, seldom poles. Where far less is left than was assumed, though,
-    modes that it would have hidden are sought again.
+    A wrong noise reduces the accuracy and rarely loses poles. If the residual is far below the
+    assumed noise, modes that this noise would hide are searched again.
     """
     own, chi = data, chi_of(data, fit)
     for _ in range(ROUNDS):
@@ -113,14 +113,14 @@ def reweighted(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, trie
 
 
 def with_noise_left(data: PoleData, fitted: PoleData, fit: PoleFit) -> PoleData:
-    """The same samples, weighted by what a fit leaves; ``fitted`` holds the weights of that fit."""
+    """Weight the samples by the residual of a fit; ``fitted`` contains the weights of that fit."""
     used = fitted.w > 0
     rest = np.where(used, fit.e / np.where(used, fitted.w, 1.0), 0)
     return replace(data, w=weights(left_variance(rest, data.y - rest, used), used))
 
 
 def own_spread(own: PoleData, fit: PoleFit, slope: PoleSystem, chi: float) -> Spread:
-    """Spread by the noise that is left, no less than that of ``STEADY`` times the noise assumed."""
+    """Spread by the residual noise, at least that of ``STEADY`` times the assumed noise."""
     noise = chi_of(own, fit) * max(1.0, STEADY / chi)
     return uncertainty(fit.p, slope, noise**2)
 

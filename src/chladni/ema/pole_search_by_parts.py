@@ -1,10 +1,10 @@
 """Poles of recordings of hundreds of channels or many thousand lines: band by band.
 
-A pole is known from the lines about it, so a band of some hundred lines holds few unknowns; in it
-thirty combinations of whitened channels carry nearly all that a hundred do (Juang and Suzuki 1988,
-ASME J. Vib. Acoust. 110, 88-95: compression by principal components). They choose the poles; every
-channel then polishes them with its own noise. Residues of all poles are solved for at once, and so
-are the poles beside the band, which bend every part of it.
+A pole is determined by the lines near it, so a band of some hundred lines has few unknowns. In it
+thirty combinations of whitened channels carry nearly all information of a hundred (Juang and Suzuki
+1988, ASME J. Vib. Acoust. 110, 88-95: compression by principal components). They select the poles.
+All channels then polish them, each with its own noise. The residues of all poles are solved
+together. The poles outside the band are too, because they affect every part of it.
 """
 
 from dataclasses import dataclass, replace
@@ -28,18 +28,18 @@ from .pole_search import (
 )
 from .pole_selection import Rule, extended, uncertainty, with_neighbours
 
-CHANNELS, LINES = 48, 2000  # up to here all are fitted at once; of more what rings beside shows
+CHANNELS, LINES = 48, 2000  # up to here all are fitted at once; beyond, outer modes become visible
 PER_BAND = 1200  # lines of a band: some ten modes of a structure, a hundred lines each
 MARGIN = 0.15  # of its lines that a band looks to either side
 COMBINATIONS = 32
 POLISH = 3  # steps on all channels: they begin within the noise of the answer
-PASSES = 2  # each takes off what rings in other bands, better known than before
+PASSES = 2  # each subtracts the modes of other bands, more accurate than before
 SEARCH = 0.8  # of the time goes into choosing the poles
 TRIES = 4  # poles sought in what all channels leave
 
 
 def is_large(data: PoleData) -> bool:
-    """So many channels or lines that fitting all at once takes minutes."""
+    """Return True if channels or lines are so many that one fit of all takes minutes."""
     return data.y.shape[1] > CHANNELS or len(data.s) > LINES
 
 
@@ -65,7 +65,7 @@ def searched_by_parts(
     tries: int,
     progress: Progress = silent,
 ) -> Solution:
-    """As :func:`.pole_search.searched`, of poles that are chosen band by band."""
+    """Search poles as :func:`.pole_search.searched`, but select them band by band."""
     bands = core_bands(data)
     size = f"{data.y.shape[1]} channels x {len(data.s)} lines"
     step = counted(within(progress, 0.0, SEARCH), f"identifying {size}: band", len(bands))
@@ -93,7 +93,7 @@ def searched_by_parts(
 def _with_outer(
     data: PoleData, parts: list[BandPoles], rule: Rule, stated: bool
 ) -> tuple[PoleData, PoleFit, Spread]:
-    """Poles of all bands and outside of them, polished together: condensed lines, few combinations.
+    """Polish the poles of all bands and outside them together, on condensed lines and few channels.
 
     The first result is the condensed lines of all channels.
     """
@@ -108,7 +108,7 @@ def _with_outer(
 
 
 def core_bands(data: PoleData) -> list[tuple[int, int]]:
-    """Lines [low, high) of bands of about the same number, cut where least resonates."""
+    """Divide the lines into bands [low, high) of similar size, cut at the weakest response."""
     n = len(data.s)
     count = max(1, round(n / PER_BAND))
     scale = np.maximum(np.sqrt((np.abs(data.y) ** 2).mean(axis=0)), 1e-300)
@@ -147,7 +147,7 @@ def _part(
     orders: tuple[int, ...],
     tries: int,
 ) -> BandPoles:
-    """Poles of one band, those of its margins left out again; at the ends all are kept."""
+    """Find the poles of one band without those of its inner margins."""
     n, margin = len(data.s), max(6, int(MARGIN * (high - low)))
     rows = slice(max(0, low - margin), min(n, high + margin))
     whole = replace(data, s=data.s[rows], y=data.y[rows], w=data.w[rows])
@@ -171,7 +171,7 @@ def _part(
 
 
 def _once(parts: list[BandPoles]) -> list[BandPoles]:
-    """Of two neighbours' poles that are one, that of the first is left out."""
+    """Remove duplicates: if two neighbouring bands share a pole, the second band keeps it."""
     kept = []
     for part, after in zip(parts, [*parts[1:], None], strict=True):
         p = part.poles
@@ -186,7 +186,7 @@ def _once(parts: list[BandPoles]) -> list[BandPoles]:
 def _polished(
     data: PoleData, fit: PoleFit, part: BandPoles, own: np.ndarray, rule: Rule, stated: bool
 ) -> tuple[np.ndarray, np.ndarray, Spread]:
-    """Poles, rise of χ² and spread of one band once what rings elsewhere is taken off."""
+    """Poles, rise of χ² and spread of one band, after subtraction of the other bands' modes."""
     rest = np.delete(np.arange(len(fit.p)), own)
     whole = PoleData(data.s[part.rows], data.y[part.rows], data.w[part.rows], data.q)
     x = fit.x[:-2].reshape(len(fit.p), 2, -1)[rest].reshape(2 * len(rest), -1)

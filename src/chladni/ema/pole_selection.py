@@ -47,7 +47,7 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False)
 class Rule:
-    """When a pole is worth its parameters."""
+    """Criterion by which a pole justifies its parameters."""
 
     channels: int
     lines: int
@@ -63,15 +63,15 @@ class Rule:
         return self.noise * (self.factor * parameters + 4 * np.log(self.lines))
 
     def after(self, data: PoleData, fit: PoleFit) -> Self:
-        """The rule with the misfit of this fit as noise: what is systematic buys no poles."""
+        """Rule with the misfit of this fit as noise: a systematic error justifies no poles."""
         return replace(self, noise=max(self.noise, noise_left(data, fit)))
 
 
 def compressed(data: PoleData, most: int = 8) -> PoleData:
-    """At most ``most`` real combinations of the channels, lines weighted alike for all.
+    """Form at most ``most`` real combinations of the channels, with the same line weights for all.
 
-    Channels are scaled to one and every line to the rms over channels, so that small responses
-    count as large ones do; a channel of hardly more than noise is not raised above its neighbours.
+    Channels are scaled to one and every line to the rms over channels, so that small and large
+    responses count equally. A channel with little more than noise is not amplified to that level.
     """
     used = data.w > 0
     noise = np.where(used, 2 / np.where(used, data.w, 1.0) ** 2, 0.0).mean(axis=0)
@@ -85,7 +85,7 @@ def compressed(data: PoleData, most: int = 8) -> PoleData:
 
 
 def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1) -> Sweep:
-    """Vector fitting at growing order, until χ² no longer falls by what the poles cost."""
+    """Fit by vector fitting at increasing order, until χ² falls by less than the poles cost."""
     small = compressed(data)
     f = np.abs(data.s)
     order: list[int] = []
@@ -115,7 +115,7 @@ def swept(data: PoleData, orders: tuple[int, ...] = ORDERS, largest: float = 0.1
 
 
 def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
-    """Numbers of poles of different orders that agree, one array a cluster, richest order first.
+    """Group poles of different orders that agree: one index array per cluster, by falling order.
 
     Each leading pole takes the nearest of every other order that lies within the sum of the two
     half bandwidths.
@@ -135,7 +135,7 @@ def clusters(sweep: Sweep, among: np.ndarray) -> list[np.ndarray]:
 
 
 def start(data: PoleData, sweep: Sweep, rule: Rule) -> np.ndarray:
-    """Poles to begin with: what pays in the richest order, and clusters the rest agree on."""
+    """Select starting poles: significant ones of the highest order, clusters of three orders."""
     p, richest = sweep.poles, sweep.orders.max()
     low, high = 0.9 * float(np.abs(data.s).min()), 1.1 * float(np.abs(data.s).max())
     fits = (low < np.abs(p)) & (np.abs(p) < high) & (sweep.delta_chi2 > rule.price)
@@ -151,12 +151,13 @@ def start(data: PoleData, sweep: Sweep, rule: Rule) -> np.ndarray:
 def settled(
     data: PoleData, p: np.ndarray, rule: Rule, rounds: int = 40
 ) -> tuple[PoleFit, PoleSystem]:
-    """Polish a little, take out what does not pay, again, until both are at rest.
+    """Polish a little and remove insignificant poles, in turn, until neither changes the fit.
 
-    A pole does not pay if χ² rises by less than its price without it. It is no mode if it has
-    left the band by three tenths, sits at the damping limit, or lies inside with a frequency less
-    sure than its bandwidth. Nearer than that a pole stands for what rings beyond: a crowd of modes
-    above the band is no constant, and what it leaves over would pass for modes inside.
+    A pole is insignificant if its removal raises χ² by less than its price. A pole is not a mode
+    if it is more than three tenths outside the band or at the damping limit. The same holds inside
+    the band if its frequency is less certain than its bandwidth. A pole nearer to the band may
+    represent outer modes: many modes above it are not a constant, and their rest would look like
+    inner modes.
     """
     fit, slope = polish(data, p, rule.largest, 0)
     for _ in range(rounds):
@@ -173,10 +174,10 @@ def settled(
 
 
 def paid(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit, PoleSystem]:
-    """Poles polished to the end, without those that then pay no more, the poorest first.
+    """Polish to convergence and remove poles that are no longer significant, the poorest first.
 
-    :func:`settled` rests earlier: a pole may pay for itself a hair's breadth away from where it
-    fits best, and a neighbour of its own for what it had been paid for.
+    :func:`settled` stops earlier. There a pole may be slightly off its optimum, so that a second
+    pole next to it seems significant too.
     """
     fit, slope = polish(data, p, rule.largest, tol=0.05)
     while len(fit.p) and fit.delta_chi2.min() < rule.after(data, fit).price:
@@ -185,7 +186,7 @@ def paid(data: PoleData, p: np.ndarray, rule: Rule) -> tuple[PoleFit, PoleSystem
 
 
 def _poor(data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule) -> np.ndarray:
-    """Poles to take out at once: all that do not pay, but of neighbours only the poorest."""
+    """Select poles to remove together: all insignificant ones, of close neighbours the poorest."""
     low, high = float(np.abs(data.s).min()), float(np.abs(data.s).max())
     size, half = np.abs(fit.p), np.abs(fit.p.real)
     no_mode = (size < low / BEYOND) | (size > BEYOND * high) | (half > 0.98 * rule.largest * size)
@@ -215,7 +216,7 @@ def uncertainty(p: np.ndarray, slope: PoleSystem, noise: float) -> tuple[np.ndar
 def extended(
     data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule, tries: int
 ) -> tuple[PoleFit, PoleSystem]:
-    """Poles added where the residual stands out, as long as each pays for itself."""
+    """Add poles where the residual is large, as long as each reduces χ² by its cost."""
     f = np.abs(data.s)
     closed = np.zeros(len(f), bool)
     misses = 0
@@ -243,10 +244,10 @@ def with_neighbours(
     below: bool = True,
     far: bool = False,
 ) -> tuple[PoleFit, PoleSystem]:
-    """A pole beyond each end of the band where that pays: what rings next door is no constant.
+    """Add a pole beyond each end of the band if it is significant: outer modes are not constant.
 
-    What is left of it stands out at no line, so that :func:`extended` does not see it. ``far``: the
-    pole may go where no mode would be believed, and is sought however small the misfit.
+    Their residual is large at no single line, so that :func:`extended` does not find it. ``far``:
+    the pole may move beyond the limits for a mode, and the search is made at any misfit.
     """
     f, last = np.abs(data.s), len(fit.p)
     for at in (1.12 * float(f.max()), *([float(f.min()) / 1.12] if below else [])):
@@ -266,7 +267,7 @@ def with_neighbours(
 def _with_pole(
     data: PoleData, fit: PoleFit, at: float, rule: Rule
 ) -> tuple[PoleFit, PoleSystem] | None:
-    """The fit with one pole more near this frequency; None where a look says it is not worth it."""
+    """Fit one more pole near this frequency; return None if a quick test shows too little gain."""
     usual = float(np.median(-fit.p.real / np.abs(fit.p))) if len(fit.p) else 0.01
     looks = []
     for zeta in (0.5 * usual, 2 * usual):
@@ -281,11 +282,11 @@ def _with_pole(
 def merge_duplicate_poles(
     data: PoleData, fit: PoleFit, slope: PoleSystem, rule: Rule
 ) -> tuple[PoleFit, PoleSystem]:
-    """Twins made one: two poles in one bandwidth with the same shape are one mode, seen twice.
+    """Merge twins: two poles within one bandwidth and of the same shape represent one mode.
 
-    A slightly nonlinear or leaky resonance is fitted better by two poles than by one. The second
-    stays only if it brings ``rule.twin`` times its price after the first has been polished alone,
-    and takes away 40 % of what that leaves about the resonance: two real modes take nearly all.
+    Two poles fit a slightly nonlinear or leaky resonance better than one. The first is polished
+    alone. The second stays only if it then reduces χ² by ``rule.twin`` times its price and the
+    residual about the resonance by 40 %. Two real modes remove nearly all of it.
     """
     refused: set[complex] = set()
     while len(weaker := [k for k in _twins(fit) if complex(fit.p[k]) not in refused]):
@@ -303,7 +304,7 @@ def merge_duplicate_poles(
 
 
 def _twins(fit: PoleFit) -> list[int]:
-    """Weaker partners of pairs within a bandwidth whose residues are alike, weakest first."""
+    """Weaker partners of pairs within a bandwidth with similar residues, weakest first."""
     half, R = np.abs(fit.p.real), fit.residues
     close = np.abs(fit.p[:, None] - fit.p) < 1.5 * np.maximum(half[:, None], half)
     power = (np.abs(R) ** 2).sum(axis=1)

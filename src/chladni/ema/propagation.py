@@ -1,4 +1,4 @@
-"""Covariance of numbers that are made of each identified mode by itself."""
+"""Covariance of quantities computed from each identified mode separately."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,10 +15,9 @@ Made = Callable[[Identified], np.ndarray]
 
 
 def propagated(identified: Identified, made: Made) -> np.ndarray:
-    """Covariance (r, k, k) of k real numbers that are made of each mode's own pole and residues.
+    """Covariance (r, k, k) of k real numbers computed from the pole and residues of each mode.
 
-    J C Jᵀ with J by central differences. Where the numbers are a shape, whose sign is free, it is
-    held.
+    J C Jᵀ with J by central differences. The numbers may be a shape: its free sign is kept fixed.
 
     Parameters
     ----------
@@ -39,7 +38,7 @@ def propagated(identified: Identified, made: Made) -> np.ndarray:
 
 
 def standard_deviations(identified: Identified, made: Made) -> np.ndarray:
-    """The roots of its diagonal (r, k), without the rest."""
+    """Standard deviations (r, k): the square roots of the diagonal of :func:`propagated`."""
     parts = []
     for J, C in _parts(identified, made):
         own = _by_channel(J)
@@ -50,7 +49,7 @@ def standard_deviations(identified: Identified, made: Made) -> np.ndarray:
 
 
 def _parts(identified: Identified, made: Made) -> Iterator[tuple[np.ndarray, ModalCovariance]]:
-    """Slopes and covariance of some modes after the other, as many as fit into memory."""
+    """Yield slopes and covariance for groups of modes that fit into memory."""
     if identified.covariance is None:
         raise ValueError("this identification holds no covariance of its modes")
     if not identified.order:
@@ -64,7 +63,7 @@ def _parts(identified: Identified, made: Made) -> Iterator[tuple[np.ndarray, Mod
 
 
 def _root(C: ModalCovariance) -> np.ndarray:
-    """Of pole and residues of every mode (r, 2 + 2 n_c, m)."""
+    """Root of the shared covariance of pole and residues of every mode (r, 2 + 2 n_c, m)."""
     root = np.concatenate([C.pole[:, None], C.shared], axis=1)
     return root.reshape(len(root), -1, root.shape[-1])
 

@@ -13,18 +13,19 @@ from ..dynamics.statespace import StateSpace
 from ..errors import AccuracyError, LabelError
 from .identification import DERIVATIVES, Identified
 
-_FAR = 100.0  # the added poles lie that factor beside the band: they bend it by 1e-4
+_FAR = 100.0  # the added poles lie that factor outside the band: they change it by 1e-4
 _ZETA = 1e-3  # of the added poles: they settle, and turn the band by 2e-5 rad
 
 
 def realised(
     identified: Identified, quantity: Quantity = "receptance", rank: float = 1e-6
 ) -> StateSpace:
-    """Real A, B, C, D of an identified model, in any quantity.
+    """Build real A, B, C, D of an identified model, in any quantity.
 
     L/s² becomes a mode a hundred times below the band, U one a hundred times above it. A velocity
-    or acceleration output is C A or C A² of the displacement output. C B = 2 Re Σ R, a jump of the
-    displacement that no mass makes, is left by noise in the residues; the high pole takes it up.
+    or acceleration output is C A or C A² of the displacement output. C B = 2 Re Σ R would be a jump
+    of the displacement, which no mass permits. Noise in the residues causes it; the high pole
+    compensates it.
 
     Parameters
     ----------
