@@ -1,10 +1,10 @@
 """Common poles of many responses, on any frequency grid.
 
-H(s) = s^q [Σ_r R_r / (s - p_r) + R̄_r / (s - p̄_r) + L / s² + U], s = iω, q the number of
-derivatives (0 receptance, 1 mobility, 2 accelerance). The residues and the residual terms L, U
-(modes below and above the band) are linear and are eliminated (Golub and Pereyra 1973, variable
-projection; Jacobian of Kaufman 1975); the poles are found by relaxed vector fitting
-(Gustavsen and Semlyen 1999, Gustavsen 2006) and polished by Levenberg-Marquardt.
+H(s) = s^q [Σ_r R_r / (s - p_r) + R̄_r / (s - p̄_r) + L / s² + U], s = iω. The number of derivatives
+is q (0 receptance, 1 mobility, 2 accelerance). The residues and the residual terms L, U (modes
+below and above the band) are linear and are eliminated (Golub and Pereyra 1973, variable
+projection; Jacobian of Kaufman 1975). The poles are found by relaxed vector fitting (Gustavsen and
+Semlyen 1999, Gustavsen 2006) and polished by Levenberg-Marquardt.
 
 Nothing here assumes evenly spaced lines. Frequencies are scaled to the top of the band.
 """
@@ -122,8 +122,8 @@ def orthonormal(data: PoleData, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def solve(data: PoleData, p: np.ndarray, slope: bool = False) -> tuple[PoleFit, PoleSystem | None]:
     """Residues by weighted least squares, channel by channel, in one orthonormal basis.
 
-    With Q R = g Φ for the common weight g, every channel's normal matrix Qᵀ v² Q (v = w / g) is
-    close to the identity, so that the normal equations lose nothing.
+    With Q R = g Φ for the common weight g, the normal matrix Qᵀ v² Q (v = w / g) of every channel
+    is close to the identity. The normal equations are then well conditioned.
     """
     A = linear(data.s, p, data.q)
     n = A.shape[1]

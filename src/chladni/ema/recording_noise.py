@@ -1,10 +1,10 @@
-"""What the noise of a recording leaves in the damping-equalised response identified from it.
+"""Effect of the noise of a recording on the damping-equalised response identified from it.
 
-The identified model is the weighted least-squares estimate of poles, which all channels share, and
-of each channel's residues and residual terms. With F = Q R the weighted columns of a channel's
-linear unknowns and G those of the poles, S = Σ_c Gᵀ(I - QQᵀ)G is the information on the poles, and
-a prediction with slopes g_c, g_p has the variance |R⁻ᵀ g_c|² + hᴴ S⁻¹ h, h = g_p - GᵀQ R⁻ᵀ g_c
-(Seber and Wild 1989, Nonlinear Regression, section 5.1; the linear unknowns are eliminated).
+The identified model is a weighted least-squares estimate. All channels share its poles; each has
+its residues and residual terms. F = Q R are the weighted columns of a channel's linear unknowns; G
+are those of the poles. S = Σ_c Gᵀ(I - QQᵀ)G is the information on the poles. A prediction with
+slopes g_c, g_p has the variance |R⁻ᵀ g_c|² + hᴴ S⁻¹ h, h = g_p - GᵀQ R⁻ᵀ g_c (Seber and Wild 1989,
+Nonlinear Regression, section 5.1; the linear unknowns are eliminated).
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ LN10 = np.log(10.0)
 class EqualisedError:
     """Error of an equalised response: d ln H per standard deviation of each identified number.
 
-    Its covariance is that of all columns together, each with a factor of unit variance.
+    The error is the sum of all columns, each times an independent factor of unit variance.
 
     Attributes
     ----------
@@ -92,9 +92,9 @@ def equalised_noise(
 def sample_noise(identified: Identified, frf: FRF, s: np.ndarray) -> np.ndarray:
     """Standard deviation of log10 H(s), sample by sample, for a likelihood that sums them (n, ...).
 
-    :func:`equalised_noise` is smaller, for a sample is known from all lines of its modes; but then
-    its noise is that of its neighbours too, and a sum over samples would count it many times. Here
-    a sample is known only from the lines within the half-bandwidth of a mode, π ζ f / Δf of them.
+    :func:`equalised_noise` is smaller, because it uses all lines of the modes for each sample. Its
+    noise is correlated between neighbours, and a sum over samples would count it many times. Here
+    a sample uses only the lines within the half-bandwidth of a mode, π ζ f / Δf of them.
     """
     sd = np.sqrt(frf_variance(frf) / np.maximum(np.abs(frf.values) ** 2, 1e-300))
     f, own = s.imag / (2 * np.pi), frf.frequency
@@ -107,7 +107,7 @@ def sample_noise(identified: Identified, frf: FRF, s: np.ndarray) -> np.ndarray:
 def _channel(
     w: np.ndarray, F: np.ndarray, G: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """R of the weighted F, QᵀG, and what G says beyond F: Gᵀ(I - QQᵀ)G."""
+    """R of the weighted F, QᵀG, and the information in G beyond F: Gᵀ(I - QQᵀ)G."""
     Q, root = np.linalg.qr(stacked(w * F))
     G = stacked(w * G)
     tied = Q.T @ G
@@ -142,7 +142,7 @@ def _equalised_slopes(
 ) -> np.ndarray:
     """∂H_X/∂(Re p, Im p) of every pole (n_s, 2 r): through m = |p| and through f = Im p/m.
 
-    Of a pole that stays where it is, ∂H/∂p.
+    For a pole that is not moved, the slope is ∂H/∂p.
     """
     m, a, b = np.abs(p), p.real, p.imag
     by_f = _taken(basis(s, 1j * m, q), R)

@@ -1,4 +1,4 @@
-"""A recording screened alone and by the modes identified from it."""
+"""Screening of a recording by itself and by the modes identified from it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ from .time_record import overloaded
 
 LINES = 3.0  # in a half-bandwidth: fewer leave the damping uncertain
 POOR = 3.0  # times the noise that an identification leaves: its quantity may be wrong
-STRONG = 3.0  # of χ² that a mode brings, over what it pays
+STRONG = 3.0  # fall of χ² due to a mode over its required gain
 
 
 def screened(
@@ -36,15 +36,15 @@ def screened(
     use: np.ndarray | None = None,
     calmer: Sequence[Recording] = (),
 ) -> Screening:
-    """What a recording says of itself.
+    """Screen a recording: channels, overload, levels, and phases of the modes.
 
     Parameters
     ----------
-    found : what was identified from it, where that is known
+    found : modes identified from it, if known
     others : recordings of the same test, at the same level or others
     places : {output: (3,)} [m]
-    use : (n_f,) bool, lines it was identified from, default all; to be identified from once more
-    calmer : more recordings of the test: a channel that lives at a lower level is not dead
+    use : (n_f,) bool, lines of that identification, default all; used again for a repetition
+    calmer : more recordings of the test: a channel that works at a lower level is not dead
     """
     frf = recording.frf
     if frf is None:
@@ -73,7 +73,7 @@ def screened(
 
 
 def _alive_when_calm(recording: Recording, others: Sequence[Recording]) -> set[str]:
-    """Outputs that live at a lower level and are as loud here: not dead, but not linear."""
+    """Find outputs that work at a lower level and are as strong here: nonlinear, not dead."""
     frf, level, alive = recording.frf, recording.level, set[str]()
     for other in others:
         if frf is None or other.frf is None or level is None or other.level is None:
@@ -95,7 +95,7 @@ def _rms(frf: FRF) -> np.ndarray:
 
 
 def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[Finding], Check]:
-    """Delay and quantity; where either is in doubt the recording is identified once more."""
+    """Check delay and quantity; in case of doubt, identify the recording again."""
     if strong.order < LEAST_MODES and frf.quantity in QUANTITIES and strong.chi > POOR:
         others = {
             q: replace(frf, quantity=cast(Quantity, q)) for q in QUANTITIES if q != frf.quantity
@@ -115,13 +115,13 @@ def _phases(frf: FRF, strong: Identified, use: np.ndarray | None) -> tuple[list[
 
 
 def strong_modes(found: Identified) -> Identified:
-    """The modes within the band that stand out of the noise."""
+    """Select the modes within the band that clearly exceed the noise."""
     sure = found.frequency_sd < 0.02 * found.frequency
     return found.sel(found.inside & sure & (found.relative_delta_chi2 > STRONG))
 
 
 def _lines(found: Identified, frequency: np.ndarray) -> Check:
-    """How many lines know the damping of each mode; no fault of the recording."""
+    """Check the number of lines per half-bandwidth of each mode; it is never a fault."""
     if not found.order:
         return Check("lines per half-bandwidth", "no mode stands out", None)
     n = lines_per_bandwidth(found, frequency)

@@ -1,11 +1,11 @@
-"""Responses to a force nobody measured: what of them a modal identification can use.
+"""Modal identification from responses to an unmeasured force: correlations and free decays.
 
-Under a force that is white and stationary in the band, correlations of responses at positive lags
-decay as the free structure does: r_ij(τ) = Σ_r c_r exp(p_r τ) + conjugate (NExT: James, Carne and
-Lauffer 1995, Int. J. Analytical and Experimental Modal Analysis 10, 260-277).  Their one-sided
-transform Σ_r c_r / (s - p_r) + ... has the poles of an FRF, and residues of no known scale.
+Let the force be white and stationary in the band. At positive lags, the correlations of responses
+then decay as the free structure does: r_ij(τ) = Σ_r c_r exp(p_r τ) + conjugate (NExT: James, Carne
+and Lauffer 1995, Int. J. Analytical and Experimental Modal Analysis 10, 260-277). Their one-sided
+transform Σ_r c_r / (s - p_r) + ... has the poles of an FRF, and residues of unknown scale.
 
-So has that of a free decay itself, from its loudest moment on: nothing is correlated there.
+The transform of a free decay, from its largest amplitude on, has this form without correlation.
 """
 
 from collections.abc import Sequence
@@ -25,15 +25,15 @@ SEGMENTS = 8  # of the record: the lags that are used, and the spread of their c
 DECAY = 0.01  # of the window at the last lag
 ALIKE = -np.log(DECAY) / 2  # lines of one noise: the window's equivalent noise bandwidth
 REFERENCES = 3  # responses of most energy
-RELEASE = "decay"  # what stands in the place of a force: the block that was let go
+RELEASE = "decay"  # label in place of a force: the block of a free decay
 LINES = 2500  # of the band: more take minutes to identify
 PIECES, DIED = 32, 0.1  # of a free decay: in its last half no piece is as loud as that of the first
 
 
 def responses(functions: Sequence[Function]) -> tuple[Function, ...]:
-    """Records of responses of one kind, where no force stands beside them; none elsewhere.
+    """Select records of responses of one kind; () if a force was measured too.
 
-    Time histories come before cross and auto spectra.
+    Time histories take precedence over cross and auto spectra.
     """
     if any(f.unit.strip() in FORCES for f in functions):
         return ()
@@ -45,7 +45,7 @@ def responses(functions: Sequence[Function]) -> tuple[Function, ...]:
 
 
 def _even(x: np.ndarray) -> bool:
-    """Whether samples follow each other evenly, as files with few digits have them."""
+    """Return True if samples are evenly spaced, within the rounding of files with few digits."""
     due = np.linspace(x[0], x[-1], len(x))
     return bool(x[-1] > x[0] and np.abs(x - due).max() < ROUNDED * _step(x))
 
@@ -66,15 +66,15 @@ def of_responses(record: TimeRecord) -> tuple[Function, ...]:
 
 
 def free_decays(functions: Sequence[Function]) -> bool:
-    """Whether time histories ring down, every block of them."""
+    """Return True if the records are time histories and every block is a free decay."""
     return functions[0].kind == "time" and all(_onset(y) is not None for y in _blocks(functions)[1])
 
 
 def ringing(r: Recording, band: tuple[float, float] = (0.0, np.inf)) -> Recording:
-    """A recording that holds free decays alone with their transforms; any other as it is.
+    """Add the transforms to a recording of free decays only; return any other unchanged.
 
-    Poles are those of an FRF, residues have no scale and no drive point: modal shapes times what
-    each block was let go with.
+    Poles are those of an FRF. Residues have neither scale nor drive point: they are mode shapes
+    times the initial state of each block.
     """
     used = responses(r.functions)
     if r.frf is not None or r.poles is not None or not used or not free_decays(used):
@@ -90,7 +90,7 @@ def ringing(r: Recording, band: tuple[float, float] = (0.0, np.inf)) -> Recordin
 def _blocks(functions: Sequence[Function]) -> tuple[tuple[str, ...], np.ndarray]:
     """Labels and time histories (blocks, channels, n): records of one label are blocks.
 
-    Where some have more than others, as many are taken as all have.
+    If the numbers of blocks differ, the smallest number is used.
     """
     of: dict[str, list[np.ndarray]] = {}
     for f in functions:
@@ -100,15 +100,15 @@ def _blocks(functions: Sequence[Function]) -> tuple[tuple[str, ...], np.ndarray]
 
 
 def _at_rest(y: np.ndarray) -> np.ndarray:
-    """Channels (..., n) less what they show at last, when all has died."""
+    """Subtract from channels (..., n) their mean over the last tenth, after the decay."""
     return np.asarray(y - y[..., -max(y.shape[-1] // 10, 1) :].mean(axis=-1, keepdims=True))
 
 
 def _onset(y: np.ndarray) -> int | None:
-    """The sample from which channels (k, n) ring down: their loudest; None where they do not.
+    """Return the first sample of the decay of channels (k, n), that of largest power, or None.
 
-    It lies in the first half, and in the last half of what follows none of its ``PIECES`` has
-    ``DIED`` of the mean square of the first: random forces, and hits in a row, keep it up.
+    It must lie in the first half. The rest is divided into ``PIECES``. No piece of its last half
+    may reach ``DIED`` times the mean square of the first; random forces and repeated hits do.
     """
     y = _at_rest(y)
     power = np.maximum((y**2).mean(axis=1, keepdims=True), np.finfo(float).tiny)
@@ -129,7 +129,7 @@ def one_sided(
     Parameters
     ----------
     functions : from :func:`responses`
-    band : that is asked about [Hz]; of free decays no more is taken than gives it ``LINES``
+    band : of interest [Hz]; free decays are cut so that it has at most ``LINES`` lines
 
     The result is called a receptance, for it has that form: Σ R_r / (s - p_r) and residual terms.
     """
@@ -139,7 +139,7 @@ def one_sided(
 
 
 def _of_time(functions: Sequence[Function], band: tuple[float, float]) -> tuple[FRF, float]:
-    """Of free decays themselves; else correlations of each segment, their mean and its variance."""
+    """Transform free decays directly, else correlations: mean and variance over segments."""
     labels, blocks = _blocks(functions)
     rate = 1 / _step(functions[0].x)
     starts = [k for y in blocks if (k := _onset(y)) is not None]
@@ -183,7 +183,7 @@ def _of_decays(
 
 
 def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:
-    """Spectra turned into correlations and back; auto spectra alone are a reference each."""
+    """Convert each spectrum to a correlation and transform this one-sidedly."""
     f = functions[0].x
     step = _step(f)
     n_f = round(float(f[-1]) / step) + 1
@@ -201,7 +201,7 @@ def _of_spectra(functions: Sequence[Function]) -> tuple[FRF, float]:
 def _transformed(r: np.ndarray, rate: float) -> np.ndarray:
     """Σ w(τ) r(τ) exp(-sτ) Δτ of lags (n, ...).
 
-    What noise adds at lag zero is a constant, which the residual terms of the fit take.
+    Noise adds a constant at lag zero, which the residual terms of the fit absorb.
     """
     w = window("exponential", len(r), DECAY)
     return np.fft.rfft(r * w[:, None, None], axis=0) / rate

@@ -1,4 +1,4 @@
-"""Noise of frequency responses: what a recording states, or what its own scatter shows."""
+"""Noise of frequency responses, as stated by a recording or estimated from its scatter."""
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -18,11 +18,12 @@ _PRECISE = 1e-7  # of |H|: what is left below is rounding
 def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
     """Variance E|ΔH|² of every sample (n_f, n_out, n_in).
 
-    In this order: the variance of the recording; (1-γ²)/(γ² n)|H|² from the coherence (Bendat and
-    Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H| for what no coherence shows;
-    1 % of |H| and, by channel, the scatter of its faint lines, 0.001 % of its rms at least; 0.1 %
-    where lines are too few to show it. More would hide what is faint and known: springs to ground
-    act where accelerances are a thousandth of their peaks.
+    The first source is the variance of the recording. The second is the coherence:
+    (1-γ²)/(γ² n)|H|² (Bendat and Piersol 2010, eq. 9.81), smoothed over nine lines, and 1 % of |H|
+    for errors that no coherence shows. The last is 1 % of |H| and the scatter of the faint lines of
+    each channel. It is at least 0.001 % of the rms, or 0.1 % if lines are too few to show it.
+    A larger value would hide accurate faint lines: springs to ground act where accelerances are a
+    thousandth of their peaks.
     """
     H = np.abs(frf.values)
     rms = np.sqrt((H**2).mean(axis=0))
@@ -37,7 +38,7 @@ def frf_variance(frf: FRF, averages: int = 1) -> np.ndarray:
 
 
 def noise_source(frf: FRF, averages: int = 1) -> str:
-    """In words, where :func:`frf_variance` takes the noise from."""
+    """Describe in words the source of the noise in :func:`frf_variance`."""
     if frf.variance is not None:
         return "the variance that the recording states (averages, repeats or dwells)"
     if frf.coherence is not None:
@@ -51,9 +52,9 @@ def noise_source(frf: FRF, averages: int = 1) -> str:
 def faint_scatter(frf: FRF) -> np.ndarray:
     """Standard deviation of the additive noise by channel (n_out, n_in), from faint lines.
 
-    Five neighbours leave one combination that no cubic in ω has a part in; of unit norm it has the
-    variance of the noise. Between resonances the response is such a cubic, so its median square
-    over the faintest quarter of the lines shows the noise alone; 0 where lines are few.
+    Five neighbours have one combination of unit norm that vanishes for every cubic in ω. Its
+    variance is that of the noise. Between resonances the response is nearly a cubic. Therefore its
+    median square over the faintest quarter of the lines shows the noise alone; 0 for few lines.
     """
     H, f = frf.values, frf.frequency
     if len(f) < _FEW:
@@ -70,9 +71,9 @@ def faint_scatter(frf: FRF) -> np.ndarray:
 
 
 def left_variance(rest: np.ndarray, H: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """a²|H|² + b² by channel from what a fit H leaves over (n_f, n_c), see `left_scatter`.
+    """a²|H|² + b² by channel from the residual of a fit H (n_f, n_c), see `left_scatter`.
 
-    H is the fit, not the sample: weights that know the noise bias what they weigh.
+    H is the fit, not the sample: weights that depend on the noise would bias the estimate.
     """
     a2, b2 = left_scatter(rest, H, used)
     return a2 * np.abs(H) ** 2 + b2
@@ -81,9 +82,9 @@ def left_variance(rest: np.ndarray, H: np.ndarray, used: np.ndarray) -> np.ndarr
 def left_scatter(
     rest: np.ndarray, H: np.ndarray, used: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """a² and b² (n_c,): noise as a share of the response H and additive, by what a fit leaves over.
+    """a² and b² (n_c,): noise as a share of the response H and additive, by the residual of a fit.
 
-    b from the faintest lines, a from the rest of the strongest; ``used`` marks samples that count.
+    b is from the faintest lines, a from the strongest; ``used`` marks the samples that count.
     """
     size = np.where(used, np.abs(H), np.nan)
     square = np.where(used, np.abs(rest) ** 2, np.nan)
@@ -104,5 +105,5 @@ def _median_square(square: np.ndarray, size: np.ndarray, faint: bool) -> np.ndar
 
 
 def moving_mean(x: np.ndarray, lines: int) -> np.ndarray:
-    """Mean over so many lines about each (n_f, ...), ends held."""
+    """Moving mean over a number of lines (n_f, ...); the ends are repeated."""
     return np.asarray(uniform_filter1d(x, min(lines, len(x)), axis=0, mode="nearest"))

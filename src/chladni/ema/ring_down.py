@@ -1,4 +1,4 @@
-"""Free decays: poles from ring-down, and how frequency and damping go with the amplitude.
+"""Free decays: poles from ring-down, and frequency and damping as functions of the amplitude.
 
 Feldman (2011), Hilbert Transform Applications in Mechanical Vibration, chapter 6 (FREEVIB).
 """
@@ -17,7 +17,7 @@ LEVELS = 6  # steps of amplitude at which frequency and damping are given
 
 @dataclass(frozen=True, eq=False)
 class RingDown:
-    """One mode as it dies away at one output.
+    """Decay of one mode at one output.
 
     Attributes
     ----------
@@ -41,10 +41,9 @@ class RingDown:
 
 
 def ring_downs(record: TimeRecord, count: int = 6) -> tuple[RingDown, ...]:
-    """The strongest modes of the mean free decay, each at the output where it is largest.
+    """Follow the strongest modes of the free decay of the first block, each at its largest output.
 
-    The decay begins where every input has died; blocks are averaged after their inputs, so only
-    repeats alike (hits) gain by it; none where the inputs never stop.
+    The decay begins where every input has ended. The result is empty if the inputs never stop.
     """
     start = _free_from(record.force)
     n = record.response.shape[2] - start
@@ -73,9 +72,9 @@ def ring_downs(record: TimeRecord, count: int = 6) -> tuple[RingDown, ...]:
 
 
 def _free_from(force: np.ndarray) -> int:
-    """First sample after which no input of the first block exceeds a hundredth of its peak.
+    """First sample after which no input of the first block exceeds a twentieth of its peak.
 
-    A sensor's own drift after a hit is no input: what is below a twentieth and smooth is let pass.
+    The drift of a force sensor after a hit is not an input: values below a twentieth are ignored.
     """
     x = np.abs(force[0] - np.median(force[0], axis=1, keepdims=True)).max(axis=0)
     loud = np.flatnonzero(x > 0.05 * x.max())
@@ -83,7 +82,7 @@ def _free_from(force: np.ndarray) -> int:
 
 
 def _peaks(X: np.ndarray) -> np.ndarray:
-    """Local maxima that stand twice above the median of what surrounds them."""
+    """Local maxima with a prominence of half of ``PEAK`` times the largest."""
     from scipy.signal import find_peaks
 
     at, _ = find_peaks(X, prominence=0.5 * PEAK * X.max())

@@ -19,7 +19,7 @@ _LN10 = np.log(10.0)
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """What is left after looking.
+    """Usable channels and lines after the screening.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Screened:
 
 
 def screen(frf: FRF, least: float = 0.8, gap: float = 0.02) -> Screened:
-    """Dead, broken and incoherent channels out; lines where the median coherence is low out.
+    """Remove dead, broken and incoherent channels, and lines of low median coherence.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def runs(f: np.ndarray, lines: np.ndarray) -> tuple[tuple[float, float], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Homogeneity:
-    """Two levels of the same test against each other.
+    """Comparison of two levels of the same test.
 
     Attributes
     ----------
@@ -134,14 +134,14 @@ _CHANCE = 0.1  # what the uncertain variances of five sweeps leave of the mean r
 
 
 def homogeneity(low: FRF, high: FRF, least: float = 0.01) -> Homogeneity:
-    """Is the response proportional to the level? |H₂ - H₁|² over what the noise explains.
+    """Test whether the response is proportional to the level: |H₂ - H₁|² over the noise.
 
     Worden and Tomlinson (2001), Nonlinearity in Structural Dynamics, section 2.3 (homogeneity).
-    ``linear`` unless the ratio is beyond chance (1.1, or five standard deviations of a mean of
-    exponential variates) *and* the responses differ by more than ``least`` in log₁₀.
+    The result is ``linear`` unless the ratio is beyond chance (1.1, or five standard deviations of
+    a mean of exponential variates) *and* the responses differ by more than ``least`` in log₁₀.
 
-    The second recording is interpolated to the lines of the first; where a recording brings no
-    variance, its noise is what does not follow a parabola through five lines. Variances are means
+    The second recording is interpolated to the lines of the first. Without a stated variance, the
+    noise is the deviation from a parabola through five lines (`roughness`). Variances are means
     over 15 lines: the reciprocal of one that comes from ν averages is too large by ν/(ν - 1).
     """
     if (low.outputs, low.inputs, low.quantity) != (high.outputs, high.inputs, high.quantity):
@@ -205,7 +205,7 @@ def _bands_beyond(f: np.ndarray, line: np.ndarray) -> tuple[tuple[float, float],
 def levels_checked(
     recording: Recording, others: Sequence[Recording]
 ) -> tuple[list[Finding], list[Check]]:
-    """Recordings of the same channels against this one: other levels, and repeats of its own."""
+    """Compare recordings of the same channels with this one: other levels and repeats."""
     found: list[Finding] = []
     said: dict[str, list[str]] = {"homogeneity": [], "repeatability": []}
     odd: set[str] = set()
@@ -247,7 +247,7 @@ def _worst(h: Homogeneity) -> str:
 
 
 def _compared(one: Recording, other: Recording) -> Homogeneity | None:
-    """Their homogeneity; None where they are of other articles, channels or lines."""
+    """Return their homogeneity, or None if articles, channels or lines differ."""
     a, b = one.frf, other.frf
     if a is None or b is None or one.article != other.article or other is one:
         return None
@@ -272,7 +272,7 @@ def noise_of(frf: FRF) -> np.ndarray:
 
 
 def roughness(frf: FRF) -> np.ndarray:
-    """What does not follow a parabola through five neighbouring lines, as variance of a sample.
+    """Variance of a sample by its deviation from a parabola through five neighbouring lines.
 
     The residual of the middle of five against the least-squares parabola has variance 18/35 σ²
     on an even grid; medians over 21 lines keep resonances out.

@@ -1,4 +1,4 @@
-"""What was measured, where and with what: recordings and the set-up of the test (SI)."""
+"""Recordings, sensors and the set-up of the test (SI)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Control = Literal["force", "response"]
 
 @dataclass(frozen=True, eq=False)
 class PoleTable:
-    """Identified frequencies without an FRF: what a table of a report holds.
+    """Identified frequencies without an FRF, as in a table of a report.
 
     Attributes
     ----------
@@ -62,10 +62,10 @@ class PoleTable:
 
 @dataclass(frozen=True, eq=False)
 class Function:
-    """A record that is no FRF: time history, spectrum, power spectral density.
+    """A record other than an FRF: time history, spectrum, power spectral density.
 
-    ``kind`` is the universal file's word (time, auto spectrum, cross spectrum, psd, ...);
-    ``input`` is "" where the record has no reference; ``unit`` is the label the file gives.
+    ``kind`` is the term of the universal file (time, auto spectrum, cross spectrum, psd, ...).
+    ``input`` is "" if the record has no reference. ``unit`` is the label of the file.
     """
 
     kind: str
@@ -142,7 +142,7 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A measured dof as the user describes it: where it sits, which way it points, what it weighs.
+    """A measured dof as the user describes it: its place, direction and mass.
 
     Either ``grid`` or ``place`` is given; ``direction`` None means the normal of the surface.
     """
@@ -160,7 +160,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class SensorAccuracy:
-    """How far sensors and force gauges are what and where they should be: standard deviations.
+    """Standard deviations of gain, direction and position of sensors and force gauges.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class TestSetup:
         Raises
         ------
         LabelError
-            If there is none; the sentence lists those there are.
+            If there is none; the message lists the known ones.
         """
         among = self.outputs if role == "output" else self.inputs
         for sensor in among:

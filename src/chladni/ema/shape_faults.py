@@ -1,18 +1,18 @@
-"""Channels at fault, by the measured mode shapes against a model that is itself not right.
+"""Faults of channels, from measured mode shapes and a model that has errors itself.
 
 A measured shape mixes the model's shapes near it, and each channel has an error of its own:
 
     ψ_r ~ s_r N(0, Σ_m κ_rm² φ_m φ_mᵀ + σ² I),  κ_rm² = 1 / (1 + (ln(f_m / c f_r) / ε)²).
 
-To first order a change of the model mixes modes in inverse proportion to their distance. ε, σ and
-the common factor c of the frequencies are those that make the recording most likely; the scale s_r
-is profiled, ln L = Σ_r -n/2 ln(ψ_rᵀ C_r⁻¹ ψ_r) - ½ ln|C_r|. A fault of a channel (its sign, its
-gain, an exchange of two, another direction, another place) changes ψ or the rows of Φ; it is named
-where ln L rises by more than the number of trials explains.
+To first order, a change of the model mixes modes in inverse proportion to their distance. ε, σ and
+the common factor c of the frequencies maximise the likelihood. The scale s_r is profiled:
+ln L = Σ_r -n/2 ln(ψ_rᵀ C_r⁻¹ ψ_r) - ½ ln|C_r|. A fault of a channel changes ψ or the rows of Φ. It
+is a wrong sign, gain, direction or place, or an exchange of two channels. It is named if ln L rises
+by more than the number of trials explains.
 
-A patch that the model lacks bends shapes about a sensor as well as a move of it does. Therefore a
-gain, a place or a direction is a warning, and has to fit better than a channel with an error τ² of
-its own (C_r + τ² e_i e_iᵀ); a reversed sign and an exchange are faults.
+A patch that the model lacks changes shapes about a sensor, as a move of the sensor does. Therefore
+a wrong gain, place or direction is only a warning. It must fit better than a channel with its own
+error τ² (C_r + τ² e_i e_iᵀ). A reversed sign and an exchange are faults.
 """
 
 from collections.abc import Callable
@@ -44,7 +44,7 @@ MOST = 3  # faults that are named one after another
 
 @dataclass(frozen=True, eq=False)
 class ModelShapes:
-    """What the model knows of the channels.
+    """Shapes of the model at the channels, also for other directions and places.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ModelShapes:
 
 @dataclass(frozen=True, eq=False)
 class _Fault:
-    """A hypothesis: what it gains, over a misjudged channel as well, and how it reads."""
+    """A hypothesis: gain over no fault, gain over a misjudged channel, and its finding."""
 
     gain: float
     over_misjudged: float
@@ -72,7 +72,7 @@ class _Fault:
 def shape_faults(
     labels: tuple[str, ...], psi: np.ndarray, frequency: np.ndarray, model: ModelShapes
 ) -> list[Finding]:
-    """Faults of single channels and of pairs, the surest first; the next is sought without it.
+    """Find faults of channels and pairs, the surest first; each search excludes earlier ones.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _best(
     model: ModelShapes,
     at: np.ndarray,
 ) -> _Fault | None:
-    """The fault that raises ln L most, ε, σ and c chosen anew for each.
+    """Find the fault that raises ln L most; ε, σ and c are optimised for each.
 
     ``at`` (n,) are the positions of the channels in the model.
     """
@@ -128,10 +128,10 @@ def _best(
 
 
 def _misjudged(psi: np.ndarray, grid: list["_Mixture"]) -> np.ndarray:
-    """Ln L where the model knows one channel worse than the others, of each mixture (n_grid, n).
+    """Compute ln L with a larger model error at one channel, for each mixture (n_grid, n).
 
-    With τ² of its own, C_i = C + τ² e_i e_iᵀ: what physics that the model lacks does about a
-    sensor. A fault of a channel that physics may mimic has to fit better than that.
+    The channel has its own τ², C_i = C + τ² e_i e_iᵀ: the effect of missing physics at a sensor. A
+    fault that missing physics may imitate must fit better than this.
     """
     n, r = psi.shape
     L = np.full((len(grid), n), -np.inf)
@@ -200,7 +200,7 @@ def _gains(
     null: float,
     misjudged: np.ndarray,
 ) -> _Fault:
-    """One channel times a real factor g: ψ_i / g is what was there."""
+    """One channel times a real factor g: the true motion is ψ_i / g."""
     n, r = psi.shape
     factors = np.concatenate([np.exp(GAINS), -np.exp(GAINS)])
     L = _of_factors(psi, grid, factors, slice(None))
@@ -289,7 +289,7 @@ def _other_rows(
     null: float,
     misjudged: np.ndarray,
 ) -> list[_Fault]:
-    """The channels that fit worst, along other directions, at other places, at another's place."""
+    """Try the worst channels along other directions, at other places, and as copies of others."""
     first = max(grid, key=lambda g: g.likelihood(psi))
     pull = np.einsum("rij,jr->ir", first.inverse, psi)
     odd = (pull**2 / np.einsum("rii->ir", first.inverse) / first.squares(psi)).sum(axis=1)
@@ -310,7 +310,7 @@ def _other_rows(
 
 
 def _like(psi: np.ndarray, i: int) -> np.ndarray:
-    """Other channels that show nearly the same."""
+    """Find other channels with nearly the same motion."""
     gap = ((psi - psi[i]) ** 2).sum(axis=1) / ((psi**2).sum(axis=1) + (psi[i] ** 2).sum())
     return np.flatnonzero((gap < COPY) & (np.arange(len(psi)) != i))
 
@@ -327,7 +327,7 @@ def _replaced(
     null: float,
     misjudged: float,
 ) -> _Fault:
-    """Row i of the model by each of others (k, m), by what the other channels foretell of it."""
+    """Replace row i of the model by each of others (k, m); other channels predict its motion."""
     n = len(psi)
     keep = np.arange(n) != i
     L = np.full(len(rows), -np.inf)

@@ -54,7 +54,7 @@ def driven_shapes(identified: Identified) -> np.ndarray:
 
 
 def real_shapes(identified: Identified) -> np.ndarray:
-    """The same (n_out, r), turned so that they are as real as they can be, of unit norm."""
+    """Real parts of the shapes (n_out, r), rotated to be as real as possible, of unit norm."""
     psi = _turned(driven_shapes(identified).T).T.real
     return psi / np.maximum(np.linalg.norm(psi, axis=0), 1e-300)
 

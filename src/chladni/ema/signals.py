@@ -126,7 +126,7 @@ def estimated(
 
     - H1 = S_yf S_ff⁻¹: noise at the response averages out;
     - H2 = S_yy / S_fy (one input): noise at the force averages out;
-    - Hv: total least squares, noise at both (inputs and outputs scaled alike).
+    - Hv: total least squares, noise at both (inputs and outputs on one scale).
 
     The coherence is the multiple one, γ² = S_yf S_ff⁻¹ S_fy / S_yy. The variance is
     E|ΔH|² = (1-γ²) S_yy [S_ff⁻¹]_jj / (n - n_in) (Bendat and Piersol 2010, eq. 9.90).

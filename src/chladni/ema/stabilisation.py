@@ -1,4 +1,4 @@
-"""The stabilisation diagram: poles of every order of the subspace road, and how steady they are.
+"""Stabilisation diagram: poles of every order of the subspace method, and their stability.
 
 Classes and their limits are those in use since Heylen, Lammens and Sas (1997), Modal Analysis
 Theory and Testing, section A.3: 1 % in frequency, 5 % in damping, 0.95 of MAC against the order

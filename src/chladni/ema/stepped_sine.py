@@ -57,8 +57,8 @@ def demodulated(record: TimeRecord) -> tuple[FRF, np.ndarray, tuple[str, ...]]:
 def dwells(x: np.ndarray) -> list[tuple[int, int]]:
     """Stretches of constant frequency of a sine (n,), as first and last sample.
 
-    The frequency before and after every cycle is that of ``SPAN`` cycles; where the two differ by
-    more than their scatter a step lies.
+    The frequency before and after every cycle is the mean over ``SPAN`` cycles. A step is where
+    both differ by more than their scatter.
     """
     phase = np.unwrap(np.angle(_analytic(x - x.mean())))
     cycle = np.arange(np.ceil(phase[0] / (2 * np.pi)), np.floor(phase[-1] / (2 * np.pi)))
@@ -111,7 +111,7 @@ def _line(signals: np.ndarray, rate: float) -> tuple[float, np.ndarray, np.ndarr
 
 
 def _frequency(x: np.ndarray, rate: float) -> float:
-    """Of a sine (n,), by Gauss-Newton on a, b, c and f from the slope of its phase [Hz]."""
+    """Frequency of a sine (n,) [Hz], by Gauss-Newton on a, b, c and f from its phase slope."""
     t = np.arange(len(x)) / rate
     phase = np.unwrap(np.angle(_analytic(x - x.mean())))
     inner = slice(len(x) // 10, -max(1, len(x) // 10))

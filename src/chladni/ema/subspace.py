@@ -1,10 +1,11 @@
 """Poles by a frequency-domain subspace method, on any grid: one factorisation, every order.
 
-McKelvey, Akçay and Ljung (1996), IEEE Trans. Automatic Control 41(7), 960-979, algorithm 2: with
-z = e^{iθ} and G(z) = D + C (z - A)⁻¹ B, the rows z^k G, k = 0 ... q-1, are O X + Γ W, where the
-columns of O = [C; CA; ...; CA^{q-1}] span what is left of them beside the rows z^k of the input.
-The band is carried to the unit circle by z = (α + s) / (α - s), which is exact and leaves the
-distance of the lines free; α is the geometric mean of its ends, so that it covers the arc evenly.
+McKelvey, Akçay and Ljung (1996), IEEE Trans. Automatic Control 41(7), 960-979, algorithm 2. With
+z = e^{iθ} and G(z) = D + C (z - A)⁻¹ B, the rows z^k G, k = 0 ... q-1, are O X + Γ W. The rows z^k
+of the input, W, are projected out. The columns of O = [C; CA; ...; CA^{q-1}] span the rest.
+The map z = (α + s) / (α - s) carries the band to the unit circle. It is exact and permits any
+spacing of the lines. α is the geometric mean of the ends of the band, so that it covers the arc
+evenly.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ _SURPLUS = 2.0  # rows of O over the states sought: the rest is noise that the S
 
 @dataclass(frozen=True, eq=False)
 class Subspace:
-    """O of the largest order; a smaller one takes its first columns.
+    """O of the largest order; a smaller order uses its first columns.
 
     Attributes
     ----------
@@ -36,8 +37,8 @@ class Subspace:
     def modes(self, order: int) -> tuple[np.ndarray, np.ndarray]:
         """Upper poles (r,) of the system of that many states and their shapes (n_o, r).
 
-        Poles come mirrored into the left half plane and by rising modulus; s and 1/s of a real
-        system, real poles, are no modes.
+        Poles are mirrored into the left half plane and sorted by modulus. Real
+        poles, s and 1/s of a real system, are not modes.
         """
         O = self.O[:, :order]
         A, *_ = np.linalg.lstsq(O[: -self.outputs], O[self.outputs :], rcond=None)

@@ -12,7 +12,7 @@ from ..errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class TimeRecord:
-    """What every channel of one test did: hits or bursts as blocks, or one long stretch.
+    """Time histories of all channels of one test: hits or bursts as blocks, or one long stretch.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class TimeRecord:
 
     @property
     def duration(self) -> float:
-        """Of one block [s]."""
+        """Duration of one block [s]."""
         return self.force.shape[2] / self.rate
 
     @property
@@ -68,8 +68,8 @@ class TimeRecord:
 def overloaded(record: TimeRecord) -> dict[str, int]:
     """Channels that were clipped, and in how many blocks: {channel in words: blocks}.
 
-    A clipped signal stays at its extreme for three samples and more although it came there
-    steeply; the round top of a sine in coarse steps comes there by one step.
+    A clipped signal stays at its extreme for three samples or more after a steep rise. The round
+    top of a coarsely quantised sine reaches its extreme by one step.
     """
     signals = np.concatenate([record.force, record.response], axis=1)
     found = {}
@@ -84,7 +84,7 @@ _STEPS = 4.0  # in quantisation steps: the top of a parabola, three samples wide
 
 
 def _clipped(x: np.ndarray) -> bool:
-    """Whether a signal (n,) was cut at its largest or smallest value."""
+    """Return True if a signal (n,) was cut at its largest or smallest value."""
     return any(_flat_top(side) for side in (x, -x))
 
 
