@@ -1,1 +1,1 @@
-"""What chladni can do, one function each: from a case to a result."""
+"""The functions of chladni, one for each command: from a case to a result."""

@@ -1,4 +1,4 @@
-"""Sensors declared along one axis that measured along another: X for Z."""
+"""Detect sensors that measured along another axis than declared, as X for Z."""
 
 from dataclasses import replace
 from itertools import permutations
@@ -16,7 +16,7 @@ from ..errors import FileError
 from ..fem.modelled import Modelled
 from .identify import firm
 
-OUTPUTS = 8  # fewer, and shapes of other axes are alike by chance
+OUTPUTS = 8  # with fewer, shapes along other axes are similar by chance
 SHARE = 0.5  # of the test's modes that must find a partner along the other axes
 ALIKE = 0.8  # mean MAC of these pairs
 SURE, MOST = 0.95, 0.7  # or: so like these pairs are, and what declared axes reach of them at most
@@ -27,13 +27,13 @@ BETTER = 2.0  # times the sum of MAC along the axes declared
 def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
     """Refuse a table of sensors whose axes are exchanged, all of them in the same way.
 
-    The shapes of the test are held against the model's along the axes declared, along the five
-    other orders of X, Y and Z, and along the normals of the surface.
+    Measured shapes are compared with the model's along the declared axes. The comparison is
+    repeated for the five other orders of X, Y and Z, and for the normals of the surface.
 
     Raises
     ------
     FileError
-        Naming the axes along which they fit.
+        If other axes fit better; the sentence names them.
     """
     found = found.sel(firm(found))
     if len(case.outputs.labels) < OUTPUTS or not found.order:
@@ -57,18 +57,18 @@ def refuse_turned_axes(case: Case, found: Identified, model: Modelled) -> None:
 
 
 def _axes(ways: np.ndarray) -> list[str]:
-    """The axis that each of some directions (k, 3) lies nearest to."""
+    """Return the axis nearest to each direction (k, 3)."""
     return ["XYZ"[k] for k in np.abs(ways).argmax(axis=1)]
 
 
 def _where_declared(ways: np.ndarray, others: np.ndarray) -> str:
-    """Which axes stand for which, of those that differ."""
+    """Describe in words which axes replace which declared ones."""
     differ = sorted({(a, b) for a, b in zip(_axes(ways), _axes(others), strict=True) if a != b})
     return ", ".join(f"along {other} where {said} is declared" for said, other in differ)
 
 
 def _across(case: Case, ways: np.ndarray) -> np.ndarray:
-    """Normals of the surface, with the sign that is declared; what is declared where none is."""
+    """Return surface normals with the declared sign; the declared direction off the surface."""
     normal = surface_normals(case.assembly, case.outputs)
     normal *= np.where((normal * ways).sum(axis=1) < -LEANS, -1.0, 1.0)[:, None]
     return np.where(normal.any(axis=1, keepdims=True), normal, ways)

@@ -30,7 +30,7 @@ FLAT = 0.05  # of the structure's size: hangers nearer to the centre of gravity 
 
 @dataclass(frozen=True, eq=False)
 class TruePlaces:
-    """Where sensors truly sit and which way they feel.
+    """True places and directions of sensors.
 
     Attributes
     ----------
@@ -47,9 +47,10 @@ def true_places(
     assembly: Assembly, outputs: MeasuredDofs, inputs: MeasuredDofs, kind: AccelerometerType,
     rng: np.random.Generator,
 ) -> TruePlaces:  # fmt: skip
-    """Each sensor a little beside its place and tilted; the one at the driving point beside it.
+    """Return true places: each sensor a little off its place and tilted.
 
-    On beams and solids a sensor sits where it should, for there is no sheet to shift it along.
+    The sensor at the driving point sits next to it. On beams and solids a sensor keeps its place,
+    because there is no sheet to shift it along.
     """
     n = len(outputs.labels)
     u, v = tangents(outputs.directions)
@@ -75,11 +76,10 @@ def benched(
     scatter: Scatter,
     rng: np.random.Generator,
 ) -> BenchArticle:
-    """The article by its modes at all places of the test, its damping drawn.
+    """Return the test article as modes at all places of the test, with random damping.
 
-    Where the inputs are the motion of the base it stands on a shaker table, by modes of held
-    supports, and hangs on nothing. Dashpots and losses of materials add to the damping what they
-    dissipate in each mode by itself.
+    If the base moves, the article stands on a shaker table: its modes have fixed supports, and no
+    cords are attached. Dashpots and material losses add their dissipation to each mode.
     """
     built = structure(assembly)
     modes = _modes(built, ABOVE * f_max)
@@ -112,7 +112,7 @@ def benched(
 
 
 def _modes(built: Structure, band: float) -> ModalModel:
-    """Up to a frequency [Hz], and so many that an elastic one is among them."""
+    """Return modes up to a frequency [Hz], at least as many as include an elastic one."""
     found = solved(built, band).modes
     least = min(LEAST, len(built.system.dofs))
     if len(found) >= least:
@@ -147,9 +147,9 @@ def _hung(built: Structure, hangers: Sequence[int]) -> sp.csr_array:
 
 
 def cords_way(assembly: Assembly, hangers: Sequence[int]) -> np.ndarray:
-    """Unit vector (3,) along which cords pull: from the centre of gravity to the hangers.
+    """Return the unit vector (3,) of the cords' pull, from the centre of gravity to the hangers.
 
-    Where the hangers stand on either side of it, along the middle one of the structure's three
+    If the hangers are on both sides of the centre, it is the middle one of the structure's three
     principal directions: in its plane, across its length.
     """
     X = assembly.points[assembly.rows(list(hangers))]
@@ -173,6 +173,6 @@ def _dissipated(built: Structure, phi: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def with_site(article: BenchArticle, row: np.ndarray, law: LocalForce) -> BenchArticle:
-    """One more local force along the motion row (r,)."""
+    """Add a local force along the motion row (r,)."""
     sites = np.vstack([article.sites, row[None]]) if len(article.laws) else row[None]
     return replace(article, sites=sites, laws=(*article.laws, law))

@@ -1,4 +1,4 @@
-"""A case before minutes are spent on it: what will be used, what not, what cannot be right."""
+"""Check a case before a long run: what will be used, what not, and what looks wrong."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from .screening_of_case import POUND, in_pounds, screened_unprepared
 from .unit_check import FAR, refuse_other_units
 from .unit_guess import SIZE, guessed_units
 
-COMMANDS = ("correlate", "calibrate", "diagnose", "study")  # whose use of the words is told
+COMMANDS = ("correlate", "calibrate", "diagnose", "study")  # the use of words by these is reported
 MODES = 12  # of the model that are looked at
 OFF_MASS = 0.1  # of the weighed mass: more is no scatter of sheets
 OFF_MESH = 0.005  # of the structure's size: a sensor farther from the mesh is worth a look
@@ -30,7 +30,7 @@ TOGETHER = 1e-4  # [m]; two channels nearer than this in one direction are one p
 
 @dataclass(frozen=True)
 class CaseFinding:
-    """Something that looks wrong: a fault is to be mended before anything is fitted."""
+    """Something that looks wrong; a ``fault`` must be corrected before a fit."""
 
     text: str
     remedy: str
@@ -52,7 +52,7 @@ class CheckedDof:
 
 @dataclass(frozen=True, eq=False)
 class CaseCheck:
-    """What a case holds, as it was understood.
+    """Content of a case, as it was understood.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class CaseCheck:
     frequency : (r,)      lowest elastic modes of the model [Hz]
     dofs : tuple of CheckedDof
     findings : tuple of CaseFinding
-    unused : {command: sentences}   what each command makes no use of, and how the rest is read
+    unused : {command: sentences}   words each command does not use, and how the rest is read
     """
 
     facts: tuple[tuple[str, str], ...]
@@ -71,13 +71,13 @@ class CaseCheck:
 
     @property
     def faults(self) -> tuple[CaseFinding, ...]:
-        """What is to be mended first."""
+        """The findings that must be corrected first."""
         return tuple(f for f in self.findings if f.fault)
 
 
 @one_blas_thread()
 def check(case: Case, progress: Progress = silent) -> CaseCheck:
-    """Units, mass, size, places, band and words of a case, with the model's lowest modes."""
+    """Check units, mass, size, places, band and words of a case, with the model's lowest modes."""
     progress("modes of the model", 0.1)
     model = as_model(case, "modes")
     modal = model.modes(MODES + 6)
@@ -151,7 +151,7 @@ def _dofs(case: Case, at: MeasuredDofs, role: str) -> list[CheckedDof]:
 
 
 def _units(case: Case) -> list[CaseFinding]:
-    """A system the deck cannot be in, by its weighed mass or its materials."""
+    """Report a unit system that contradicts the weighed mass or the materials."""
     try:
         refuse_other_units(case)
     except FileError as error:
@@ -164,7 +164,7 @@ def _units(case: Case) -> list[CaseFinding]:
 
 
 def _dead(case: Case) -> list[CaseFinding]:
-    """Channels that said nothing, which were left out."""
+    """Report channels without a signal, which were left out."""
     said = [n for r in case.recordings for n in r.notes if n.endswith(DEAD)]
     return [CaseFinding(n, "look at its cable; use = no in sensors.csv says so") for n in said]
 
@@ -218,7 +218,7 @@ def _same(a: CheckedDof, b: CheckedDof) -> bool:
 
 
 def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
-    """What only shows when the recording is held against the model."""
+    """Report the faults that only a comparison of recording and model reveals."""
     if not case.frfs:
         return []
     try:
@@ -236,7 +236,7 @@ def _correlated(case: Case, progress: Progress) -> list[CaseFinding]:
 
 
 def _band(case: Case, elastic: np.ndarray) -> list[CaseFinding]:
-    """A recording in whose band the model has nothing to say."""
+    """Report a recording in whose band the model has no elastic mode."""
     frfs = case.frfs
     if not frfs or not len(elastic):
         return []

@@ -1,4 +1,4 @@
-"""A first case from a deck and a recording: what is guessed, from what, and what is missing."""
+"""Draft a case from a deck and a recording, with what was guessed and what is missing."""
 
 import json
 import os
@@ -42,7 +42,7 @@ _FAR = 0.01  # [m] from the mesh: worth saying
 
 @dataclass(frozen=True, eq=False)
 class CaseDraft:
-    """What `chladni init` writes.
+    """Content of the case that `chladni init` writes.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class CaseDraft:
     read : recordings as read, the compared one first
     dofs : where its outputs and inputs are
     notes : what was assumed
-    missing : what is not there yet, and how to supply it
+    missing : what is still missing, and how to supply it
     """
 
     deck: Path
@@ -88,12 +88,12 @@ def draft(
     weighed: float | None = None,
     allow: Sequence[str] = (),
 ) -> CaseDraft:
-    """Read what there is, guess what is not said, and name what is missing.
+    """Read the files, guess what they do not state, and list what is missing.
 
     Raises
     ------
     FileError
-        If a file cannot be read, if its name is no text, or the unit system cannot be told.
+        If a file cannot be read, its name is not printable, or the unit system is ambiguous.
     """
     for path in (deck, *recordings):
         if not str(path).isprintable():
@@ -123,7 +123,7 @@ def draft(
 
 
 def _as_given(made: Assembly, name: str, system: Units) -> str:
-    """Why these units; what speaks for others where only they fit the materials."""
+    """State why these units hold, or that only another system fits the materials."""
     try:
         guess = guessed_units(made, name)
     except FileError:  # no known material in any system
@@ -158,7 +158,7 @@ def _far(dofs: Sequence[MatchedDof]) -> list[str]:
 def _missing(
     read: Sequence[Recording], dofs: Sequence[MatchedDof], mass: float, weighed: float | None
 ) -> list[str]:
-    """What is not there yet, and how to supply it."""
+    """List what is still missing, and how to supply it."""
     out = []
     lost = [f"{d.label} ({d.role})" for d in dofs if d.way == "missing"]
     if lost:
@@ -181,7 +181,7 @@ def _missing(
 
 
 def sensors_text(made: CaseDraft) -> str:
-    """``sensors.csv``; what is missing has no row."""
+    """Return the text of ``sensors.csv``; a missing sensor has no row."""
     rows = [_row(d) for d in made.dofs if d.way != "missing"]
     return "\n".join([",".join(COLUMNS), *(",".join(row) for row in rows), ""])
 
@@ -200,7 +200,7 @@ def _row(d: MatchedDof) -> list[str]:
 
 
 def case_text(made: CaseDraft, folder: Path) -> str:
-    """``case.toml`` with a comment on every word, its paths as seen from ``folder``."""
+    """Return the text of ``case.toml``, paths relative to ``folder``, a comment on every word."""
     name = lambda path: json.dumps(_seen_from(path, folder), ensure_ascii=False)  # noqa: E731
     lines = [
         "# A case of chladni, drafted by chladni init. Lines that begin with # are off: take the",
@@ -234,7 +234,7 @@ def case_text(made: CaseDraft, folder: Path) -> str:
 
 
 def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
-    """The word that lets in what lies elsewhere, where something does."""
+    """Return the line that permits files outside the folder, if there are any."""
     ways = (Path(_seen_from(path, folder)) for path in (made.deck, *made.recordings))
     if not any(way.is_absolute() or ".." in way.parts for way in ways):
         return []
@@ -242,7 +242,7 @@ def _of_outside(made: CaseDraft, folder: Path) -> list[str]:
 
 
 def _of_mass(made: CaseDraft) -> str:
-    """The weighed mass; where there is none no number that could be taken for one."""
+    """Return the line of the weighed mass; without a weighing it is a comment."""
     if made.weighed is not None:
         return f"mass = {made.weighed:g}  # weighed [kg]"
     return (
@@ -251,7 +251,7 @@ def _of_mass(made: CaseDraft) -> str:
 
 
 def _seen_from(path: Path, folder: Path) -> str:
-    """A path relative to the case, whole where there is no way (another drive)."""
+    """Return a path relative to the case, or the absolute path if it is on another drive."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:
@@ -259,7 +259,7 @@ def _seen_from(path: Path, folder: Path) -> str:
 
 
 def _comment(text: str) -> list[str]:
-    """A sentence as lines that begin with #, whatever a file put into it."""
+    """Wrap a sentence into lines that begin with #, without unprintable characters."""
     words, lines = "".join(c if c.isprintable() else " " for c in text).split(), ["#"]
     for word in words:
         if len(lines[-1]) + len(word) > 98 and lines[-1] != "#":

@@ -30,7 +30,7 @@ MOST, NAMED = 1200, 12  # dofs a deck may ask for at once; loaded ones taken in 
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponses:
-    """Responses, those on other frequencies in an FRF of their own, and what was done."""
+    """Responses, one FRF for each set of frequencies, with notes on the computation."""
 
     frfs: tuple[FRF, ...]
     notes: tuple[str, ...] = ()
@@ -45,7 +45,7 @@ def frf(
     damping: float = 0.01,
     progress: Progress = silent,
 ) -> FrequencyResponses:
-    """Responses of a model.
+    """Compute frequency responses of a model.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def frf(
     Raises
     ------
     FileError
-        If there is nothing to tell where it is driven and where it answers.
+        If the places of excitation or response are missing.
     """
     if _labels(inputs):
         if frequency is None or not _labels(outputs):
@@ -74,7 +74,7 @@ def frf(
 
 
 def _of_recording(case: Case, damping: float, progress: Progress) -> FrequencyResponses:
-    """The model's responses on the lines, labels and quantity of a case's first recording."""
+    """Compute the model's responses on lines, labels and quantity of a case's first recording."""
     if not case.frfs:
         raise FileError(f"{case.path} holds no FRF; give --input and --output, as --input 12:+Z")
     test = case.frfs[0]
@@ -93,7 +93,7 @@ def _labels(side: Side) -> tuple[str, ...]:
 def placed_layout(
     model: Model, path: Path, driven: Sequence[str] = ()
 ) -> tuple[Model, MeasuredDofs, MeasuredDofs]:
-    """The model with the sensors of a layout on it, and its places as :func:`layout_places`."""
+    """Return the model with the masses of a layout's sensors, and its :func:`layout_places`."""
     outputs, inputs = layout_places(model, path, driven)
     if driven:
         said = f"Driven at {', '.join(driven)} (--input); the sensors are those of {path.name}."
@@ -109,7 +109,7 @@ def placed_layout(
 def layout_places(
     model: Model, path: Path, driven: Sequence[str] = ()
 ) -> tuple[MeasuredDofs, MeasuredDofs]:
-    """Outputs and inputs of a layout on a model.
+    """Place the outputs and inputs of a layout on a model.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def layout_places(
     Raises
     ------
     FileError, LabelError
-        If it is no layout, or a place is not on the model.
+        If the file is not a layout, or a place is not on the model.
     """
     if not path.is_file():
         raise FileError(f"no file {path}{beside(path)}")
@@ -141,7 +141,7 @@ def _between(
     model: Model, outputs: Side, inputs: Side, frequency: np.ndarray,
     damping: float, progress: Progress,
 ) -> FrequencyResponses:  # fmt: skip
-    """Receptance by modes up to ``REACH`` times the band and the static rest of the others."""
+    """Superpose modes up to ``REACH`` times the band; others contribute their static response."""
     refuse_unknown(model, outputs, inputs)
     progress("modes", 0.2)
     made = model.solved(REACH * float(frequency[-1]))
@@ -155,7 +155,7 @@ def _between(
 
 
 def refuse_unknown(model: Model, outputs: Side, inputs: Side) -> None:
-    """Refuse ends the model does not have, and a moving base beside other inputs."""
+    """Refuse ends the model does not have, and a moving base together with other inputs."""
     bases = [text for text in _labels(inputs) if text.startswith("base:")]
     if bases and len(_labels(inputs)) > 1:
         raise FileError(f"--input {bases[0]} moves all supports and stands alone, not with others")
@@ -168,7 +168,7 @@ def superposed(
     model: Model, made: Modelled, outputs: Side, inputs: Side,
     frequency: np.ndarray, damping: float,
 ) -> FRF:  # fmt: skip
-    """Receptance of solved modes, up to ``REACH`` times the band, and the static rest of others."""
+    """Superpose solved modes, up to ``REACH`` times the band, and the static rest of the others."""
     names_o, names_i = _labels(outputs), _labels(inputs)
     if isinstance(outputs, MeasuredDofs) and isinstance(inputs, MeasuredDofs) and inputs.base.any():
         return _places_from_base(made, outputs, inputs, frequency, damping)
@@ -191,7 +191,7 @@ def _from_base(
     made: Modelled, outputs: Sequence[str], inputs: Sequence[str], frequency: np.ndarray,
     damping: float,
 ) -> FRF:  # fmt: skip
-    """Acceleration per acceleration of all supports (transmissibility)."""
+    """Compute the acceleration per acceleration of all supports (transmissibility)."""
     _, axis, sign = parse(inputs[0].replace("base:", "0:"))
     ends = [parse(text) for text in outputs]
     dofs, s = np.array([(point, c) for point, c, _ in ends]), made.structure
@@ -212,7 +212,7 @@ def _places_from_base(
     made: Modelled, outputs: MeasuredDofs, inputs: MeasuredDofs, frequency: np.ndarray,
     damping: float,
 ) -> FRF:  # fmt: skip
-    """The same at places that need be no grids, along directions of their own."""
+    """Compute the transmissibility at places off the grids, along their own directions."""
     built, modal = made.structure, made.modes.with_damping(damping)
     pick, load = outputs.rows(built).T.toarray(), inputs.loads(built).T.toarray()
     rest = residual_flexibility(built.system, modal, pick, load, points=node_points(built))
@@ -223,9 +223,9 @@ def _places_from_base(
 
 
 def _of_deck(models: DeckModels, outputs: Sequence[str], progress: Progress) -> FrequencyResponses:
-    """Displacements under the deck's own dynamic loads, one column a subcase.
+    """Compute displacements under the deck's own dynamic loads, one column for each subcase.
 
-    Subcases at other frequencies stand in an FRF of their own.
+    Subcases at other frequencies form a separate FRF.
     """
     asked = models.analysis
     cases = [c for c in asked.subcases if c.dload and c.frequency]
@@ -258,7 +258,7 @@ def _columns(
     labels: Sequence[str],
     progress: Progress,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(frequencies, displacements) of every subcase under its own supports; the first is built."""
+    """Return (frequencies, displacements) of every subcase; the first model is already built."""
     from ..fem.deck_response import response
 
     ends = [parse(text) for text in labels]
@@ -278,7 +278,7 @@ def _columns(
 def _gathered(
     labels: Sequence[str], cases: Sequence[Subcase], columns: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[FRF]:
-    """Subcases at the same frequencies side by side."""
+    """Gather subcases at the same frequencies into one FRF."""
     groups: dict[bytes, list[int]] = {}
     for k, (f, _) in enumerate(columns):
         groups.setdefault(f.tobytes(), []).append(k)
@@ -294,7 +294,7 @@ def _gathered(
 
 
 def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[list[str], list[str]]:
-    """Dofs whose motion the case control asks for (the loaded ones where it names none or all)."""
+    """Return the dofs that the case control requests; the loaded ones for none or all."""
     ids = model.assembly.ids
     runs = [run for case in cases for run in case.outputs]
     named = np.zeros(len(ids), bool)
@@ -315,7 +315,7 @@ def _wanted(model: Model, asked: Analysis, cases: Sequence[Subcase]) -> tuple[li
 
 
 def _loaded(model: Model, asked: Analysis) -> list[str]:
-    """The loaded degrees of freedom, for want of a wish."""
+    """Return the loaded degrees of freedom, used when none is requested."""
     ends = {
         (int(model.assembly.ids[row]), int(c))
         for loads in asked.dynamic.values()

@@ -29,14 +29,14 @@ TRUST = 5.0  # rms of the whitened residual above which poles are not to be trus
 
 @dataclass(frozen=True, eq=False)
 class RecordingModes:
-    """What was identified from one recording.
+    """Modes identified from one recording, and its screening.
 
     Attributes
     ----------
     recording : Recording
-    whole : Identified      with the poles beside the band that shape it
-    screening : Screening   what the recording says of its own faults
-    diagram : Stabilisation poles of every order of the subspace road
+    whole : Identified      with the poles outside the band that contribute to it
+    screening : Screening   faults that the recording itself reveals
+    diagram : Stabilisation poles of every order of the subspace method
     """
 
     recording: Recording
@@ -51,17 +51,17 @@ class RecordingModes:
 
     @property
     def struck(self) -> np.ndarray:
-        """Among ``modes``, poles where no peak is and that no other order shows (r,) bool."""
+        """Among ``modes``, poles without a peak that no other order shows (r,) bool."""
         return ghosts(self.whole, self.diagram)[self.whole.inside]
 
     @property
     def firm(self) -> np.ndarray:
-        """Among ``modes``, those that are known well enough to be called so (r,) bool."""
+        """Among ``modes``, the ones known accurately enough to be reported as modes (r,) bool."""
         return firm(self.modes) & ~self.struck
 
     @property
     def poles(self) -> PoleTable:
-        """The modes that are known well enough, as a table of a report has them."""
+        """The ``firm`` modes, as a table for the report."""
         m = self.modes.sel(self.firm)
         r = len(m.poles)
         return PoleTable(m.frequency, m.frequency_sd, m.damping, np.arange(1, r + 1), ("",) * r)
@@ -69,12 +69,12 @@ class RecordingModes:
 
 @dataclass(frozen=True)
 class PoleChoice:
-    """Poles chosen otherwise than by what they pay.
+    """A choice of poles that replaces the choice by their gain.
 
     Attributes
     ----------
-    states : int or None   all poles of a state space of that order, by the subspace road
-    drop, pick : [Hz]      poles taken out, poles put in by hand
+    states : int or None   all poles of a state space of that order, by the subspace method
+    drop, pick : [Hz]      poles removed, poles added by hand
     """
 
     states: int | None = None
@@ -83,7 +83,7 @@ class PoleChoice:
 
     @property
     def notes(self) -> list[str]:
-        """What was chosen, in sentences."""
+        """The choice, in sentences."""
         said = []
         if self.states is not None:
             said.append(f"All poles of a state space of {self.states} states (subspace road).")
@@ -95,7 +95,7 @@ class PoleChoice:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """The modes of every recording, what was done, and reasons not to trust them.
+    """The modes of every recording, with notes and reasons not to trust them.
 
     ``levels`` holds a study of each object that was measured at two levels or more.
     """
@@ -125,11 +125,11 @@ def identify(
     progress: Progress = silent,
     choice: PoleChoice = PoleChoice(),
 ) -> Identification:
-    """Poles of every recording that holds an FRF, or free decays.
+    """Identify the poles of every recording that holds an FRF, or free decays.
 
     Parameters
     ----------
-    source : a case, whose band and gaps are kept to, or recordings
+    source : a case, whose band and gaps apply, or recordings
     band : [Hz]; default that of the case, else the whole
     averages : of the estimate, where the noise comes from the coherence
     choice : poles by hand, or all of a state space
@@ -174,7 +174,7 @@ def identify(
 
 
 def _has(read: Sequence[Recording]) -> str:
-    """What the recordings hold instead."""
+    """Describe the content of recordings without an FRF."""
     kinds = dict.fromkeys(f.kind for r in read for f in r.functions)
     said = [f"records of kind {', '.join(kinds)}"] if kinds else []
     said += ["a table of poles"] * any(r.poles is not None for r in read)
@@ -216,18 +216,18 @@ def _modes(
 
 
 def firm(modal: Identified) -> np.ndarray:
-    """Poles known to 2 % in frequency and to half their damping: (r,) bool."""
+    """Select poles known to 2 % in frequency and to half their damping: (r,) bool."""
     known = modal.frequency_sd < 0.02 * modal.frequency
     return known & (modal.damping_sd < 0.5 * modal.damping)
 
 
 def clear(found: Identified) -> np.ndarray:
-    """Poles that stand out of noise which a window has made alike on neighbouring lines (r,)."""
+    """Select poles above the noise that a window correlates on neighbouring lines (r,) bool."""
     return np.asarray(found.relative_delta_chi2 > LEAST_DELTA_CHI2 * ALIKE)
 
 
 def without_window(found: Identified, added: float) -> Identified:
-    """The poles without what an exponential window added to them, p + Δσ [1/s]."""
+    """Remove the damping that an exponential window added to the poles, p + Δσ [1/s]."""
     return replace(found, poles=found.poles + added) if added else found
 
 
@@ -252,7 +252,7 @@ def _notes(
 
 
 def _levels(found: Sequence[RecordingModes], averages: int) -> tuple[LevelStudy, ...]:
-    """Modes over levels, of each article and state by itself."""
+    """Study the modes over levels, separately for each article and state."""
     alike: dict[tuple[str, str], list[AtLevel]] = {}
     for one in found:
         r = one.recording
@@ -265,7 +265,7 @@ def _levels(found: Sequence[RecordingModes], averages: int) -> tuple[LevelStudy,
 
 
 def _doubts(found: Sequence[RecordingModes]) -> tuple[str, ...]:
-    """Poles that leave far more than noise are handed out, but said to be weak."""
+    """State a reason for distrust if the poles leave far more than noise."""
     weak = [r for r in found if not r.firm.any() or r.modes.chi > TRUST]
     if not weak:
         return ()

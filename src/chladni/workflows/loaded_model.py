@@ -1,4 +1,4 @@
-"""What commands share about a model: from a path to its assembly, its modes, its pictures."""
+"""Load a model for any command: from a path to its assembly, its modes, its pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from ..io.nastran import Deck
 
 
-LEAST = 7  # modes; with them six rigid motions of a free structure are told from the first elastic
+LEAST = 7  # modes; they separate six rigid motions of a free structure from the first elastic mode
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """An assembly with its matrices, made when first asked for."""
+    """An assembly with its matrices, built at first use."""
 
     source: Path
     assembly: Assembly
@@ -54,16 +54,16 @@ class Model:
         return node_points(self.structure)
 
     def solved(self, band: float) -> Modelled:
-        """Its modes up to a frequency [Hz]."""
+        """Compute its modes up to a frequency [Hz]."""
         return solved(self.structure, band)
 
     @cached_property
     def seen(self) -> Surface:
-        """What a picture of it shows."""
+        """The surface that a picture shows."""
         return surface(self.assembly, self.unit)
 
     def modes(self, count: int) -> ModalModel:
-        """The lowest normal modes."""
+        """Compute the lowest normal modes."""
         from ..dynamics.eigen import normal_modes
 
         count = min(count, len(self.structure.system.dofs))
@@ -94,12 +94,12 @@ def load_model(
     subcase: int | None = None,
     command: str = "modes",
 ) -> Model:
-    """The model of a bare deck, or of a case (folder or case.toml), for a command.
+    """Load the model of a bare deck, or of a case (folder or case.toml), for a command.
 
     Raises
     ------
     FileError
-        If there is no such file, or it is no deck and no case.
+        If there is no such file, or it is neither a deck nor a case.
     """
     source = Path(source)
     if not source.exists():
@@ -114,7 +114,7 @@ def load_model(
 
 @dataclass(frozen=True, eq=False)
 class DeckModels:
-    """A bare deck, what it asks for, and its model under each subcase."""
+    """A bare deck, its analysis requests, and its model under each subcase."""
 
     source: Path
     deck: "Deck"
@@ -122,18 +122,18 @@ class DeckModels:
 
     @cached_property
     def analysis(self) -> Analysis:
-        """Loads, frequencies, damping; read when first asked for."""
+        """Loads, frequencies and damping, read at first use."""
         from ..io.nastran.read.analysis_requests import analysis
 
         return analysis(self.deck, self.units)
 
     def model(self, subcase: int | None = None) -> Model:
-        """The model under the supports and equations of a subcase, or of the one for modes.
+        """Build the model with supports and equations of a subcase, or of the one for modes.
 
         Raises
         ------
         FileError
-            If the deck is wrong, or its materials are none in its unit system but in another.
+            If the deck is wrong, or its materials are known only in another unit system.
         """
         from ..io.nastran import assembly
         from ..io.nastran.read.analysis_requests import STRUCTURAL, remarks
@@ -148,7 +148,7 @@ class DeckModels:
 
 
 def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Model:
-    """The model of a case or of a deck; a model as it is."""
+    """Convert a case or a deck to a model; return a model unchanged."""
     if isinstance(source, Model):
         return source
     if isinstance(source, DeckModels):
@@ -161,7 +161,7 @@ def as_model(source: "Case | Model | DeckModels", command: str = "modes") -> Mod
 def load_deck(
     source: Path, units: str | Units | None = None, allow: Sequence[str] = ()
 ) -> DeckModels:
-    """A bare deck and what it asks for; cards named in ``allow`` are passed over."""
+    """Read a bare deck and its requests; cards named in ``allow`` are skipped."""
     from ..io.nastran import read_deck
 
     if source.is_dir():
@@ -173,19 +173,19 @@ def load_deck(
 
 
 def on_faces(seen: Surface, of_shells: np.ndarray) -> np.ndarray:
-    """Values of the shells as values of all faces; skins of solids have none (nan)."""
+    """Extend values of shells to all faces; skins of solids get nan."""
     values = np.full(len(seen.faces), np.nan)
     values[: len(of_shells)] = of_shells
     return values
 
 
 def is_case(source: Path) -> bool:
-    """A folder (with a case.toml, or to be told that there is none) or a .toml file."""
+    """Return True for a folder or a .toml file; a folder may still lack its case.toml."""
     return source.is_dir() or source.suffix == ".toml"
 
 
 def beside(source: Path) -> str:
-    """The names nearest to the one that is missing, else those of its kind: files and cases."""
+    """List names similar to a missing one, else files and cases with the same ending."""
     if not source.parent.is_dir():
         return f"; there is no folder {source.parent} either"
     there = (p for p in source.parent.iterdir() if p.is_file() or (p / "case.toml").is_file())

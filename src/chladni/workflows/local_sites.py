@@ -1,4 +1,4 @@
-"""Where a local force acts that nobody knows of, and how strong: it must be felt at the level."""
+"""Draw the place and size of a hidden local force, with a visible effect at the test's level."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from .benched_article import with_site
 
 STRONG = 0.2  # stiffness of the site over m ω_1²: what would be a firm support if it were linear
 CLOSES = 1.5  # rms displacements at which a gap closes: one sample in fifteen is beyond it
-SLIPS = 0.7  # rms displacements at which friction gives way
+SLIPS = 0.7  # rms displacements at which friction slips
 
 
 def _clearance(k: float, rms: float) -> LocalForce:
@@ -35,10 +35,10 @@ LOCAL = {"clearance": _clearance, "cubic-spring": _cubic, "friction": _friction}
 def local_site(
     rig: BenchRig, names: Sequence[str], test: BenchTest, rng: np.random.Generator
 ) -> tuple[BenchArticle, list[dict[str, Any]]]:
-    """The article with local forces to ground at sensors drawn at random, and what each is.
+    """Add local forces to ground at random sensors; return the article and their description.
 
-    Their size goes by the rms displacement that the test causes there: pink noise of its level, or
-    a sine of its force at the frequency that moves most.
+    Their size follows the rms displacement that the test causes there. It is that of pink noise
+    at the test's level, or of a sine of its force at the frequency of largest motion.
     """
     truth, article = [], rig.article
     order = rng.permutation(len(article.outputs))
@@ -54,7 +54,7 @@ def local_site(
 
 
 def _rms(rig: BenchRig, test: BenchTest) -> np.ndarray:
-    """Of the displacement at every sensor (n_out,) [m]."""
+    """Return the rms displacement at every sensor (n_out,) [m]."""
     f = np.geomspace(*test.band, 3000)
     s = 2j * np.pi * f
     H = rig.measured.response(s)[:, :, 0]

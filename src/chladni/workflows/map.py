@@ -1,4 +1,4 @@
-"""Thickness of a forming simulation or a scan on a deck, with what the mapping is worth."""
+"""Map thickness of a forming simulation or a scan onto a deck, and rate the mapping."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ class MappedDeck:
     before, after : Assembly
     found : FormedThickness       part by part
     changes : of the deck's cards
-    thinning : what was learned of curvature where parts were guessed, None: nothing was
+    thinning : the law learned from curvature where parts were guessed, else None
     guessed : parts whose thickness is a guess -> its standard deviation over t
     """
 
@@ -41,7 +41,7 @@ class MappedDeck:
 
     @property
     def mass(self) -> tuple[float, float]:
-        """Of all shells, before and after [kg]."""
+        """Mass of all shells, before and after [kg]."""
         before, after = (float(shell_mass(a).sum()) for a in (self.before, self.after))
         return before, after
 
@@ -62,13 +62,13 @@ def map_formed(
     units : of the formed file, the deck's unless given
     place : "as it lies", "aligned" or "mirrored"
     pairs : part of the deck -> part id of the formed mesh
-    guess : give parts the file lacks the thinning their curvature lets expect, as learned from the
-        parts it holds
+    guess : parts missing in the file get the thinning expected from their curvature, as learned
+        from the parts in the file
 
     Raises
     ------
     FileError, ModelError, AccuracyError
-        If the deck has no units, the file lies elsewhere, or fits nothing.
+        If the deck has no units, or the file lies elsewhere or fits no part.
     """
     if model.units is None or model.deck is None:
         raise FileError(f"{model.source}: a thickness needs the deck's unit system (--units)")
@@ -88,7 +88,7 @@ def map_formed(
 def _with_guess(
     made: Assembly, mapped: set[str]
 ) -> tuple[Assembly, ThinningModel, dict[str, float]]:
-    """Shells of the other parts with the thickness expected of their curvature."""
+    """Give shells of the other parts the thickness expected from their curvature."""
     thinning = learn(made, tuple(sorted(mapped)))
     mean, sd = predict(made, thinning)
     part = made.shells.part
@@ -106,7 +106,7 @@ def _with_guess(
 def _not_mapped(
     made: Assembly, found: FormedThickness, guessed: Mapping[str, float] | None
 ) -> list[str]:
-    """Sentences on the parts the file says nothing of."""
+    """Return sentences on the parts that the file does not contain."""
     known = {p.part for p in found.mapped.parts} | set(guessed or {})
     present = [made.parts[k].name for k in np.unique(made.shells.part).tolist()]
     out = []

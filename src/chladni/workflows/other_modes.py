@@ -1,4 +1,4 @@
-"""Normal modes of a model beside those another program found for it: OP2, punch, universal file."""
+"""Compare normal modes of a model with another program's, from OP2, punch or universal files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,13 +21,13 @@ from .loaded_model import Model, beside
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both
 CLOSE = 0.01  # relative distance of frequencies within which shapes may mix
 MORE = 1.5  # modes that are solved for every one of the file, so that all of them find theirs
-LEAST = 3  # grids in common: on fewer all shapes look alike
+LEAST = 3  # grids in common: on fewer all shapes look similar
 READERS = (".op2", ".pch", ".punch", ".unv", ".uff", ".uf")
 
 
 @dataclass(frozen=True, eq=False)
 class OtherModes:
-    """The model's elastic modes beside those of a file, each numbered from 1 as its source does.
+    """Elastic modes of the model and of a file, each numbered from 1 as in its source.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class OtherModes:
     mac : (r_model, r_other)
     pairs : ModePairs
     in_span : (r_other,)      share of each shape of the file in the span of the model's modes
-                              within 1 % of its frequency: what MAC would be could modes not mix
+                              within 1 % of its frequency: the MAC if modes could not mix
     grids, translations : how many were compared
     shapes : (n_points, 3, r_other)   motion of the file's modes, basic frame; 0 where it has none
     whole : the file moves every grid that shells, solids or beams hang on
@@ -59,12 +59,12 @@ class OtherModes:
 
 
 def read_modes(path: Path) -> PunchModes:
-    """Normal modes of an OP2, a punch or a universal file, components 1-6 of every point.
+    """Read normal modes of an OP2, punch or universal file, components 1-6 of every point.
 
     Raises
     ------
     FileError
-        If it is none of these, or holds no shapes.
+        If it is another kind of file, or holds no shapes.
     """
     if not path.is_file():
         raise FileError(f"no file {path}{beside(path)}")
@@ -77,7 +77,7 @@ def read_modes(path: Path) -> PunchModes:
 
 
 def _universal(path: Path) -> PunchModes:
-    """Dataset 55 of a universal file."""
+    """Read dataset 55 of a universal file."""
     shapes = read_uff(path).shapes
     if shapes is None:
         raise FileError(f"{path} holds no mode shapes (dataset 55)")
@@ -132,7 +132,7 @@ def other_modes(model: Model, path: Path, progress: Progress = silent) -> OtherM
 
 
 def _on_model(made: Assembly, read: PunchModes, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the model's points the file has, and its translations there in the basic frame."""
+    """Return rows of the model's points in the file, and translations there (basic frame)."""
     known = np.isin(read.ids, made.ids)
     if known.sum() < LEAST:
         raise FileError(

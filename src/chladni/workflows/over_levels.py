@@ -1,4 +1,4 @@
-"""What levels of excitation change in a diagnosis: verdict, effects, comments of the deck."""
+"""Include levels of excitation in a diagnosis: verdict, effects, comments of the deck."""
 
 from dataclasses import replace
 
@@ -13,10 +13,10 @@ def over_levels(
     asked: Question, prepared: Prepared, stages: UpdatedModels, result: DiagnosisResult,
     diagnosing: bool,
 ) -> DiagnosisResult:  # fmt: skip
-    """The result with the modes over levels; nonlinear where they move and no effect is named.
+    """Add the modes over levels; the verdict is nonlinear if they move and no effect is named.
 
-    An effect of the catalogue is linear: it can explain one level, never that levels differ. Where
-    one was named from the level that is fitted it stays, and a note says that levels differ.
+    An effect of the catalogue is linear: it can explain one level, but not a difference between
+    levels. An effect named from the fitted level stays, with a note that levels differ.
     """
     study = prepared.levels
     result = replace(result, levels=level_tables(study))
@@ -42,7 +42,7 @@ def over_levels(
 
 
 def _with_comment(stages: UpdatedModels, joints: tuple[LinearJoint, ...]) -> UpdatedModels:
-    """The updated deck with joints over levels as comments."""
+    """Add joints over levels to the updated deck as comments."""
     if not joints or stages.final.changes is None:
         return stages
     changes = (*stages.final.changes, Add((), joint_comment(joints)))

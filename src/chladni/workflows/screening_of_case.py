@@ -54,7 +54,7 @@ def screened_by_model(
 
 
 def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Finding]:
-    """Sensors in grams and a weighing in pounds, where the responses say so."""
+    """Report sensors in grams and a weighing in pounds, if the responses show it."""
     deck, carried = float(mass_properties(case.assembly)[0]), sum(m for _, m in case.carried)
     found, weighed = [], case.setup.mass
     seen = smoothed(frf, lines, model, case.outputs, case.inputs)
@@ -87,7 +87,7 @@ def _masses(case: Case, frf: FRF, lines: np.ndarray, model: Modelled) -> list[Fi
 
 
 def in_pounds(deck: float, weighed: float) -> bool:
-    """Whether the weighed mass would be the deck's [kg], had it been pounds."""
+    """Return True if the weighed mass equals the deck's [kg] when read as pounds."""
     return deck > 0 and abs(np.log(deck / (POUND * weighed))) < NEAR_POUND
 
 
@@ -96,14 +96,14 @@ def _places(case: Case) -> dict[str, np.ndarray]:
 
 
 def screened_prepared(case: Case, prepared: Prepared) -> Screening | None:
-    """The same with what was identified and solved for a diagnosis; None where no FRF exists."""
+    """Screen with the poles and modes prepared for a diagnosis; None without an FRF."""
     if not case.frfs or prepared.identified is None:
         return None
     return screened_by_model(case, prepared.identified, prepared.nominal)
 
 
 def screened_unprepared(case: Case) -> Screening | None:
-    """The first recording, where nothing could be prepared from it; None where no FRF exists."""
+    """Screen the first recording when its preparation failed; None without an FRF."""
     if not case.frfs:
         return None
     frf = case.frfs[0]
@@ -116,20 +116,20 @@ def screened_unprepared(case: Case) -> Screening | None:
 
 
 def unmendable(screening: Screening) -> bool:
-    """Whether a fault was found that no fit could make up for."""
+    """Return True if a fault was found that a fit cannot compensate."""
     faults = screening.faults
     return len(faults) > 1 or any(f.kind not in FITTED for f in faults)
 
 
 def instead_of_effects(verdict: str, screening: Screening | None) -> tuple[str, ...]:
-    """Why a verdict that names no cause is not to be trusted: the recording itself looks wrong."""
+    """Return doubts about a verdict without a cause, if the recording itself looks wrong."""
     if verdict != "not in catalogue" or screening is None or not screening.findings:
         return ()
     return (f"{screening.sentence}: that may be what no effect explains",)
 
 
 def at_fault(case: Case, screening: Screening, diagnosing: bool) -> DiagnosisResult:
-    """The answer of a recording that is to be mended first: nothing was fitted to it."""
+    """Return the result for a recording that must be corrected first, without any fit."""
     note = (
         "Nothing was fitted: physics that is found in a recording at fault may be the fault. Write "
         "the repair, or measure again, and ask once more."

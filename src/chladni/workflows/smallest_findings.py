@@ -1,4 +1,4 @@
-"""What the test of a layout would find of a model: the smallest mass, softening and thinning."""
+"""Predict the smallest mass, softening and thinning that the test of a layout would find."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,18 +22,18 @@ def smallest_findings(
     noise: float = NOISE,
     progress: Progress = silent,
 ) -> Detectable:
-    """Predicted evidence of a layout, the article weighed to 0.2 %.
+    """Predict the evidence of a layout, with the article weighed to 0.2 %.
 
     Parameters
     ----------
     layout : a table of sensors, or ``plan.json``
-    band : that will be measured [Hz]
-    noise : of |H|, at every line that is compared
+    band : to be measured [Hz]
+    noise : of |H|, at every compared line
 
     Raises
     ------
     FileError
-        If the model has no unit system or no shells, or the layout is none.
+        If the model has no unit system or no shells, or the file is not a layout.
     """
     if not model.unit:
         raise FileError(f"{model.source}: what a test finds needs the unit system (--units)")

@@ -1,9 +1,9 @@
-"""One state of an object, or several: each is explained, what is common is shared.
+"""Explain one state of an object, or several with shared parameters.
 
-1. the states are explained one after the other; what those before say of E, rho, t, mesh and
-   scatter (their joint fit, each with its own effect) is the prior of the next;
-2. the explanations as decks can hold them are fitted once more, all at once, with E, rho, t shared;
-3. every state's deck is written with the shared values and its own effect.
+1. The states are explained one after the other. The joint fit of the earlier states, each with
+   its own effect, is the prior of the next for E, rho, t, mesh and scatter.
+2. The explanations, as decks can hold them, are fitted again together, with E, rho, t shared.
+3. Every state's deck is written with the shared values and its own effect.
 """
 
 from dataclasses import replace
@@ -61,7 +61,7 @@ def _in_states(
 
 
 def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:
-    """The case with the recordings of one state; the weighing is that of the first."""
+    """Return the case with the recordings of one state; the weighing is that of the first."""
     setup, notes = case.setup, case.notes
     recordings = of_state(case.recordings, name)
     if name != names[0]:
@@ -72,24 +72,24 @@ def _one_state(case: Case, names: tuple[str, ...], name: str) -> Case:
 
 
 def _lead(found: Diagnosis) -> HypothesisFit:
-    """The explanation with all that was fitted beside it."""
+    """Return the fit of the explanation with all its other fitted numbers."""
     return found.found or found.null
 
 
 def _as_deck(one: Explained) -> HypothesisFit:
-    """The explanation as a deck can hold it, beside the learned error of the model."""
+    """Return the explanation as a deck can hold it, with the learned error of the model."""
     return as_written(_lead(one.found), one.prepared.problem.mass_measurement)
 
 
 def _joint(every: list[Explained], fits: list[HypothesisFit]) -> JointFit:
-    """All states at once; priors are those of the first, which knew of no other."""
+    """Fit all states together, with the priors of the first state."""
     return joint_fit(fits, [e.prepared.problem.mass_measurement for e in every])
 
 
 def _with(one: Explained, fit: HypothesisFit, changed: bool) -> Explained:
-    """The explanation with the values that all states share in its deck.
+    """Put the shared values of all states into the deck of an explanation.
 
-    A state that asks for no other values than the deck's has them too where another state does.
+    A state that needs no other values than the deck's gets them too if another state needs them.
     """
     found = replace(one.found, shared=True)
     if found.found is not None:
@@ -103,7 +103,7 @@ def _said(
     result: DiagnosisResult, name: str, names: tuple[str, ...],
     shared: tuple[CalibratedParameter, ...],
 ) -> DiagnosisResult:  # fmt: skip
-    """The result with a note on what it shares."""
+    """Add a note on the shared parameters to the result."""
     rest = ", ".join(repr(n) for n in names if n != name)
     what = ", ".join(p.where for p in shared) or "nothing"
     note = f"state {name!r} was fitted together with {rest}: {what} shared, an effect is its own"

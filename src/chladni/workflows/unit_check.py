@@ -1,4 +1,4 @@
-"""A deck far from the weighed mass, or of no known material, was read in the wrong unit system."""
+"""Detect a wrong unit system by a deck far from the weighed mass or of no known material."""
 
 import numpy as np
 
@@ -16,12 +16,12 @@ STIFF, HEAVY = (1e6, 2e12), (10.0, 3e4)  # E [Pa] of rubber to diamond, rho [kg/
 def refuse_other_units(case: Case) -> None:
     """Refuse a deck that weighs ``FAR`` times more or less than the article on the scales.
 
-    So is one whose materials are known ones in another unit system, and in no way in its own.
+    Also refuse a deck whose materials are known only in another unit system.
 
     Raises
     ------
     FileError
-        Naming the unit systems in which the deck would weigh right, and be of a usual material.
+        If either check fails; the sentence names the unit systems that fit mass and materials.
     """
     _refuse_by_mass(case)
     _refuse_by_material(case)
@@ -60,7 +60,7 @@ def _refuse_by_mass(case: Case) -> None:
 
 
 def _fits(made: Assembly, said: Units, other: Units, mass: float, weighed: float) -> bool:
-    """Whether the deck's numbers make sense in another system: its mass, and usual materials."""
+    """Return True if mass and materials of the deck are plausible in another unit system."""
     if not 1 / FAR <= mass * other.mass / said.mass / weighed <= FAR:
         return False
     materials = [m for part in made.parts if (m := material_of(part.section)) is not None]
@@ -70,6 +70,6 @@ def _fits(made: Assembly, said: Units, other: Units, mass: float, weighed: float
 
 
 def _usual(values: np.ndarray, limits: tuple[float, float]) -> bool:
-    """Whether the median of those that are given lies within limits."""
+    """Return True if the median of the positive values lies within limits, or there is none."""
     given = values[values > 0]
     return not len(given) or bool(limits[0] <= np.median(given) <= limits[1])

@@ -48,7 +48,7 @@ ABOVE_BAND = 1.5  # articles differ in their modes up to so many times the highe
 
 @dataclass(frozen=True)
 class BenchSettings:
-    """What a virtual test is to be.
+    """Settings of a virtual test.
 
     Attributes
     ----------
@@ -59,13 +59,13 @@ class BenchSettings:
     articles : how many, each drawn
     seed : of all that is drawn
     hide : names of effects to conceal
-    local : clearance, cubic-spring, friction: what acts where nobody knows of it
+    local : clearance, cubic-spring, friction: forces that act at concealed places
     exact : the articles are the deck's own, without scatter
     finer : the articles' mesh is the deck's with every shell cut in four
     resolution, averages, sweeps : as ``BenchTest`` has them
-    delay : cycles a stepped sine waits at every line, where the thesis' table says less
+    delay : cycles a stepped sine waits at every line, if the thesis' table gives fewer
     room : m/s² rms by which sound and floor move the median accelerometer, in the band
-    rubber : whether the cords' ends are taped with it, so that they hardly ring
+    rubber : whether rubber is taped to the cords' ends, so that they hardly ring
     keep_time : whether time data are kept
     """
 
@@ -90,16 +90,16 @@ class BenchSettings:
 
 @dataclass(frozen=True, eq=False)
 class BenchResult:
-    """Recordings, article by article and level by level, and what nobody was told.
+    """Recordings, article by article and level by level, and the concealed truth.
 
     Attributes
     ----------
     settings, setup : as tested
-    outputs, inputs : where, as the user believes
+    outputs, inputs : places as the user believes them
     band : of the test [Hz]
     mass : weighed, of the first article [kg]
     recordings : tuple
-    truth : what was concealed, true places and scatter
+    truth : concealed effects, true places and scatter
     schedule : lines of the stepped sine, else none
     cords : (k,) as they ring when tapped [Hz]
     """
@@ -120,7 +120,7 @@ class BenchResult:
 def virtual_test(
     case: Case, settings: BenchSettings | None = None, progress: Progress = silent
 ) -> BenchResult:
-    """Put the case's structure on the bench, hide in it what is to be hidden, test it.
+    """Put the case's structure on the bench, conceal the chosen effects in it, and test it.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _tested(case: Case, settings: BenchSettings, progress: Progress) -> BenchRes
 
 
 def _refuse_long(settings: BenchSettings, band: tuple[float, float], channels: int) -> None:
-    """Refuse blocks of time data that no memory holds, with the resolution that would do."""
+    """Refuse time data too large for the memory; name a resolution that fits."""
     if settings.excitation not in ("burst-random", "multisine"):
         return
     rate, limit = sampling_rate(band[1]), most_gigabytes()
@@ -237,7 +237,7 @@ def _refuse_long(settings: BenchSettings, band: tuple[float, float], channels: i
 
 
 def _refuse_few(lines: int, band: tuple[float, float]) -> None:
-    """Refuse a recording that nothing could be identified from."""
+    """Refuse a recording with too few lines for identification."""
     if lines < LEAST_LINES:
         raise FileError(
             f"{lines} lines between {band[0]:g} and {band[1]:g} Hz are too few to identify from, "
@@ -247,7 +247,7 @@ def _refuse_few(lines: int, band: tuple[float, float]) -> None:
 
 
 def _tapped(case: Case, settings: BenchSettings, mass: float) -> tuple[float, ...]:
-    """Frequencies at which the cords are heard to ring [Hz]."""
+    """Return the frequencies of the cords when tapped [Hz]."""
     cords = cords_for(mass, len(case.setup.hangers))
     return () if settings.rubber or case.inputs.base[0] else tuple(c.frequency for c in cords)
 
@@ -262,7 +262,7 @@ def _run(
 
 
 def _band(case: Case) -> tuple[float, float]:
-    """Of the case, a little wider; else of its first modes [Hz]."""
+    """Return the band of the case, slightly wider, or that of its first modes [Hz]."""
     named = [b for b in (case.band, case.held_band) if b is not None]
     if named:
         low, high = min(b[0] for b in named), max(b[1] for b in named)
@@ -276,7 +276,7 @@ def _article(
     case: Case, settings: BenchSettings, setup: BenchSetup, band: tuple[float, float],
     scatter: Scatter, rng: np.random.Generator,
 ) -> tuple[BenchArticle, dict[str, Any]]:  # fmt: skip
-    """The nominal article with what is hidden in it, and the truth of it."""
+    """Return the nominal article with its concealed effects, and a record of them."""
     made, truth = case.assembly, {"seed": settings.seed, "effects": {}}
     if settings.finer:
         made = refined(made)
@@ -303,13 +303,13 @@ def _article(
 
 
 def _grids(case: Case, at: MeasuredDofs) -> np.ndarray:
-    """Grid of the deck at or nearest to every place that is measured or driven (n,)."""
+    """Return the deck's grid nearest to every measured or driven place (n,)."""
     a = case.assembly
     return np.where(at.grids > 0, at.grids, a.ids[nearest_points(a.points, at.points)])
 
 
 def _driven(case: Case) -> tuple[int, tuple[float, float, float]] | None:
-    """Grid and direction of the force; None where the supports are what moves."""
+    """Return grid and direction of the force; None if the supports move."""
     if case.inputs.base[0]:
         return None
     x, y, z = case.inputs.directions[0].tolist()
@@ -328,7 +328,7 @@ def _drawn(
 
 
 def level_unit(inputs: MeasuredDofs) -> str:
-    """Of a test's level: force, or acceleration of a shaker table."""
+    """Return the unit of a test's level: of force, or of a shaker table's acceleration."""
     return "m/s²" if inputs.base[0] else "N"
 
 
