@@ -1,4 +1,4 @@
-"""What a diagnosis works with, and the fit of one hypothesis."""
+"""The problem of a diagnosis, and the fit of one hypothesis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ NEARLY = 6.0  # in -2 ln evidence: what explains poles so much worse still has a
 
 @dataclass(frozen=True, eq=False)
 class Valley:
-    """Where else the parameters (n_p,) of an effect may lie, with their standard deviations."""
+    """Another likely place of an effect's parameters (n_p,), with their standard deviations."""
 
     neg2_log_evidence: float
     x: np.ndarray
@@ -33,10 +33,10 @@ class Valley:
 
 @dataclass(frozen=True, eq=False)
 class HypothesisFit:
-    """One hypothesis after its fit: the effect, the fit, the model it was fitted in.
+    """One hypothesis after its fit: the effect, the fit and the model used for it.
 
-    ``beside`` are effects that were found before it; the hypothesis is all of them together.
-    ``valleys`` are other values of the effect that explain the same poles paired otherwise.
+    ``beside`` are effects found earlier; the hypothesis is all of them together.
+    ``valleys`` are other values of the effect, from another pairing of the same poles.
     """
 
     effect: Effect
@@ -47,7 +47,7 @@ class HypothesisFit:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """All that it names."""
+        """All effects of the hypothesis."""
         return (self.effect, *self.beside)
 
     @property
@@ -57,17 +57,17 @@ class HypothesisFit:
 
     @property
     def physics(self) -> bool:
-        """Whether it changes the model, and not the test alone."""
+        """True if it changes the model, and not only the test."""
         return any(e.kind != "test" for e in self.effects)
 
     @property
     def verdict(self) -> str:
-        """The public verdict where it is named."""
+        """The public verdict if it is named."""
         return "missing physics" if self.physics else "measurement fault"
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels that it concerns, where it concerns nothing else."""
+        """Channels of its effects, if every effect is one of channels."""
         every = [e.channels for e in self.effects]
         return tuple(c for each in every for c in each) if all(every) else ()
 
@@ -78,7 +78,7 @@ class HypothesisFit:
         return tuple(v for v in self.valleys if v.neg2_log_evidence < most)
 
     def among(self, other: "HypothesisFit") -> "HypothesisFit":
-        """The same with the values of another fit of its effect to the same poles kept as well."""
+        """Keep the values of another fit of the same effect to the same poles as a valley."""
         if not isinstance(self.data, Poles) or other.effect.text != self.effect.text:
             return self
         own = other.fit.of(other.effect), other.fit.sd(other.effect)
@@ -87,7 +87,7 @@ class HypothesisFit:
 
     @property
     def data(self) -> Data:
-        """What was fitted."""
+        """The fitted data."""
         return self.fit.data
 
     @property
@@ -98,14 +98,14 @@ class HypothesisFit:
 
 @dataclass(frozen=True, eq=False)
 class UpdatingProblem:
-    """All that a diagnosis works with.
+    """Data and model of a diagnosis.
 
     Attributes
     ----------
     base : ordinary parameters and nuisances, free in every fit
     nuisance : the nuisances alone
-    damping, coupling : of the modes that were identified, where responses are compared
-    found : effects of the base that were found, each with its parameters where it was
+    damping, coupling : of the identified modes, if responses are compared
+    found : effects found earlier and now in the base, each with its parameters
     """
 
     reduced: ReducedProblem
@@ -121,7 +121,7 @@ class UpdatingProblem:
 
     @property
     def where(self) -> Surroundings:
-        """The structure and its test as effects may know them."""
+        """The structure and its test, as effects see them."""
         reduced = self.reduced
         shapes = reduced.shapes
         return Surroundings(
@@ -130,7 +130,7 @@ class UpdatingProblem:
         )  # fmt: skip
 
     def allowing_errors(self, state: State, delta: float = MEDIAN) -> "UpdatingProblem":
-        """Responses with errors of the model's form as they spread from this state."""
+        """Return the problem with errors of the model's form, linearised about this state."""
         if not isinstance(self.data, Responses):
             return self
         data = self.data.allowing_errors(state, delta)
@@ -140,18 +140,18 @@ class UpdatingProblem:
         return replace(self, data=data)
 
     def exactly(self) -> "UpdatingProblem":
-        """The same problem with a model that is taken to be right but for its parameters."""
+        """Return the problem for a model without errors of form."""
         if not isinstance(self.data, Responses):
             return self
         return replace(self, data=self.data.exactly())
 
     def begun_wide(self) -> "UpdatingProblem":
-        """The same problem with the likelihood in which searches begin."""
+        """Return the problem with the wider likelihood in which searches begin."""
         wide = getattr(self.data, "wide", None)
         return self if wide is None else replace(self, data=wide)
 
     def holding(self, found: Sequence[tuple[Effect, np.ndarray]]) -> "UpdatingProblem":
-        """The same problem with effects in its base, and in its model what they move."""
+        """Return the problem with effects in its base, and their changes in its model."""
         problem = self
         for effect, x in found:
             model = problem.reduced.model_for(effect, x)
@@ -163,11 +163,11 @@ class UpdatingProblem:
         return problem
 
     def mean(self) -> np.ndarray:
-        """Prior mean of the base parameters; what was found stands where it was found."""
+        """Prior mean of the base parameters; found effects keep their fitted values."""
         return self.begun(self.base)
 
     def begun(self, effects: Sequence[Effect]) -> np.ndarray:
-        """The same of some of them."""
+        """Starting values of these effects: fitted values if found, else the prior mean."""
         known = {id(e): x for e, x in self.found}
         each = [known.get(id(e), np.array([p.mean for p in e.parameters])) for e in effects]
         return np.concatenate([np.zeros(0), *each])
@@ -186,10 +186,10 @@ class UpdatingProblem:
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
 
     def about_itself(self, hypothesis: HypothesisFit, max_steps: int = 30) -> HypothesisFit:
-        """A hypothesis with errors of the model's form as they spread from its own state.
+        """Fit a hypothesis again with errors of the model's form about its own state.
 
-        While many are compared they spread from the null's; a strong effect makes it another
-        structure (a support turns rigid modes into flexible ones, which err as those do).
+        Comparisons of many hypotheses use the errors about the null's state. A strong effect
+        changes the structure: a support turns rigid modes into flexible ones, with their errors.
         """
         data, begun = hypothesis.data, hypothesis.fit
         if not isinstance(data, Responses) or data.error is None:
@@ -200,7 +200,7 @@ class UpdatingProblem:
         return replace(hypothesis, fit=fit)
 
     def without(self, effect: Effect) -> list[Effect]:
-        """The base less what the effect makes superfluous; what was found stays."""
+        """Return the base without the effects that this one replaces; found effects stay."""
         found = [e for e, _ in self.found]
         return [e for e in self.base if e in found or e.text not in effect.replaces]
 
@@ -209,7 +209,7 @@ def fitted(
     model: Reduced, effects: Sequence[Effect], data: Data,
     mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int = 30,
 ) -> Fit:  # fmt: skip
-    """A fit; for poles, the spread that no model reaches is found with it."""
+    """Fit a model; for poles, the irreducible spread is fitted too."""
     if isinstance(data, Poles):
         found = _fit_poles(model, effects, data, mass_measurement, x)
     elif isinstance(data, Responses) and data.error is not None:
@@ -223,7 +223,7 @@ def begun(
     model: Reduced, effects: Sequence[Effect], data: Data,
     mass_measurement: MassMeasurement | None, x: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Where a fit begins: narrow basins are entered from the likelihood of independent samples."""
+    """Return the start of a fit, found with the wide likelihood of independent samples."""
     wide = data.wide if isinstance(data, Responses) else None
     return x if wide is None else fitted(model, effects, wide, mass_measurement, x, ROUGH).x
 
@@ -235,7 +235,7 @@ def _fit_responses(
     model: Reduced, effects: Sequence[Effect], data: Responses,
     mass_measurement: MassMeasurement | None, x: np.ndarray, max_steps: int,
 ) -> Fit:  # fmt: skip
-    """Parameters and the size δ of the model's error in turn; the evidence has δ integrated out."""
+    """Fit parameters and the size δ of the model's error in turn; evidence integrates δ out."""
     assert data.error is not None
     for _ in range(ROUNDS):
         found = fit(model, effects, data, mass_measurement, x, max_steps=max_steps)
@@ -261,7 +261,7 @@ def _fit_poles(
     mass_measurement: MassMeasurement | None,
     x: np.ndarray,
 ) -> Fit:
-    """Alternate the fit with the most probable scale of what no model reaches."""
+    """Alternate the fit with the most probable scale of the irreducible spread."""
     options = []
     for road in ROADS:
         there = x
@@ -282,7 +282,7 @@ def _settled(
     mass_measurement: MassMeasurement | None,
     x: np.ndarray,
 ) -> Fit:
-    """Scale and parameters in turn until the evidence stays."""
+    """Fit scale and parameters in turn until the evidence stays constant."""
     best = None
     for _ in range(4):
         scale = _likely_scale(replace(data, scale=SCALES[0]), evaluate(model, effects, x, False))
@@ -297,11 +297,11 @@ def _settled(
 
 
 def over_scales(data: Poles, state: State, r0: np.ndarray, J0: np.ndarray) -> float:
-    """-2 ln evidence of poles with the spread that no model reaches integrated out.
+    """-2 ln evidence of poles with the irreducible spread integrated out.
 
-    Few poles say little of that spread: held at its most probable value, as small as a model of
-    several free numbers can make it, it would refuse what lies a per cent off.  The parameters are
-    linear about their fit, ``r0``, ``J0`` what is known of them beside the data.
+    Few poles determine that spread poorly. A model of several free numbers can make its most
+    probable value very small; held there, it would reject deviations of a per cent.  Parameters
+    are linear about their fit; ``r0``, ``J0`` are residual and slope of the other knowledge.
     """
     every = []
     for scale in SCALES:

@@ -1,10 +1,10 @@
-"""What a recording says about a state of the reduced model: whitened residuals and their slopes.
+"""Compare a recording with a state of the reduced model: whitened residuals and their slopes.
 
-Two ways of reading a recording share one interface:
+Two kinds of data share one interface:
 
-- :class:`Responses`: complex log10 deviation of the damping-equalised FRF on the line
-  s = ω (ζ + i) (Abrahamsson and Kammer's equalisation, poles moved to |p| on both sides);
-- :class:`Poles`: ln of natural frequencies, where gain or places are unknown.
+- :class:`Responses`: complex log10 deviation of the damping-equalised FRF on s = ω (ζ + i). This
+  is Abrahamsson and Kammer's equalisation; poles are moved to |p| on both sides;
+- :class:`Poles`: ln of natural frequencies, used if gain or places are unknown.
 """
 
 from dataclasses import dataclass, field, replace
@@ -35,10 +35,10 @@ class Data(Protocol):
         """r (n,) and ∂r/∂x (n, n_p)."""
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """The same over the spread of each sample alone, dependence not yet whitened out."""
+        """Residuals divided by the spread of each sample, with their dependence still present."""
 
     def over(self, model: Reduced) -> Self:
-        """The same data seen through another basis."""
+        """Return the data with rows in another basis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Responses:
     values : (n_f, n_out, n_in) complex    H_X(s)
     s : (n_f,) complex                     [rad/s]
     outputs, inputs : sparse rows (n_out, n), (n_in, n) of the structure
-    direct : (n_out, n_in)                 what a moving base carries along, 0 for forces
+    direct : (n_out, n_in)                 rigid motion with a moving base, 0 for forces
     use : (n_f, n_out) bool                lines and channels the fit may see
     sigma_model : float                    sd of log10 H that neither noise nor δ explains
     noise : (n_f, n_out, n_in)             sd of log10 H of independent samples, spread included
@@ -94,7 +94,7 @@ class Responses:
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
 
-        Where effects dissipate, of modes that are complex (:mod:`.rising`).
+        If effects dissipate, the modes are complex (:mod:`.rising`).
         """
         H = self.receptance(state, *self.modal(state))
         return self.s[:, None, None] ** self.power * H + self.direct
@@ -102,7 +102,7 @@ class Responses:
     def receptance(
         self, state: State, phi_o: np.ndarray, phi_i: np.ndarray, d: np.ndarray
     ) -> np.ndarray:
-        """Of modes as :meth:`modal` gives them, made complex by what dissipates."""
+        """Receptance of the modes of :meth:`modal`, made complex by dissipation."""
         H = modal_sum(phi_o, d, phi_i)
         lost = state.dissipated
         return H if lost is None else H + lost.seen(self.s, d, phi_o, phi_i)
@@ -110,7 +110,7 @@ class Responses:
     def modal(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """φ_o (n_out, r), φ_i (n_in, r) and D = 1 / (λ + s²) (n_f, r).
 
-        φ_i of a moving base is its load, which follows the mass of the state.
+        φ_i of a moving base is its load, which depends on the mass of the state.
         """
         d = 1 / (state.lam + self.s[:, None] ** 2)
         phi_o = self.a @ state.phi
@@ -121,7 +121,7 @@ class Responses:
         return phi_o + moved_o, phi_i + moved_i if state.drive is None else phi_i, d
 
     def _of_test(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What holds for all places, of the outputs and of the inputs."""
+        """Split an array over all places into outputs and inputs."""
         return places[: len(self.a)], places[len(self.a) :]
 
     def deviation(self, state: State) -> np.ndarray:
@@ -132,7 +132,7 @@ class Responses:
         return wrapped(delta)
 
     def std(self) -> np.ndarray:
-        """Standard deviation of δ of each sample, dependence apart."""
+        """Standard deviation of δ of each sample, without their dependence."""
         if self.about is not None and self.identified is not None:
             out, more = np.full(self.values.shape, RESOLVED**2), [self.spread, self.bent]
         else:
@@ -144,11 +144,11 @@ class Responses:
     def allowing_errors(
         self, state: State, delta: float = MEDIAN, curved: float | None = None
     ) -> Self:
-        """The same responses of a model whose form is off by about δ, as seen from a state.
+        """Return these responses for a model with an error of form of size δ about a state.
 
-        Errors of the sensors are included. ``curved`` is the δ that terms of second order take,
-        where it is not δ: common to hypotheses whose evidence is compared, for these terms count as
-        independent, and a smaller δ would gain on every sample.
+        Errors of the sensors are included. ``curved`` is the δ of second-order terms, if not δ.
+        Hypotheses whose evidence is compared share it: these terms count as independent, and a
+        smaller δ would gain on every sample.
         """
         plain = self.exactly()
         if curved is None:
@@ -182,15 +182,15 @@ class Responses:
         return np.concatenate([no, *own]), np.concatenate([no, *common])
 
     def wrong(self, state: State) -> np.ndarray | float:
-        """E|d ln H|² of what sensors show wrongly by themselves (n_f, n_out, n_in)."""
+        """E|d ln H|² of the independent errors of sensors (n_f, n_out, n_in)."""
         return 0.0 if self.sensors is None else variance(self.sensors, self, state)
 
     def exactly(self) -> Self:
-        """The same responses of a model and a test that are right but for its parameters."""
+        """Return these responses for a model and a test without errors of form."""
         return replace(self, bent=None, error=None, about=None, known=None, wide=None)
 
     def using(self, use: np.ndarray) -> Self:
-        """Other lines and channels, with the same errors of the model's form."""
+        """Return other lines and channels, with the same errors of the model's form."""
         data = replace(self, use=use)
         if self.error is None or self.about is None:
             return data
@@ -198,12 +198,12 @@ class Responses:
 
     @property
     def span(self) -> Span | None:
-        """Space of the residuals, where it is smaller than the samples."""
+        """Space of the residuals, if it is smaller than that of the samples."""
         return None if self.known is None else self.known.span
 
     @property
     def log_det(self) -> float:
-        """Ln det of the covariance that known errors leave, where evidence counts it."""
+        """Ln det of the covariance with known errors, if the evidence counts it."""
         return 0.0 if self.known is None or self.identified is None else self.known.log_det
 
     def residual(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -214,7 +214,7 @@ class Responses:
         return self.error.whitened(r), self.error.whitened(J) if gradient else J
 
     def scaled(self, state: State, gradient: bool) -> tuple[np.ndarray, np.ndarray]:
-        """δ over its spread on what is in use, real and imaginary, sensors' errors whitened out."""
+        """δ over its spread on used samples, real and imaginary, sensors' errors whitened out."""
         sd = self.std()
         r = self.stacked(self.deviation(state)[None] / sd)[:, 0]
         if not gradient:
@@ -230,9 +230,9 @@ class Responses:
     def _slopes(self, state: State) -> np.ndarray:
         """∂δ/∂x (n_p, n_f, n_out, n_in): dH = -s^k φ_o D ((dK + s² dM) D φ_i - dφ_i), over H ln 10.
 
-        dK and dM are met over the basis, with Φ D φ_i on their right, so that none is taken into
-        the modes whole. dφ_i is that of a moving base; dφ_o and dφ_i of shapes that change where
-        they are measured.
+        dK and dM are multiplied in the basis, with Φ D φ_i on their right, so that none is
+        projected on the modes as a whole. dφ_i is that of a moving base. dφ_o and dφ_i also occur
+        if shapes change where they are measured.
         """
         phi_o, phi_i, d = self.modal(state)
         H = self.receptance(state, phi_o, phi_i, d)
@@ -264,7 +264,7 @@ class Responses:
         return out
 
     def only(self, use: np.ndarray) -> Self:
-        """The same responses on other lines and channels."""
+        """Return these responses on other lines and channels, without errors of form."""
         return replace(self.exactly(), use=use)
 
     def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
@@ -289,7 +289,7 @@ class Poles:
     use : (n,) bool           poles the fit may see
     strength : (n,)           peak height relative to the highest
     band : (low, high) Hz     in which the test would have shown a mode
-    scale : float             spread of ln f that no model reaches; learned with every hypothesis
+    scale : float             irreducible spread of ln f; learned with every hypothesis
     spurious : (n,) or float  chance of each pole to belong to no mode of the structure
     outputs, inputs           rows at the likely places of sensors and shakers, or None
     """
@@ -319,7 +319,7 @@ class Poles:
     def pairs(
         self, state: State, among: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Positions (test pole, model mode) of each pair, and the price of unpaired modes."""
+        """Return positions (test pole, model mode) of each pair, and the price of other modes."""
         poles = np.flatnonzero(self.use if among is None else among)
         if not len(poles):
             return poles, poles, 0.0
@@ -335,12 +335,12 @@ class Poles:
         return poles[test], modes[model], unpaired
 
     def _price_unpaired(self) -> np.ndarray:
-        """Price of an unpaired pole, on the scale on which a pair costs δ²/σ²."""
+        """Price of an unpaired pole, on a scale where a pair costs δ²/σ²."""
         price = np.where(np.isinf(self.strength), 1e4, price_spurious(self.spurious))
         return price - 2 * np.log(self.std())
 
     def visibility(self, state: State, modes: np.ndarray) -> np.ndarray:
-        """How strongly each mode shows, 1 = as the strongest: rms residue over likely places."""
+        """Visibility of each mode, 1 for the strongest: rms residue over likely places."""
         if self.a is None or self.b is None or not len(modes):
             return np.ones(len(modes))
         seen = np.sqrt(((self.a @ state.phi[:, modes]) ** 2).mean(axis=0))
@@ -377,13 +377,13 @@ class Poles:
     scaled = residual  # poles are independent
 
     def only(self, use: np.ndarray) -> Self:
-        """The same poles, others in use."""
+        """Return these poles with others in use."""
         return replace(self, use=use)
 
     using = only  # poles are independent
 
     def forced(self, state: State, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """ln(f_model / f_test) and the model mode of every real pole (n,): none is left alone."""
+        """ln(f_model / f_test) and the model mode of every real pole (n,); all are paired."""
         wide = replace(self, scale=0.1, strength=np.full(len(self.strength), np.inf))
         delta, mode = np.full(len(real), np.nan), np.full(len(real), -1)
         d, test, model = wide.deviation(state, real)
@@ -391,7 +391,7 @@ class Poles:
         return delta, mode
 
     def Q(self, state: State, use: np.ndarray, real: np.ndarray | None = None) -> float:
-        """Mean |log10(f_model / f_test)|² over the poles in use that are real ones."""
+        """Mean |log10(f_model / f_test)|² over the real poles in use."""
         real = np.ones(len(use), bool) if real is None else real
         delta = self.forced(state, real)[0][use & real]
         known = np.isfinite(delta)

@@ -1,4 +1,4 @@
-"""Test and model side by side, nothing calibrated: paired modes, MAC, COMAC, Q."""
+"""Compare test and model without calibration: paired modes, MAC, COMAC, Q."""
 
 from dataclasses import dataclass, replace
 
@@ -35,22 +35,22 @@ RIGID = 1e-3  # of the highest frequency of the test: modes below are rigid moti
 
 @dataclass(frozen=True, eq=False)
 class Correlation:
-    """Test and model side by side: paired modes with shapes at the sensors, and Q.
+    """Comparison of test and model: paired modes with shapes at the sensors, and Q.
 
     Attributes
     ----------
     channels, sensors : names of the columns of Q and of COMAC
-    test : what was identified; None where only poles were given
+    test : the identified modes; None if only poles were given
     f_test, f_model : (r_test,), (r_model,) [Hz]
     mac : (r_model, r_test) or None
     pairs : ModePairs
     comac : (n_out,) or None
     quality : Q by channel and band, or None
     model : responses of the model on the lines of the recording, or None
-    screening : what the recording says of its own faults, alone and against the model
+    screening : faults of the recording, found alone and by comparison with the model
     numbers : of the model's modes, the rigid ones counted, as in ``f_model``
     shapes : of the pairs at the sensors, with the model's whole motion; None without FRFs
-    likeness : what the MAC of each pair is worth; none without one
+    likeness : significance of the MAC of each pair; empty without a MAC
     """
 
     channels: tuple[str, ...]
@@ -75,13 +75,13 @@ def correlate(case: Case, progress: Progress = silent, every_line: bool = True) 
 
     Parameters
     ----------
-    every_line : False where its screening alone is asked for: of a long recording the modes are
-        then told from the lines that screening needs
+    every_line : False if only its screening is needed: the modes of a long recording are then
+        identified from the lines that screening needs
 
     Raises
     ------
     FileError
-        If the deck's unit system cannot be right, or there is nothing to compare with.
+        If the deck's unit system cannot be right, or there is no recording to compare with.
     """
     refuse_other_units(case)
     with one_blas_thread():
@@ -124,7 +124,7 @@ def _correlated(case: Case, progress: Progress, every_line: bool) -> Correlation
 
 
 def _identifying(channels: int, lines: int) -> str:
-    """What is done, and how long it takes where it is long.
+    """Return the progress message, with the duration if it is long.
 
     >>> _identifying(6, 900)
     'modes of the test, 6 channels of 900 lines'
@@ -138,7 +138,7 @@ def _identifying(channels: int, lines: int) -> str:
 def _likeness(
     found: Identified, phi: np.ndarray, f_model: np.ndarray, pairs: ModePairs
 ) -> tuple[Likeness, ...]:
-    """Of every pair, its shape in the test turned as real as it can be."""
+    """Rate the MAC of every pair, with test shapes rotated to be as real as possible."""
     if not len(pairs):
         return ()
     psi, covariance = real_shapes(found), shape_covariance(found)
@@ -154,7 +154,7 @@ def _paired_shapes(
     case: Case, model: Modelled, near: ModalModel, at_sensors: tuple[np.ndarray, np.ndarray],
     pairs: ModePairs, f_test: np.ndarray, numbers: tuple[int, ...],
 ) -> PairedShapes:  # fmt: skip
-    """Model shapes of largest entry 1, test shapes turned real and scaled onto them."""
+    """Return model shapes of largest entry 1, and test shapes made real and scaled to them."""
     phi, psi = at_sensors[0][:, pairs.model], at_sensors[1][:, pairs.test]
     scale = np.maximum(np.abs(phi).max(axis=0, initial=0.0), 1e-300)
     phi = phi / scale
@@ -171,7 +171,7 @@ def _paired_shapes(
 
 
 def _f_max(case: Case, test: FRF | None) -> float:
-    """Highest frequency the test speaks of [Hz]."""
+    """Return the highest frequency of the test [Hz]."""
     if case.band is not None:
         return case.band[1]
     if test is not None:
@@ -193,7 +193,7 @@ def _by_poles(case: Case, near: ModalModel) -> Correlation:
 
 
 def scored(case: Case, model: Modelled, test: FRF) -> tuple[FRF, Quality | None, tuple[str, ...]]:
-    """Responses of the model, Q over the lines that count, and how it was taken."""
+    """Return responses of the model, Q over the lines in use, and notes on both."""
     use = case.lines(test.frequency) if case.band or case.exclude else test.frequency > 0
     low, high = test.frequency[use][[0, -1]]
     seen = test.sel(band=(max(float(low), 1e-9), float(high)))

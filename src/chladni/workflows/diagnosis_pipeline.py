@@ -1,10 +1,10 @@
-"""From a case to the result of a diagnosis or calibration: the one road all of them take.
+"""Lead from a case to the result of a diagnosis or calibration, on one path for all.
 
-1. the recording is read, what is held out is chosen (``prepare``);
-2. hypotheses are fitted and compared by evidence (``updating.diagnosis``);
-3. the fit that is reported is repeated where the reduced model had left its ground (``renewed``);
-4. the decision is made on rows of numbers, and asks for the fits that it needs (``decided``);
-5. the result is written into the deck, and every number is taken from the decks as written.
+1. The recording is read and the held-out data are chosen (``prepare``).
+2. Hypotheses are fitted and compared by evidence (``updating.diagnosis``).
+3. The reported fit is repeated if it left the reduced model's range of validity (``renewed``).
+4. The decision is made on rows of numbers, and requests the fits that it needs (``decided``).
+5. The result is written into the deck, and every number is taken from the decks as written.
 """
 
 from dataclasses import dataclass, replace
@@ -90,23 +90,23 @@ class Searched:
     screening: Screening | None
 
     def renew(self, hypothesis: HypothesisFit) -> Renewal:
-        """A hypothesis on a reduced model that bears it."""
+        """Fit a hypothesis again on a reduced model that can represent it."""
         return renewed(self.asked, self.prepared, hypothesis)
 
 
 def searched(
     case: Case, diagnosing: bool, progress: Progress, known: Posterior | None = None
 ) -> Searched:
-    """Fit all hypotheses of one state of a case; without ``diagnosing`` calibration alone.
+    """Fit all hypotheses of one state of a case; without ``diagnosing`` only calibration.
 
     Parameters
     ----------
-    known : what other states say of what this one shares with them
+    known : posterior of the shared parameters from other states
 
     Raises
     ------
     RecordingAtFault
-        If the recording shows a fault that no fit could make up for.
+        If the recording shows a fault that a fit cannot compensate.
     """
     progress("identifying the recording", 0.0)
     if diagnosing and not len(case.assembly.shells) + len(case.assembly.beams):
@@ -148,7 +148,7 @@ def explained(
 
 
 def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisResult:
-    """The result of an explanation: the decks as they are written, and every number from them."""
+    """Write an explanation into decks and compute every number of the result from them."""
     case, asked, prepared = known.case, known.asked, known.prepared
     found = with_deck(prepared, known.found)
     give_back_freed_memory()
@@ -173,7 +173,7 @@ def told(known: Explained, diagnosing: bool, progress: Progress) -> DiagnosisRes
 
 
 def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...]]:
-    """The verdict by all data, and reasons not to trust it."""
+    """Return the verdict by all data, and reasons not to trust it."""
     prepared = made.prepared
     if not diagnosing:  # nothing is to be named
         prepared = replace(prepared, too_little="")
@@ -193,7 +193,7 @@ def _judged(made: Searched, diagnosing: bool) -> tuple[Diagnosis, tuple[str, ...
 def _updated(
     case: Case, asked: Question, prepared: Prepared, found: Diagnosis
 ) -> tuple[UpdatedModels, list[str]]:
-    """The structures before and after, each solved once, changed ones as their decks have them."""
+    """Return the structures before and after, each solved once, as their decks describe them."""
     stages, nominal = models(asked, found), as_it_is(asked, prepared.nominal)
     calibrated, lost = _deck(case, asked, nominal, stages.calibrated)
     final = calibrated
@@ -206,9 +206,9 @@ def _updated(
 
 
 def as_it_is(asked: Question, searched: Modelled) -> Modelled:
-    """The deck's own structure: what is searched has firm springs in rigid ties, if there are any.
+    """Return the deck's own structure; the searched one has stiff springs in place of rigid ties.
 
-    What is scored is what whoever runs the deck finds.
+    Scores use the structure that a user of the deck obtains.
     """
     given = asked.tested(asked.assembly)
     if len(given.points) == len(searched.assembly.points):
@@ -219,7 +219,7 @@ def as_it_is(asked: Question, searched: Modelled) -> Modelled:
 def _deck(
     case: Case, asked: Question, nominal: Modelled, changed: Assembly
 ) -> tuple[ChangedDeck, list[str]]:
-    """The edits of the deck and what it then describes; where no card can hold them, a sentence."""
+    """Return edits of the deck with its new structure, or a sentence if no card can hold them."""
     if changed is case.as_deck:
         return ChangedDeck(nominal, ()), []
     try:
@@ -232,7 +232,7 @@ def _deck(
 
 
 def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
-    """The deck with what its cards cannot hold of the named effects, as comments."""
+    """Add to the deck, as comments, the parts of named effects that cards cannot hold."""
     if named is None or deck.changes is None:
         return deck
     said = [e.deck_comment(named.fit.of(e)) for e in named.effects]
@@ -241,7 +241,7 @@ def _commented(deck: ChangedDeck, named: HypothesisFit | None) -> ChangedDeck:
 
 
 def _unseen(prepared: Prepared) -> tuple[str, ...]:
-    """Labels of the outputs that no fit saw."""
+    """Return labels of the held-out outputs."""
     data = prepared.problem.data
     if not isinstance(data, Responses):
         return ()
@@ -250,10 +250,10 @@ def _unseen(prepared: Prepared) -> tuple[str, ...]:
 
 
 def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, FRF]:
-    """The recording and the responses of the deck before and after, over all that was compared.
+    """Return the recording and the deck's responses before and after, over the compared band.
 
-    Each mode of a deck has the damping of its partner in the test. The default damping would make
-    peaks too low or too high, which is no error of the deck.
+    Each mode of a deck has the damping of its partner in the test. With the default damping,
+    peaks would be too low or too high, which is not an error of the deck.
     """
     if not case.frfs:
         return {}
@@ -275,7 +275,7 @@ def _curves(case: Case, made: UpdatedModels, modes: MeasuredModes) -> dict[str, 
 def _result(
     asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels
 ) -> DiagnosisResult:
-    """All numbers and words, from the decks as written."""
+    """Collect all numbers and words, from the decks as written."""
     last, deck = found.found or found.null, found.as_deck or found.plain
     real = real_poles(prepared, last)
     every = (
@@ -320,7 +320,7 @@ def _result(
 
 
 def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
-    """The absolute test as the page has it."""
+    """Return the absolute test of fit in the form of the page."""
     test = found.adequacy
     if test is None:
         return None
@@ -332,9 +332,9 @@ def _adequate(found: Diagnosis, spot: LeftWhere | None) -> Adequacy | None:
 
 
 def _article_mass(asked: Question, stages: UpdatedModels, deck: HypothesisFit) -> float:
-    """What the updated deck weighs: the structure as tested less its sensors [kg].
+    """Return the mass of the updated deck: the structure as tested minus its sensors [kg].
 
-    Less those that were found as well: they were not on the scales either.
+    Sensor masses that were found are subtracted too: they were not weighed either.
     """
     sensors = sum(m for _, m in asked.carried)
     if stages.final.model is not stages.nominal:
@@ -344,7 +344,7 @@ def _article_mass(asked: Question, stages: UpdatedModels, deck: HypothesisFit) -
 
 
 def _blind(spot: LeftWhere | None) -> tuple[str, ...]:
-    """Where the sensors would not notice what is asked about, if that is much of the structure."""
+    """Return a warning if the sensors are blind to local losses on much of the structure."""
     if spot is None or spot.blind < BLIND_SHARE:
         return ()
     return (
@@ -357,7 +357,7 @@ def _scores(
     asked: Question, prepared: Prepared, found: Diagnosis, stages: UpdatedModels,
     real: np.ndarray | None,
 ) -> tuple[Scores, Scores]:  # fmt: skip
-    """Q of the three decks on fitted and held-out data, the noise, and what nuisances take."""
+    """Return Q of the three decks on fitted and held-out data, of noise, and of nuisances."""
     winner = found.found or found.null
     sets = prepared.score.use, held_out(prepared, winner)
     named = found.found
@@ -378,5 +378,5 @@ def _scores(
 
 
 def _finite(value: float | None) -> float | None:
-    """The value; None where nothing was there to take a mean of."""
+    """Return the value, or None for the mean of no data."""
     return value if value is not None and np.isfinite(value) else None

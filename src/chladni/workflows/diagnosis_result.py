@@ -1,4 +1,4 @@
-"""The result of a diagnosis or calibration, and the structures it speaks of (SI).
+"""The result of a diagnosis or calibration, and its structures (SI).
 
 :mod:`chladni.report.diagnosis_json` writes it as ``diagnosis.json`` and reads it back.
 """
@@ -35,9 +35,9 @@ Compared = Literal["responses", "frequencies"]
 
 @dataclass(frozen=True, eq=False)
 class ChangedDeck:
-    """A deck with changes, and the structure that its reader will have.
+    """A deck with changes, and the structure that it then describes.
 
-    ``changes`` are those of its cards; None where no card can hold them.
+    ``changes`` are edits of its cards; None if no card can hold them.
     """
 
     model: Modelled
@@ -46,13 +46,13 @@ class ChangedDeck:
 
 @dataclass(frozen=True, eq=False)
 class UpdatedModels:
-    """The three structures a diagnosis speaks of, and their responses beside the recording's.
+    """The three structures of a diagnosis, with their responses and the recording's.
 
     Attributes
     ----------
     nominal : Modelled                 the deck as it was given
-    calibrated, final : ChangedDeck    without and with the effect; one where none is named
-    curves : {"test", "before", "after": FRF}, empty where no FRF exists
+    calibrated, final : ChangedDeck    without and with the effect; identical if none is named
+    curves : {"test", "before", "after": FRF}, empty without an FRF
     held_out : labels of outputs that were not fitted
     test : the modes of the recording
     """
@@ -67,12 +67,12 @@ class UpdatedModels:
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisResult:
-    """What was found, how sure it is, and how much it helps.
+    """Result of a diagnosis: the verdict, its certainty, and the improvement it brings.
 
     Attributes
     ----------
     verdict : a public verdict
-    effects, alternatives : what is named, and all else that was tried, best first
+    effects, alternatives : the named effects, and all others that were tried, best first
     agreement : Q of every deck
     calibrated : E, rho, t, ... that were fitted
     frequencies : test and decks side by side
@@ -82,15 +82,15 @@ class DiagnosisResult:
     distrust : reasons not to trust the result; the command then exits with 3
     compared : whether responses or natural frequencies were compared
     searched : False where only ordinary parameters were fitted
-    screening : what the recording says of its own faults; None where no FRF exists
-    files : {what: name} of what was written beside it
-    models : the structures; None where the result was read from a file
-    left_where : what the explanation leaves, on the mesh; None where frequencies were compared
+    screening : faults that the recording itself reveals; None without an FRF
+    files : {what: name} of the files written with it
+    models : the structures; None if the result was read from a file
+    left_where : residual of the explanation on the mesh; None if frequencies were compared
     recordings : Q of the decks on the recordings that were not fitted
     levels : its modes over levels of excitation, where it was measured at several
     joints : K and GE that linear joints would have at each level, where friction may sit in them
-    states : of an object measured in several states each one's result; this one is the first's
-    shared : what the states share, fitted to all of them at once
+    states : result of each state, if the object was measured in several; this is the first's
+    shared : parameters common to the states, fitted to all of them together
     """
 
     verdict: str = ""
@@ -120,7 +120,7 @@ class DiagnosisResult:
 
     @property
     def deck_changed(self) -> bool:
-        """Whether the updated deck has other values than the one that was given."""
+        """True if the updated deck has other values than the given one."""
         return self.verdict not in ("", "nothing missing")
 
     def trusted(self) -> "DiagnosisResult":
@@ -138,7 +138,7 @@ class DiagnosisResult:
 
 @dataclass(frozen=True, eq=False)
 class StateResult:
-    """One state of an object, and what was found in it."""
+    """One state of an object, and its result."""
 
     name: str
     result: DiagnosisResult

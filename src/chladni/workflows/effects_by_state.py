@@ -1,4 +1,4 @@
-"""What is common to the states of an object, what moved and what came or went, in words."""
+"""Compare the effects of an object's states in words: constant, moved, new or gone."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -11,7 +11,7 @@ from .diagnosis_result import StateResult
 
 
 def by_state(states: Sequence[StateResult]) -> list[str]:
-    """A sentence on every effect: the states that have it, and how place and size compare."""
+    """Return a sentence on every effect: its states, and how place and size compare."""
     found: dict[str, list[tuple[str, NamedEffect]]] = {}
     for state in states:
         for effect in state.result.effects:
@@ -33,7 +33,7 @@ def _sentence(name: str, those: Sequence[tuple[str, NamedEffect]], count: int) -
 
 
 def _moved(one: NamedEffect, other: NamedEffect) -> str:
-    """Whether two effects are at one place, as well as each is known."""
+    """State if two effects are at one place, within the uncertainty of both."""
     a, b = one.where, other.where
     if a.point_m is None or b.point_m is None:
         return "it stays" if a.text == b.text else f"it goes to {b.text}"
@@ -43,7 +43,7 @@ def _moved(one: NamedEffect, other: NamedEffect) -> str:
 
 
 def _grown(one: NamedEffect, other: NamedEffect) -> str:
-    """Whether the sizes can be one, by their intervals."""
+    """State if the sizes can be equal, by their intervals."""
     pairs = list(zip(one.parameters, other.parameters, strict=False))
     apart = [(p, q) for p, q in pairs if p.name == q.name and not _overlap(p, q)]
     if not apart:
@@ -52,7 +52,7 @@ def _grown(one: NamedEffect, other: NamedEffect) -> str:
 
 
 def _overlap(p: Estimate, q: Estimate) -> bool:
-    """Whether two intervals meet; one without ends meets all."""
+    """Return True if two intervals overlap; an interval without ends overlaps all."""
     low = max(end for end in (p.low, q.low, -np.inf) if end is not None)
     high = min(end for end in (p.high, q.high, np.inf) if end is not None)
     return bool(low <= high)

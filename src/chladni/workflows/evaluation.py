@@ -1,4 +1,4 @@
-"""The evaluation of a test: FRFs from time data, ring-downs, screening of every recording."""
+"""Evaluate a test: FRFs from time data, ring-downs, screening of every recording."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -28,14 +28,14 @@ LINES = 2500  # of an FRF: more take minutes to identify; whoever wants that nam
 
 @dataclass(frozen=True, eq=False)
 class RecordingEvaluation:
-    """What was made of one recording.
+    """Evaluation of one recording.
 
     Attributes
     ----------
     recording : Recording     with the FRFs
-    estimate : how they were estimated, where it held time data
-    decays : free decays of its strongest modes, where its inputs stop
-    levels : what their amplitudes tell, level by level
+    estimate : details of their estimation, if it held time data
+    decays : free decays of its strongest modes, if its inputs stop
+    levels : study of the modes over the decaying amplitude
     screening : Screening
     """
 
@@ -59,7 +59,7 @@ def evaluate_recordings(
     settings: EstimateSettings | None = None,
     progress: Progress = silent,
 ) -> Evaluation:
-    """Estimate the FRFs of what holds time data, and screen every recording.
+    """Estimate FRFs from time data, and screen every recording.
 
     The first recording of a case is screened against its model as well. A case that compares
     natural frequencies does not know the places of its channels; it is screened alone.
@@ -67,7 +67,7 @@ def evaluate_recordings(
     Raises
     ------
     FileError
-        If nothing holds FRFs or time data, or no FRF can be estimated.
+        If no recording holds FRFs or time data, or no FRF can be estimated.
     LabelError
         If excitation or method have no such name.
     """
@@ -103,7 +103,7 @@ def evaluate_recordings(
 
 
 def _decay_notes(found: RecordingEvaluation) -> list[str]:
-    """A sentence a mode whose frequency or damping goes with its amplitude as it dies away."""
+    """Return a sentence on each mode whose frequency or damping depends on its amplitude."""
     name = found.recording.name
     beats = "to settle it, measure at two levels: a second mode within a bandwidth beats alike"
     return [f"{name}: free decay: {mode_sentence(m)}; {beats}" for m in found.levels.moving]
@@ -124,7 +124,7 @@ def _screened(
 
 
 def _identified(case: Case | None, r: Recording) -> Identified | None:
-    """Its modes, where they can be identified."""
+    """Return the modes of a recording, or None if they cannot be identified."""
     frf = r.frf
     assert frf is not None
     if len(frf.frequency) > LINES:
@@ -140,7 +140,7 @@ def _identified(case: Case | None, r: Recording) -> Identified | None:
 def _with_time(
     screening: Screening, estimate: FrfEstimate | None, decays: Sequence[RingDown]
 ) -> Screening:
-    """The same with what only time data tell: distortion, and damping that goes with amplitude."""
+    """Add findings from time data: distortion, and damping that depends on amplitude."""
     findings: list[Finding] = []
     checks = []
     if estimate is not None and estimate.distortion is not None:

@@ -1,4 +1,4 @@
-"""From a case to the question a diagnosis is asked."""
+"""Convert a case into the question of a diagnosis."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from .unit_check import refuse_other_units
 
 
 def nothing_measured(case: Case) -> FileError:
-    """The sentence on a case that holds nothing a model could be compared with."""
+    """Return the error for a case without data to compare a model with."""
     if not case.recordings:
         return FileError(
             f"{case.path} names no recording to compare the model with; give it as recordings = "
@@ -24,7 +24,7 @@ def nothing_measured(case: Case) -> FileError:
 
 
 def question(case: Case) -> Question:
-    """The question of a case.
+    """Build the question of a case.
 
     Raises
     ------
@@ -63,7 +63,7 @@ MASS_SD = 0.002  # of the mass, where the user gives none
 
 
 def _weighed(case: Case) -> MassMeasurement | None:
-    """What the scales say of the recording that is fitted, itself or the article as a whole."""
+    """Return the weighed mass of the fitted recording, else that of the article."""
     mass, sd = case.recordings[0].mass, case.setup.mass_sd
     if mass is not None:
         return MassMeasurement(mass, sd or MASS_SD * mass)
@@ -71,7 +71,7 @@ def _weighed(case: Case) -> MassMeasurement | None:
 
 
 def _others(case: Case) -> tuple[OtherRecording, ...]:
-    """Repeats, articles and levels of the recording that is fitted; other states are none."""
+    """Return repeats, articles and levels of the fitted recording, without other states."""
     first = case.recordings[0]
     kinds = [(r, relation(first, r)) for r in case.recordings[1:] if r.frf is not None]
     return tuple(
@@ -82,5 +82,5 @@ def _others(case: Case) -> tuple[OtherRecording, ...]:
 
 
 def prepared(case: Case) -> Prepared:
-    """A case made ready for updating: identified, reduced, what is held out chosen."""
+    """Prepare a case for updating: identify, reduce, and choose the held-out data."""
     return prepare(question(case))
