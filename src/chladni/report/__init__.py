@@ -1,1 +1,1 @@
-"""One self-contained page per run."""
+"""Reports: one self-contained page for each run."""

@@ -70,7 +70,7 @@ def file_names(recordings: tuple[BenchRecording, ...]) -> list[str]:
 
 
 def _sensors(found: BenchResult) -> str:
-    """The table of sensors, with the masses they were told to have."""
+    """Return the text of ``sensors.csv``, with the nominal masses of the sensors."""
     text = StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
     uncertain = ["position_sd"] * bool((found.outputs.sd > 0).any() or (found.inputs.sd > 0).any())
@@ -98,7 +98,7 @@ def _rows(dofs: MeasuredDofs, role: str, masses: np.ndarray) -> list[list[str]]:
 
 
 def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
-    """Every word of the case as it stands, but for those that the test has made anew."""
+    """Copy every word of the case, except those that the test replaces."""
     files = [f"{n}.uff" for n in names]
     weighed = {"mass": float(f"{found.mass:.6g}"), "mass_sd": float(f"{1e-3 * found.mass:.2g}")}
     lines = ["[model]", *_words({"deck": "deck.bdf"} | _kept(case, "model"))]
@@ -121,18 +121,18 @@ def _toml(case: Case, found: BenchResult, names: list[str]) -> str:
 
 
 def _kept(case: Case, section: str) -> dict[str, Any]:
-    """Words of a section that hold for the new recordings as they did for the old."""
+    """Return the words of a section that also apply to the new recordings."""
     found = case.keys.tables.get(section, [])
     return {k: v for s in found for k, v in s.values.items() if k not in RENEWED[section]}
 
 
 def _words(values: dict[str, Any]) -> list[str]:
-    """Lines of TOML; text, numbers and lists of them are written as JSON has them."""
+    """Return lines of TOML; text, numbers and lists are written as in JSON."""
     return [f"{k} = {json.dumps(v)}" for k, v in values.items()]
 
 
 def _left_out(case: Case, found: BenchResult, band: tuple[float, float]) -> list[str]:
-    """Bands the case leaves out, and that of the cords, which anyone can tap."""
+    """Return the excluded bands of the case, and that of the cords, known by tapping."""
     out = [list(b) for b in case.exclude]
     low, high = band
     tapped = [f for f in found.cords if low <= f <= high]
@@ -147,7 +147,7 @@ def _left_out(case: Case, found: BenchResult, band: tuple[float, float]) -> list
 def _covered(
     band: tuple[float, float] | None, by: tuple[float, float]
 ) -> tuple[float, float] | None:
-    """What of a band the test covers [Hz]; None where that is less than half of it."""
+    """Return the part of a band that the test covers [Hz]; None if it is less than half."""
     if band is None:
         return None
     low, high = max(band[0], by[0]), min(band[1], by[1])

@@ -1,4 +1,4 @@
-"""A virtual test as a page: what was tested, the schedule, a stretch of time, FRFs, overloads."""
+"""A virtual test as a page: the test setup, the schedule, a time signal, FRFs, overloads."""
 
 from pathlib import Path
 from typing import Any
@@ -132,7 +132,7 @@ def _typical(r: BenchRecording) -> int:
 
 
 def _drive(found: BenchResult) -> str:
-    """What drives, with its unit."""
+    """Return the excited quantity with its unit."""
     what = "base" if found.inputs.base[0] else "force"
     return f"{what} [{level_unit(found.inputs)}]"
 

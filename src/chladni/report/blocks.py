@@ -1,4 +1,4 @@
-"""What a page is made of: titled sections of text, tables, facts and pictures."""
+"""Building blocks of a page: titled sections of text, tables, facts and pictures."""
 
 from base64 import b64encode
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Facts:
-    """Numbers worth reading first: (what, value)."""
+    """Main numbers: (name, value)."""
 
     facts: Sequence[tuple[str, str]]
     kind: str = "facts"
@@ -48,7 +48,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG, GIF, SVG or JPEG that is laid into the page itself."""
+    """A PNG, GIF, SVG or JPEG that is embedded in the page."""
 
     path: Path
     caption: str = ""
@@ -92,7 +92,7 @@ class Live:
 
 @dataclass(frozen=True)
 class Links:
-    """Files beside the page: (name, what it is)."""
+    """Files in the folder of the page: (name, description)."""
 
     files: Sequence[tuple[str, str]]
     kind: str = "links"
@@ -111,7 +111,7 @@ Block = Text | Items | Facts | Table | Picture | Live | Links | Code
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands under it; a section without blocks is left out."""
+    """A heading with its blocks; a section without blocks is left out."""
 
     title: str
     blocks: Sequence[Block]
@@ -119,13 +119,13 @@ class Section:
 
 @dataclass(frozen=True)
 class PageParts:
-    """What a result puts on the page of its command.
+    """Contents of a result for the page of its command.
 
     Attributes
     ----------
     lead : the result in one sentence
-    files : (name, what it is) of what was written beside the page
-    drawings : what the page draws itself, by the names in its sections
+    files : (name, description) of the files written with the page
+    drawings : drawings by the page itself, by the names in its sections
     """
 
     lead: str

@@ -1,4 +1,4 @@
-"""A checked case as a page: what was understood, what looks wrong, where the sensors are."""
+"""A checked case as a page: its content, suspected errors, places of the sensors."""
 
 from pathlib import Path
 from typing import Any

@@ -135,7 +135,7 @@ def _pictures(drawn: dict[str, Path], names: Sequence[str]) -> list[Picture]:
 
 
 def _shapes(folder: Path, shown: Shown, found: Correlation) -> dict[str, Path]:
-    """The first pairs, test and model side by side."""
+    """Draw the first pairs, test next to model."""
     from ..view.shape_pairs import shape_pairs
 
     pairs = found.shapes
@@ -160,7 +160,7 @@ def _modes(found: Correlation) -> Table:
 
 
 def _worth(found: Correlation) -> list[Block]:
-    """What every MAC is worth, and the best half of the sensors of poor ones."""
+    """Tabulate the significance of every MAC, and the best half of the sensors for poor ones."""
     if not found.likeness:
         return []
     f = [hertz(found.f_test[j]) for j in found.pairs.test]
@@ -185,7 +185,7 @@ def _worth(found: Correlation) -> list[Block]:
 
 
 def _alone(found: Correlation) -> str:
-    """What has no partner, on either side, and how modes are counted."""
+    """List modes without a partner, on either side, and how modes are counted."""
     said = ["Modes of the model are numbered with its rigid motions, as `chladni modes` does."]
     p, top = found.pairs, found.f_test.max(initial=0.0)
     test = [hertz(f) for f in found.f_test[p.alone_test]]

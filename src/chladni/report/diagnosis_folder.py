@@ -31,7 +31,7 @@ def write_diagnosis(
     progress: Progress = silent,
     home: Path | None = None,
 ) -> DiagnosisResult:
-    """Write all of it; the result with the names of the files.
+    """Write the whole folder; return the result with the names of the files.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def write_diagnosis(
 def _with_states(
     folder: Path, case: Case, result: DiagnosisResult, progress: Progress, home: Path
 ) -> DiagnosisResult:
-    """Every state but the first into a folder of its own; the first is the run itself."""
+    """Write every state except the first into its own folder; the first is the run itself."""
     done = list(result.states)
     for k, state in enumerate(result.states):
         if k:
@@ -70,7 +70,7 @@ def _with_states(
 
 
 def _decks(folder: Path, case: Case, result: DiagnosisResult, home: Path) -> dict[str, str | None]:
-    """Names of the updated deck and, where an effect is named, of the one without it.
+    """Return names of the updated deck and, if an effect is named, of the one without it.
 
     None where no card can hold the change.
     """

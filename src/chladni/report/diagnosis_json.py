@@ -134,7 +134,7 @@ def _read_adequate(d: Mapping[str, Any]) -> Adequacy:
 
 
 def from_json(d: Mapping[str, Any]) -> DiagnosisResult:
-    """A result from its JSON; what is missing there is empty here."""
+    """Read a result from its JSON; missing fields stay empty."""
     mass, error, left, good = (
         d.get(k) for k in ("mass", "frequency_rms_percent", "structured", "adequate")
     )

@@ -1,4 +1,4 @@
-"""The pictures of a result: where it is, how much it helps, frequencies, responses."""
+"""The pictures of a result: its place, the improvement, frequencies, responses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,13 +19,13 @@ from .words import hertz
 
 _GRID = 8  # channels in the overview
 _SHAPES = 6
-CALM = 27.0  # gain up to which a map of what is left stays pale: less names nothing
+CALM = 27.0  # gain up to which a map of the residual stays pale: less names nothing
 Bands = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What there is to draw beside the numbers of a result.
+    """Data for the pictures of a result that its numbers do not contain.
 
     Attributes
     ----------
@@ -33,11 +33,11 @@ class Shown:
     parts : names, by the numbers in ``seen.part``; ids of the points of ``seen``
     curves : {"test", "before", "after"} or {"test", "model"} to FRF, same channels and lines
     held_out : labels of outputs that were not fitted
-    compared : False where the responses are only shown, because frequencies were compared
+    compared : False if frequencies were compared, so that responses are only shown
     fitted, excluded : bands [Hz]
     outputs, inputs, cords : sensors, shakers and hangers as markers
     mac : (test modes, model modes) after, with their frequencies [Hz], or None
-    pairs : (test, model) positions of what is paired in it
+    pairs : (test, model) positions of the paired modes in it
     """
 
     seen: Surface
@@ -75,7 +75,7 @@ def _places(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pa
 
 
 def setup(folder: Path, shown: Shown) -> dict[str, Path]:
-    """Where sensors and shakers sit."""
+    """Draw the places of sensors and shakers."""
     if not (shown.outputs or shown.inputs):
         return {}
     path, ends = folder / "setup.png", (shown.outputs, shown.inputs)
@@ -135,7 +135,7 @@ def _modes(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Pat
 
 
 def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path]:
-    """What the explanation leaves, on the mesh: grey where the test is blind."""
+    """Draw the residual of the explanation on the mesh: grey where the test is blind."""
     left = result.left_where
     if left is None:
         return {}
@@ -155,7 +155,7 @@ def _left(folder: Path, result: DiagnosisResult, shown: Shown) -> dict[str, Path
 
 
 def q_steps(q: Scores, named: bool) -> dict[str, float]:
-    """Q of the decks, in the order in which they came about; without an effect there are two."""
+    """Draw Q of the decks, in the order of the updating; without an effect there are two."""
     steps = {"nominal": q.nominal, "calibrated": q.calibrated}
     if named:
         steps["with the effect"] = q.with_effect
@@ -165,7 +165,7 @@ def q_steps(q: Scores, named: bool) -> dict[str, float]:
 def frequencies(
     folder: Path, rows: Sequence[tuple[float, float | None, float | None]]
 ) -> dict[str, Path]:
-    """Frequencies of the test, of the model before and, where there is one, after [Hz]."""
+    """Draw frequencies of the test, of the model before and, if there is one, after [Hz]."""
     held = [r for r in rows if r[0]]
     if not held:
         return {}
@@ -187,7 +187,7 @@ def mac_picture(folder: Path, shown: Shown) -> dict[str, Path]:
 
 
 def curves(folder: Path, shown: Shown) -> dict[str, Path]:
-    """One typical channel of each kind, and an overview: not the best ones, the median ones."""
+    """Draw one channel of each kind, the median and not the best, and an overview."""
     if "test" not in shown.curves:
         return {}
     test, made = shown.curves["test"], {}

@@ -1,4 +1,4 @@
-"""Words of the page that are explained where one points at them."""
+"""Words of the page with an explanation that appears under the pointer."""
 
 GLOSSARY = {
     "Q": "Mean over channels and lines of |log10(H model / H test)|²; 0 is perfect, 0.1 a factor "
@@ -28,7 +28,7 @@ _HEADS = {  # heads of tables and names of facts that hold a word of the glossar
 
 
 def meaning(head: str) -> str:
-    """Meaning of a head of a table or a fact; "" where that is plain.
+    """Return the meaning of a table head or a fact; "" if it needs none.
 
     >>> meaning("MAC after") == GLOSSARY["MAC"], meaning("parameter")
     (True, '')

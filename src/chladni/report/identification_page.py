@@ -195,7 +195,7 @@ def _circles(r: RecordingModes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def _lead(recordings: Sequence[RecordingModes]) -> str:
-    """One recording in full, of several how many modes they show and which are to be looked at."""
+    """Describe one recording in full, or several by number of modes and which to inspect."""
     if len(recordings) <= SEVERAL:
         return "; ".join(_sentence(r) for r in recordings)
     counts = sorted({len(r.poles.frequency) for r in recordings})
@@ -214,7 +214,7 @@ def _sentence(r: RecordingModes) -> str:
 
 
 def _span(f: np.ndarray) -> str:
-    """Where rising frequencies lie; "" of none."""
+    """Locate rising frequencies in words; "" if there are none."""
     if len(f) < 2:
         return "".join(f" at {number(one)} Hz" for one in f)
     return f" from {number(f[0])} to {number(f[-1])} Hz"

@@ -22,7 +22,7 @@ _WHAT = (
 
 
 def level_section(tables: Sequence[LevelTable], pictures: Mapping[int, Path]) -> Section:
-    """All modes, all modes at every level, then those that move one by one; none without levels.
+    """Tabulate all modes, all modes at every level, then each moving mode; none without levels.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def _summary(tables: Sequence[LevelTable]) -> Table:
 
 
 def _every_level(tables: Sequence[LevelTable]) -> Table:
-    """Mode by level, measured; a level at which a mode was not found has a row of dashes."""
+    """Tabulate measured modes by level; a level without the mode has a row of dashes."""
     levels = sorted({r.level for t in tables for r in t.rows})
     rows = []
     for k, t in enumerate(tables, 1):
@@ -162,18 +162,18 @@ def draw_levels(folder: Path, tables: Sequence[LevelTable], stem: str = "") -> d
 def _columns(
     rows: Sequence[tuple[float, float, float | None]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Value, spread and what was foretold (nan: nothing), each (k,)."""
+    """Return value, spread and prediction (nan: none), each (k,)."""
     value, sd, foretold = np.array(rows, dtype=float).T
     return value, sd, foretold
 
 
 def level_json(tables: Sequence[LevelTable]) -> list[dict[str, Any]]:
-    """As plain data."""
+    """Convert tables to plain data."""
     return [asdict(t) for t in tables]
 
 
 def read_levels(rows: Sequence[Mapping[str, Any]] | None) -> tuple[LevelTable, ...]:
-    """From their JSON."""
+    """Read tables from their JSON."""
     return tuple(_read(d) for d in rows or ())
 
 

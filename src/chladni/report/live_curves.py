@@ -1,4 +1,4 @@
-"""Curves, matrices and bars that can be pointed at."""
+"""Curves, matrices and bars with values under the pointer."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -18,7 +18,7 @@ _LOG_STEP, _DEGREE = 1e-3, 1.0  # a thousandth of a decade; a degree
 
 
 def frf(shown: Shown) -> dict[str, Any]:
-    """Magnitude and phase of every channel, of test and decks, and how far each is off."""
+    """Magnitude and phase of every channel, of test and decks, and the deviation of each."""
     curves, held = dict(shown.curves), set(shown.held_out)
     test = curves.get("test", next(iter(curves.values())))
     channels = [(i, j) for j in range(len(test.inputs)) for i in range(len(test.outputs))]

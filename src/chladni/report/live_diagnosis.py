@@ -35,7 +35,7 @@ _CAPTIONS = {
 
 
 def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> Drawings:
-    """All that the result allows."""
+    """Return all drawings that the result allows."""
     made = _modes(case, result, shown) | _scores(result)
     if "test" in shown.curves:
         made["frf"] = Drawing(
@@ -54,7 +54,7 @@ def drawings(case: Case, result: DiagnosisResult, shown: Shown) -> Drawings:
 
 
 def _places(result: DiagnosisResult) -> list[tuple[str, Location | LeftPlace]]:
-    """Where what is named sits; where nothing is, and the fit fails, where that is seen."""
+    """Mark the places of named effects; without one, the place where the fit fails."""
     named = [(": ".join(t for t in (e.name, e.where.text) if t), e.where) for e in result.effects]
     if named or result.adequate is None:
         return list(named)
@@ -80,7 +80,7 @@ def _scores(result: DiagnosisResult) -> dict[str, Drawing]:
 
 
 def stages(result: DiagnosisResult) -> dict[str, Modelled]:
-    """The deck before and, where there is another, after."""
+    """Return the deck before and, if there is another, after."""
     if (models := result.models) is None:
         return {}
     found = {"before": models.nominal}

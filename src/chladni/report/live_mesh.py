@@ -1,4 +1,4 @@
-"""The mesh that can be turned: what was found, what is left, mode shapes."""
+"""The rotatable mesh: places of effects, residual, mode shapes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

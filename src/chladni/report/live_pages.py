@@ -74,7 +74,7 @@ def shape_pairs(
     page: Page, shown: Shown, found: PairedShapes | None, sensors: Sequence[str],
     stills: Sequence[Picture],
 ) -> Sequence[Block]:  # fmt: skip
-    """Test and model side by side."""
+    """Draw test next to model."""
     if found is None or not len(found.f_test) or not page.mesh(shown):
         return stills
     data = live_mesh.paired_shapes(found, sensors, shown)

@@ -1,4 +1,4 @@
-"""A mapped thickness as a page: what each part became, how well it is known, where it changed."""
+"""A mapped thickness as a page: result for each part, its accuracy, places of change."""
 
 from dataclasses import asdict
 from pathlib import Path

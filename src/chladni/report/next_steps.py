@@ -14,7 +14,7 @@ _MOST = 6  # steps
 
 
 def next_steps(result: DiagnosisResult) -> list[str]:
-    """Imperative sentences; of several states those of each."""
+    """Return imperative sentences; for several states those of each."""
     if result.states:
         return [
             f"{s.name or 'The first state'}: {step[0].lower()}{step[1:]}"
@@ -40,7 +40,7 @@ def _steps(result: DiagnosisResult) -> list[str]:
 
 
 def _mend(result: DiagnosisResult) -> list[str]:
-    """Faults of the recording come first: what is fitted to them bends the model."""
+    """Put faults of the recording first: a fit to them distorts the model."""
     if result.screening is None:
         return []
     return [
@@ -51,7 +51,7 @@ def _mend(result: DiagnosisResult) -> list[str]:
 
 
 def _settle(result: DiagnosisResult) -> list[str]:
-    """The measurements that tell apart what is tied."""
+    """Return the measurements that separate tied explanations."""
     known = {f.name: f.settled_by for f in families()}
     tried = {e.name: e.where.text for e in result.effects}
     tried |= {a.name: a.where.text for a in result.alternatives if a.where is not None}
@@ -66,7 +66,7 @@ def _at(place: str, what: str) -> str:
 
 
 def _confirm(result: DiagnosisResult) -> list[str]:
-    """A look at each place with the size that is expected, then what proves it."""
+    """Ask to inspect each place for the expected size, then name the proof."""
     known = {f.name: f.settled_by for f in families()}
     tied = {name for group in result.one_of for name in group}
     steps = []
@@ -89,7 +89,7 @@ def _take_the_deck(result: DiagnosisResult) -> list[str]:
 
 
 def _validate(result: DiagnosisResult) -> list[str]:
-    """A second test is worth more than a second fit."""
+    """Suggest a second test, which is worth more than a second fit."""
     if result.recordings:
         return []
     return ["Measure once more with another drive point, and diagnose again with both recordings."]
@@ -120,7 +120,7 @@ def _levels(result: DiagnosisResult) -> list[str]:
 
 
 def _look(result: DiagnosisResult) -> list[str]:
-    """Nothing of the catalogue fits: the place first, then the recording, then more data."""
+    """Advise if no effect of the catalogue fits: place first, then recording, then more data."""
     spots = [w for w in (result.adequate.where if result.adequate else ())]
     steps = [
         f"Look at the structure {'near grid ' + str(w.grid) if w.grid else 'there'}"
@@ -178,7 +178,7 @@ def _measured(calibrated: Sequence[CalibratedParameter]) -> list[str]:
 
 
 def _keep(result: DiagnosisResult) -> list[str]:
-    """Nothing is named."""
+    """Advise if no effect is named."""
     if result.distrust:
         return ["Settle the reasons under Not to be trusted, and diagnose again.",
                 *_odd_checks(result)]  # fmt: skip

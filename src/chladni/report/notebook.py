@@ -1,4 +1,4 @@
-"""A diagnosis as a notebook shows it: its page in a frame, without pictures and without scripts."""
+"""A diagnosis in a notebook: its page in a frame, without pictures and without scripts."""
 
 from html import escape
 
@@ -11,12 +11,12 @@ _FRAME = (
 
 
 def shown_in_notebooks() -> None:
-    """Give results the method by which Jupyter asks for HTML."""
+    """Give results the method that Jupyter calls for HTML."""
     DiagnosisResult._repr_html_ = _frame  # type: ignore[attr-defined]
 
 
 def _frame(result: DiagnosisResult) -> str:
-    """The frame keeps styles apart; its sandbox runs nothing."""
+    """Put the page into a frame: it separates styles, and its sandbox runs no scripts."""
     from .page import diagnosis_page
 
     return _FRAME.format(escape(diagnosis_page(result)))

@@ -1,4 +1,4 @@
-"""Modes of a model beside those of another program, as a page."""
+"""Modes of a model compared with those of another program, as a page."""
 
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,7 @@ def _lead(found: OtherModes) -> str:
 
 
 def _table(found: OtherModes) -> Table:
-    """Every elastic mode of the file, and its partner where it has one."""
+    """Tabulate every elastic mode of the file, with its partner if it has one."""
     p = found.pairs
     found_for = zip(p.model.tolist(), p.mac.tolist(), strict=True)
     partner = dict(zip(p.test.tolist(), found_for, strict=True))

@@ -1,6 +1,6 @@
 """One self-contained page per run: pictures inside, no network, readable on a phone, printable.
 
-Everything that came from a deck or a recording is text to the page: Jinja escapes all of it.
+Jinja escapes all text from a deck or a recording.
 """
 
 import platform

@@ -1,4 +1,4 @@
-"""A plan as a page: pictures of the layout and of what it sees, tables, sentences."""
+"""A plan as a page: pictures of the layout and of its coverage, tables, sentences."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -59,7 +59,7 @@ def lead(result: PlanSummary) -> str:
 
 
 def notes(found: Plan) -> list[str]:
-    """What was decided on the way, and what to mind."""
+    """List decisions of the planning, and warnings."""
     centres = int((~found.places.is_grid).sum())
     out = _places_notes(found.places)
     if len(found.layout) == len(found.places):
@@ -94,7 +94,7 @@ def notes(found: Plan) -> list[str]:
 
 
 def _places_notes(places: SensorCandidates) -> list[str]:
-    """Where places were looked for, and what was left out."""
+    """Describe the searched places, and those left out."""
     if not places.foot:
         return [
             f"{len(places)} places and directions were looked at: grids of the beams, each with "
@@ -116,7 +116,7 @@ def _places_notes(places: SensorCandidates) -> list[str]:
 
 
 def _rattle_notes(found: Plan) -> list[str]:
-    """Vetoed shaker places, and pairs of parts of which the mesh says nothing."""
+    """List vetoed shaker places, and pairs of parts that the mesh leaves undetermined."""
     out, force = [], found.settings.force
     if rattling := int((found.rattle.force < force).sum()):
         out.append(f"{rattling} places would rattle below {force:g} N: no shaker goes there.")

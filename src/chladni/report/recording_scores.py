@@ -1,4 +1,4 @@
-"""The recordings that no fit saw, as a table."""
+"""The held-out recordings as a table."""
 
 from ..workflows.diagnosis_result import DiagnosisResult
 from .blocks import Block, Table
@@ -11,7 +11,7 @@ _WHAT = (
 
 
 def recording_scores(result: DiagnosisResult) -> list[Block]:
-    """Q of every deck on each repeat, article and level that was held out."""
+    """Tabulate Q of every deck on each repeat, article and level that was held out."""
     rows = [
         (r.name, r.relation, *map(number, (r.apart, r.nominal, r.calibrated, r.with_effect)))
         for r in result.recordings

@@ -53,14 +53,14 @@ def response_page(folder: Path, found: FRF) -> PageParts:
 
 
 def _unit(found: FRF) -> str:
-    """Of the values; under a deck's own loads they are motion, not motion per unit force."""
+    """Return the unit: of motion for a deck's own loads, else of motion per unit force."""
     return (_MOTION if found.inputs[0].startswith("subcase") else UNIT).get(found.quantity, "")
 
 
 def response_json(found: FRF, in_si: bool) -> dict[str, Any]:
-    """``frf.json``: what the arrays hold, and of every channel its level and its peak.
+    """Return ``frf.json``: a description of the arrays, and level and peak of every channel.
 
-    Of a bare deck without a unit system no unit is claimed.
+    The unit is None for a bare deck without a unit system.
     """
     size = np.abs(found.values)
     return {

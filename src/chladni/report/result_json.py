@@ -1,4 +1,4 @@
-"""Results as plain data: what every command writes beside its page."""
+"""Results as plain data, which every command writes with its page."""
 
 from functools import singledispatch
 from typing import Any
@@ -31,7 +31,7 @@ from .study_page import study_json
 
 @singledispatch
 def to_json(result: Any) -> dict[str, Any]:
-    """A result of :mod:`chladni.workflows` as the JSON that its command writes."""
+    """Convert a result of :mod:`chladni.workflows` to the JSON that its command writes."""
     raise TypeError(f"{type(result).__name__} is no result of a workflow")
 
 

@@ -1,4 +1,4 @@
-"""What the screening of a recording found, as tables of a page and as JSON."""
+"""Findings of the screening of a recording, as tables of a page and as JSON."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,12 +9,12 @@ from .blocks import Block, Items, Section, Table
 
 _FINDING = ("finding", "channels", "is a", "what", "repair")
 _CHECK = ("check", "result", "is")
-SEVERAL = 2  # recordings, beyond which what is alike in them is told once
+SEVERAL = 2  # recordings, beyond which equal findings are reported once
 _WORD = {True: "in order", False: "look at it", None: "not possible"}
 
 
 def screening_section(*screenings: Screening | None) -> Section:
-    """Findings first, then every check; nothing where nothing was screened."""
+    """Tabulate findings first, then every check; nothing without a screening."""
     told = [s for s in screenings if s is not None and (s.checks or s.findings)]
     if len(told) > SEVERAL:
         return Section("The recordings", _of_several(told))
@@ -30,14 +30,14 @@ def screening_section(*screenings: Screening | None) -> Section:
 
 
 def lead_of(screenings: Sequence[Screening]) -> str:
-    """One sentence of a few recordings each, of more than that one of all."""
+    """Return a sentence for each recording if they are few, else one for all."""
     if len(screenings) <= SEVERAL:
         return "; ".join(s.sentence for s in screenings)
     return f"{len(screenings)} recordings; {of_all(screenings) or 'nothing found in any of them'}"
 
 
 def _of_several(told: Sequence[Screening]) -> list[Block]:
-    """One table of findings and one of checks: what came out alike stands once."""
+    """Return one table of findings and one of checks, with equal rows merged."""
     blocks: list[Block] = [Items([(of_all(told) or "nothing found in any of them") + "."])]
     found: dict[tuple[str, ...], list[str]] = {}
     looked: dict[tuple[str, str], dict[str, list[str]]] = {}
@@ -58,7 +58,7 @@ def _of_several(told: Sequence[Screening]) -> list[Block]:
 
 
 def _order(told: Sequence[Screening], name: str) -> int:
-    """Where a check stands among those of the recording that has it first."""
+    """Return the position of a check in the first recording that has it."""
     return next(k for s in told for k, c in enumerate(s.checks) if c.name == name)
 
 
@@ -77,7 +77,7 @@ def screening_json(s: Screening) -> dict[str, Any]:
 
 
 def read_screening(d: Mapping[str, Any]) -> Screening:
-    """A screening from its JSON."""
+    """Read a screening from its JSON."""
     return Screening(
         str(d.get("name", "")),
         tuple(_finding(f) for f in _rows(d, "findings")),

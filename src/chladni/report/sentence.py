@@ -9,14 +9,14 @@ from .words import number
 
 
 def sentence(result: DiagnosisResult) -> str:
-    """The verdict in words; of several states one sentence each."""
+    """State the verdict in words, with one sentence for each of several states."""
     if not result.states:
         return _sentence(result)
     return " ".join(f"{s.name or 'The first state'}: {_sentence(s.result)}" for s in result.states)
 
 
 def _sentence(result: DiagnosisResult) -> str:
-    """The verdict in one sentence."""
+    """State the verdict in one sentence."""
     verdict, gain = result.verdict, _gain(result.agreement)
     what = _each(result.effects)
     if verdict == "missing physics":
@@ -59,7 +59,7 @@ def _sentence(result: DiagnosisResult) -> str:
 
 
 def _off(result: DiagnosisResult) -> str:
-    """How far they are apart, for a mesh may be allowed much."""
+    """State the difference in frequency: the allowance for a mesh may be large."""
     error = result.frequency_error
     if error is None or error.before is None:
         return "model and recording differ by little"
@@ -67,7 +67,7 @@ def _off(result: DiagnosisResult) -> str:
 
 
 def _each(effects: Sequence[NamedEffect]) -> str:
-    """Effects with what they claim and where."""
+    """List effects with their claim and place."""
     words = []
     for e in effects:
         claim, place = f" ({e.claim})" * bool(e.claim), f", {e.where.text}" * bool(e.where.text)
@@ -76,7 +76,7 @@ def _each(effects: Sequence[NamedEffect]) -> str:
 
 
 def _lacks(result: DiagnosisResult) -> list[str]:
-    """What the model lacks, what is one of several, and which channel is at fault beside it."""
+    """List the missing effects, the tied ones, and the faulty channels."""
     tied = result.one_of[0] if result.one_of else ()
     one = next((e for e in reversed(result.effects) if e.name in tied), None)
     sure = [e for e in result.effects if e is not one]
@@ -91,7 +91,7 @@ def _lacks(result: DiagnosisResult) -> list[str]:
 
 
 def _tied(result: DiagnosisResult) -> str:
-    """What is tied, most probable first; the measurement that would settle it comes last."""
+    """List tied effects, most probable first, then the measurement that would separate them."""
     known = {e.name for e in result.effects} | {a.name for a in result.alternatives}
     names = [name for name in result.one_of[0] if name in known]
     checks = [word for word in result.one_of[0] if word not in known]

@@ -1,4 +1,4 @@
-"""An object in several states: what was found in each, and what they share."""
+"""An object in several states: findings in each state, and shared parameters."""
 
 import re
 
@@ -15,7 +15,7 @@ def state_folder(result: DiagnosisResult, k: int) -> str:
 
 
 def states_table(result: DiagnosisResult) -> list[Block]:
-    """Each state with its effect, its Q and its folder; then what they share."""
+    """Tabulate each state with its effect, Q and folder, then the shared parameters."""
     if not result.states:
         return []
     rows = [_row(s, state_folder(result, k)) for k, s in enumerate(result.states)]

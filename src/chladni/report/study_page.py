@@ -1,4 +1,4 @@
-"""A parameter study as a page: what moves what, parallel coordinates, results over parameters."""
+"""A parameter study as a page: influences, parallel coordinates, results over parameters."""
 
 from pathlib import Path
 from typing import Any
@@ -193,7 +193,7 @@ def _with_unit(name: str, unit: str) -> str:
 
 
 def _drawable(name: str) -> str:
-    """A user's name as a label: not as long as the picture, and no formula."""
+    """Shorten a user's name for a label, and prevent its reading as a formula."""
     shown = name if len(name) <= _LONGEST else f"{name[: _LONGEST - 12]}…{name[-11:]}"
     return shown.replace("$", r"\$")
 

@@ -78,7 +78,7 @@ _FILES = {
 
 
 def live(name: str, drawing: Drawing, figures: Mapping[str, Path]) -> Live:
-    """A drawing, with those of its pictures that were made."""
+    """Return a drawing, with the existing pictures among its own."""
     stills = [_picture(n, figures[n]) for n in drawing.instead_of if n in figures]
     return Live(name, drawing.draw, stills, drawing.caption)
 
@@ -113,7 +113,7 @@ def _mean_off(result: DiagnosisResult, key: str) -> float | None:
 
 
 def _joints(result: DiagnosisResult) -> list[Block]:
-    """What a linear deck would have in its joints at every level."""
+    """Tabulate the joints of a linear deck at every level."""
     rows = [tuple(number(x) for x in vars(j).values()) for j in result.joints]
     heads = ("mode [Hz]", "level", "K, times", "GE", "share of strain energy")
     what = (
@@ -137,7 +137,7 @@ def sections(
     command: str,
     drawings: Drawings | None = None,
 ) -> list[Section]:
-    """All of the page under its verdict, in the order an engineer asks."""
+    """Return all sections under the verdict, in the order of an engineer's questions."""
     drawn = {} if drawings is None else drawings.by_name
     replaced = {still for d in drawn.values() for still in d.instead_of}
 
@@ -248,7 +248,7 @@ def _place(where: Location) -> list[tuple[str, str]]:
 
 
 def _calibrated(result: DiagnosisResult) -> list[Block]:
-    """Values of the deck that the updated deck has otherwise."""
+    """Tabulate the values that differ between the given and the updated deck."""
     if not (result.calibrated and result.deck_changed):
         return []
     rows = [

@@ -1,4 +1,4 @@
-"""Numbers as an engineer writes them: four digits, SI prefixes, intervals in one unit."""
+"""Format numbers for engineers: four digits, SI prefixes, intervals in one unit."""
 
 import math
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def rounded(value: float, digits: int = 2) -> float:
-    """A value of which no more than so many digits mean something.
+    """Round a value to its significant digits.
 
     >>> rounded(76390.0), rounded(0.6581)
     (76000.0, 0.66)
@@ -31,7 +31,7 @@ def rounded(value: float, digits: int = 2) -> float:
 
 
 def hertz(f: float | None) -> str:
-    """A frequency in Hz: digits that a test can mean, the same in a column.
+    """Format a frequency in Hz, with digits that a test can resolve, equal in a column.
 
     >>> hertz(41.936), hertz(120.0), hertz(1234.5678), hertz(None)
     ('41.94', '120.00', '1234.6', '–')
@@ -86,7 +86,7 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
 
 
 def percent(new: float | None, old: float | None) -> str:
-    """Change in per cent, to a hundredth where it is small.
+    """Format a change in per cent, to a hundredth if it is small.
 
     >>> percent(0.02, 0.2), percent(1.03, 1.0), percent(0.9997, 1.0), percent(1.0, None)
     ('-90 %', '+3.0 %', '-0.03 %', '–')
@@ -99,7 +99,7 @@ def percent(new: float | None, old: float | None) -> str:
 
 
 def direction(vector: Sequence[float]) -> str:
-    """A unit vector: its axis where it is one.
+    """Format a unit vector, by its axis if it is along one.
 
     >>> direction((0.0, 0.0, -1.0)), direction((0.6, 0.0, 0.8))
     ('-Z', '0.60 0.00 0.80')
@@ -113,7 +113,7 @@ def direction(vector: Sequence[float]) -> str:
 
 
 def counted(n: int, one: str, many: str) -> str:
-    """A number and its noun, with the verb where one follows.
+    """Format a number with its noun, and a verb if one is given.
 
     >>> counted(1, "thing is", "things are"), counted(0, "thing is", "things are")
     ('1 thing is', '0 things are')
