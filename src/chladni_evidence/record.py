@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from chladni.case import load_case
-from chladni.decision.decide import RULES, decide
+from chladni.decision.decide import RULES
 from chladni.decision.decision_rules import DecisionRules
-from chladni.decision.hypothesis_table import NULL, Wanted
+from chladni.decision.hypothesis_table import NULL
 from chladni.decision.reasons import Decision
 from chladni.errors import ChladniError
-from chladni.updating.deciding import Measured, begun, measured
+from chladni.side_by_side import one_blas_thread
+from chladni.updating.deciding import Measured, begun, decided_by
 from chladni.workflows.diagnosis_pipeline import Searched, searched
 from chladni.workflows.output_only import with_natural_frequencies
 
@@ -47,12 +47,13 @@ def record(folders: Sequence[Path], out: Path, say: Say) -> list[Path]:
 
 def recorded_case(folder: Path) -> RecordedCase:
     """A case with the rows of its decision, and of its decisions without each of the rules."""
-    with threadpool_limits(1):
+    with one_blas_thread():
         made = searched(with_natural_frequencies(load_case(folder)), True, lambda text, share: None)
         known = replace(begun(made.prepared, made.found), whole=True)
-        found, known = answered(made, known, RULES)
+        given = made.prepared, made.found, made.renew
+        found, known = decided_by(RULES, *given, known)
         for f in fields(DecisionRules):
-            _, known = answered(made, known, RULES.without(f.name))
+            _, known = decided_by(RULES.without(f.name), *given, known)
     return kept(folder, made, found, known)
 
 
@@ -65,13 +66,6 @@ def kept(folder: Path, made: Searched, found: Decision, known: Measured) -> Reco
     return RecordedCase(
         _name(folder), truth_of(folder), known.table, found.verdict, names, found.one_of, arrays
     )
-
-
-def answered(made: Searched, known: Measured, rules: DecisionRules) -> tuple[Decision, Measured]:
-    """A decision by some rules, with every fit that it requests."""
-    while isinstance(found := decide(known.table, rules), Wanted):
-        known = measured(made.prepared, made.found, made.renew, known, found)
-    return found, known
 
 
 def truth_of(folder: Path) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """A case: one ``case.toml`` that names the deck, the recordings and what to do with them.
 
 Everything is resolved here once: files are read, labels become grids or places on the nearest
-shell, bands are held against the data. What does not fit is refused in one sentence.
+shell, bands are compared with the data. What does not fit is refused in one sentence.
 """
 
 import os

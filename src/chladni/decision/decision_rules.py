@@ -41,7 +41,7 @@ class DecisionRules:
         GOOD_PART, 1.0, "part of the gain due that fitted responses bring where other data agree"
     )
     poles_together: bool = _rule(
-        True, False, "of natural frequencies, fitted and foretold ones pay the price together"
+        True, False, "fitted and predicted natural frequencies reach the required gain together"
     )
     opposed: float = _rule(
         1.0, math.inf, "times the gain due: data that no fit saw refuse a name from there on"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..decision.decide import RULES, WITH_KNOWN_NOISE, decide
+from ..decision.decision_rules import DecisionRules
 from ..decision.hypothesis_table import (
     Ask,
     CalibratedDeck,
@@ -83,6 +84,13 @@ def decided(prepared: Prepared, found: Diagnosis, renew: Renew) -> tuple[Decisio
     """
     known = begun(prepared, found)
     rules = WITH_KNOWN_NOISE if known.table.known_noise else RULES
+    return decided_by(rules, prepared, found, renew, known)
+
+
+def decided_by(
+    rules: DecisionRules, prepared: Prepared, found: Diagnosis, renew: Renew, known: Measured
+) -> tuple[Decision, Measured]:
+    """Decide by some rules, with every fit that they request beyond those that are known."""
     while isinstance(decision := decide(known.table, rules), Wanted):
         known = measured(prepared, found, renew, known, decision)
     return decision, known

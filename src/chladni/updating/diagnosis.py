@@ -25,7 +25,7 @@ from ..sparse.freed_memory import give_back_freed_memory
 from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
-from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, begun, fitted
+from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
 from .leaning import leaning
 from .likelihood import Poles, Responses
 from .lossy_place import heard_of_damping
@@ -215,7 +215,7 @@ class FitChances:
 
 
 def fit_test(problem: UpdatingProblem, hypothesis: HypothesisFit) -> FitChances:
-    """What a hypothesis predicts itself, held against the data."""
+    """Test the data against the predictions of a hypothesis."""
     alone = hypothesis.effect not in hypothesis.fit.effects  # errors spread from the null as it is
     winner = hypothesis if alone else problem.about_itself(hypothesis, ROUGH)
     lost, damping = winner.fit.state.dissipated, problem.damping
@@ -289,7 +289,8 @@ def _base_fit(
     for k, x in enumerate(starts):
         try:
             data, mass = problem.data, problem.mass_measurement
-            fits.append(fitted(model, effects, data, mass, begun(model, effects, data, mass, x)))
+            start = wide_start(model, effects, data, mass, x)
+            fits.append(fitted(model, effects, data, mass, start))
         except ModelError:
             if not fits and k == len(starts) - 1:
                 raise

@@ -182,7 +182,8 @@ class UpdatingProblem:
         inside = np.concatenate([np.full(len(e.parameters), e in kept) for e in self.base])
         x0 = np.concatenate([base[inside.astype(bool)], start])
         effects, mass = [*kept, effect], self.mass_measurement
-        fit = fitted(model, effects, data, mass, begun(model, effects, data, mass, x0), max_steps)
+        x0 = wide_start(model, effects, data, mass, x0)
+        fit = fitted(model, effects, data, mass, x0, max_steps)
         return HypothesisFit(effect, fit, model, tuple(e for e, _ in self.found))
 
     def about_itself(self, hypothesis: HypothesisFit, max_steps: int = 30) -> HypothesisFit:
@@ -191,12 +192,12 @@ class UpdatingProblem:
         Comparisons of many hypotheses use the errors about the null's state. A strong effect
         changes the structure: a support turns rigid modes into flexible ones, with their errors.
         """
-        data, begun = hypothesis.data, hypothesis.fit
+        data, found = hypothesis.data, hypothesis.fit
         if not isinstance(data, Responses) or data.error is None:
             return hypothesis
-        data = data.allowing_errors(begun.state, data.error.delta, data.curved)
+        data = data.allowing_errors(found.state, data.error.delta, data.curved)
         mass = self.mass_measurement
-        fit = fitted(hypothesis.model, begun.effects, data, mass, begun.x, max_steps)
+        fit = fitted(hypothesis.model, found.effects, data, mass, found.x, max_steps)
         return replace(hypothesis, fit=fit)
 
     def without(self, effect: Effect) -> list[Effect]:
@@ -219,7 +220,7 @@ def fitted(
     return found.kept()
 
 
-def begun(
+def wide_start(
     model: Reduced, effects: Sequence[Effect], data: Data,
     mass_measurement: MassMeasurement | None, x: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
