@@ -19,7 +19,7 @@ import numpy as np
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import count
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.points import MassEffect, strength
 from chladni.effects.suspension import Suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution

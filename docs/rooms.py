@@ -15,7 +15,7 @@ GROUND = {
     "units",
     "output",
     "progress",
-    "side_by_side",
+    "parallel",
 }
 
 

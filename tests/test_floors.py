@@ -19,7 +19,7 @@ PACKAGES = {  # every package of ours and where its source is
     "chladni_envs": ROOT / "envs",
 }
 GROUND = {
-    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "side_by_side"
+    "address_space", "errors", "arrays", "dofs", "units", "output", "progress", "parallel"
 }  # fmt: skip
 MAY_IMPORT = {  # floor: the floors it may use, its own aside
     **{name: GROUND for name in GROUND},
@@ -49,7 +49,7 @@ MAY_IMPORT["chladni_envs"] = MAY_IMPORT["workflows"] | {"workflows", "chladni_sp
 MAY_IMPORT["__main__"] = {"cli"}
 LIBRARIES = {
     "progress": {"rich"},
-    "side_by_side": {"threadpoolctl"},
+    "parallel": {"threadpoolctl"},
     "sparse": {"sksparse"},
     "geometry": {"pyvista", "trimesh"},
     "io": {"meshio", "pyyeti", "pyuff", "trimesh", "xarray"},

@@ -23,7 +23,7 @@ from chladni_specimens.plates import folded_panel, plate
 from chladni_specimens.tailgate.design import TailgateDesign
 from chladni_specimens.tailgate.tailgate import tailgate
 
-from .footing import Spots
+from .mesh_transfer import Spots
 
 ZETA = 0.007  # median damping ratio of an article
 FLAT = 0.999  # least length of the mean normal of a point's shells where a sensor can be glued

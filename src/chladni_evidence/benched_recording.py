@@ -26,7 +26,7 @@ from chladni.model.assembly import Assembly
 
 from .article_modes import ArticleModes, Solver, article_modes
 from .bench_of_structure import Bench
-from .footing import Footing, Spots, still_there
+from .mesh_transfer import Footing, Spots, still_there
 from .hidden import Hidden
 from .response_of_article import seen
 

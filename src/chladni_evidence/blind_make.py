@@ -14,7 +14,7 @@ import numpy as np
 
 from chladni.errors import FileError, LabelError
 from chladni.output import locked, make_folder, own_version, write_json, write_text
-from chladni.side_by_side import one_blas_thread
+from chladni.parallel import one_blas_thread
 
 from .blind_folder import BlindFolder, Seals, hash_of, hash_of_case, published, read_json
 from .evidence_sets import MEANT, Order, Purpose, purpose

@@ -9,7 +9,7 @@ import numpy as np
 from chladni.geometry.facets import point_normals, tangents
 from chladni.model.assembly import Assembly, Masses
 
-from .footing import Spots, nearest_rows, rows_of_part
+from .mesh_transfer import Spots, nearest_rows, rows_of_part
 from .response_of_article import Coupling, Law
 
 FACING = 0.85  # cosine between normals of one face

@@ -11,7 +11,7 @@ import numpy as np
 from chladni.bench.accelerometers import AccelerometerType, drawn_gains
 from chladni.bench.noisy_frf import MeasurementChain, recorded
 from chladni.dynamics.frf import FRF
-from chladni.effects.ordinary import value
+from chladni.effects.calibration_parameters import value
 from chladni.errors import ModelError
 from chladni.fem.energy import mass_properties
 from chladni.geometry.facets import cell_areas
@@ -33,7 +33,7 @@ from .benched_recording import (
     can_be_benched,
     true_places,
 )
-from .footing import Spots, still_there
+from .mesh_transfer import Spots, still_there
 from .held_kinds import HELD
 from .hidden import Hidden, Site
 from .hidden_kinds import CATALOGUED, Kind

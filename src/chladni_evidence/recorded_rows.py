@@ -21,7 +21,7 @@ from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import MassMeasurement, beside, constants
 from chladni.updating.reduced_model import State, evaluate
-from chladni.updating.rising import Dissipated
+from chladni.updating.frequency_dependent_stiffness import Dissipated
 from chladni.updating.sensor_errors import SensorErrors, Side
 
 Arrays = dict[str, np.ndarray]

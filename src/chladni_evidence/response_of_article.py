@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .article_modes import ArticleModes
-from .footing import Footing
+from .mesh_transfer import Footing
 
 LINES_AT_ONCE = 64
 Law = Callable[[np.ndarray], np.ndarray]  # complex (n_f,) of s (n_f,) [rad/s]

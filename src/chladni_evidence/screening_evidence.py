@@ -24,7 +24,7 @@ from chladni.updating.channel_screening import against_model
 
 from .article_modes import ArticleModes, article_modes
 from .bench_of_structure import Bench, form_bench, glue_candidates, panel_bench
-from .footing import Footing, Spots, footing
+from .mesh_transfer import Footing, Spots, footing
 from .part_scatter import scattered
 from .response_of_article import accelerance, seen
 

@@ -31,7 +31,7 @@ from chladni.fem.measured_dofs import MeasuredDofs
 from chladni.geometry.sampling import nearest_points
 from chladni.model.assembly import Assembly
 from chladni.progress import Progress, silent
-from chladni.side_by_side import one_blas_thread
+from chladni.parallel import one_blas_thread
 from chladni.workflows.benched_article import benched, true_places
 from chladni.workflows.virtual_test import ABOVE_BAND
 from chladni_specimens.tailgate.design import TailgateDesign
@@ -39,7 +39,7 @@ from chladni_specimens.tailgate.skin import Skin
 from chladni_specimens.tailgate.tailgate import tailgate
 
 from .bench_of_structure import tailgate_bench
-from .footing import Spots, rows_of_part
+from .mesh_transfer import Spots, rows_of_part
 
 ARTICLE = TailgateDesign(size=0.020, hem="real")  # first mode at 28.4 Hz; that of the test: 28.2
 HUNG = (0.485, 0.940)  # |y|, s of the upper bolt holes, from which the thesis hung it (figure 17)

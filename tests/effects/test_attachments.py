@@ -9,7 +9,7 @@ import pytest
 from chladni.effects import point_mass
 from chladni.effects.point_mass import SHARE, TRIED
 from chladni.effects.search_context import SearchContext
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.updating.reduced_problem import reduced_problem
 from chladni_specimens.plates import plate
 

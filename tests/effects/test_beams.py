@@ -10,12 +10,12 @@ from chladni.dynamics.eigen import normal_modes
 from chladni.dynamics.reduction import Basis
 from chladni.effects.effect import WIDER
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.freed import freed, with_factor
+from chladni.effects.user_parameters import freed, with_factor
 from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.ordinary import defaults, ordinary, random_field
+from chladni.effects.calibration_parameters import defaults, ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.registry import families
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.suspension import suspension
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties

@@ -12,7 +12,7 @@ from chladni.effects import compliant_support
 from chladni.effects.compliant_support import on_springs
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.fem.base_motion import base_motion

@@ -17,17 +17,17 @@ from chladni.effects.effect import Effect, Parameter
 from chladni.effects.element_groups import element_groups
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.fold_bending import FoldBending
-from chladni.effects.freed import freed
+from chladni.effects.user_parameters import freed
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
 from chladni.effects.membrane_prestress import prestress
 from chladni.effects.model_families import model_families
-from chladni.effects.ordinary import channel_gain, ordinary, random_field
+from chladni.effects.calibration_parameters import channel_gain, ordinary, random_field
 from chladni.effects.orthotropic_material import material_axes
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
 from chladni.effects.stiffness_patch import StiffnessPatch
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.suspension import suspension
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure

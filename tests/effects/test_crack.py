@@ -18,7 +18,7 @@ from chladni.effects.crack import (
     left,
 )
 from chladni.effects.element_groups import element_groups
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.fem.assemble import structure
 from chladni.model.properties import Isotropic
 from chladni.updating.likelihood import Responses

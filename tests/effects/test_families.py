@@ -17,10 +17,10 @@ from chladni.effects.family import Article
 from chladni.effects.identified_damping import IdentifiedDamping
 from chladni.effects.joints import beads, stiffness
 from chladni.effects.model_families import model_families
-from chladni.effects.ordinary import ordinary, random_field
+from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.rigid_ties import on_firm_springs
-from chladni.effects.surroundings import Setup
+from chladni.effects.effect_context import Setup
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.geometry.sampling import farthest_point_sample

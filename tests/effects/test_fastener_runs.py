@@ -19,7 +19,7 @@ from chladni.effects.joints import (
     without_joint,
 )
 from chladni.effects.model_families import joint_families
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.weld_compliance import WeldCompliance, of_one, proposed
 from chladni.effects.weld_missing import WeldMissing
 from chladni.fem.assemble import structure

@@ -11,7 +11,7 @@ from chladni.effects.adhesive_stiffness import SEALANT, beads_of
 from chladni.effects.contact_stiffness import close_places
 from chladni.effects.joints import alone, beads, fasteners, with_factor_on, without_joint
 from chladni.effects.model_families import joint_families
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.weld_compliance import MOST, NONE_LEFT, SOUND, WeldCompliance, of_one
 from chladni.effects.weld_missing import WeldMissing
 from chladni.fem.assemble import structure

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.point_mass import PointMass
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import LIMIT, accuracy
 from chladni.updating.likelihood import Responses

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.joints import fasteners
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.over_constraint import RIGID, over_constraint
 from chladni.effects.rigid_ties import on_firm_springs, rigid_ties
 from chladni.fem.assemble import structure

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.search_context import best_starts
 from chladni.effects.shaker_restraint import MOST, shaker_restraint
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties
 from chladni.model.point_masses import with_masses

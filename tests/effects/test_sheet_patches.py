@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.mass_patch import MassPatch, spread_mass
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.property_bands import BANDS, levels
 from chladni.effects.stiffness_patch import StiffnessPatch, lost
 from chladni.fem.energy import mass_properties

@@ -13,7 +13,7 @@ from chladni.effects.effect import Parameter
 from chladni.effects.identified_damping import SCATTER, IdentifiedDamping, paired_with
 from chladni.effects.joints import fasteners, with_factor_on
 from chladni.effects.model_families import joint_families
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.viscoelastic_joint import (
     LEVEL_SD,
     LOSS,
@@ -32,7 +32,7 @@ from chladni.updating.damping_scatter import ModalDamping
 from chladni.updating.likelihood import Responses, along
 from chladni.updating.map_fit import beside, constants
 from chladni.updating.reduced_model import evaluate
-from chladni.updating.rising import Dissipated
+from chladni.updating.frequency_dependent_stiffness import Dissipated
 
 FLEXIBLE = slice(6, 12)
 USUAL = 0.01

@@ -8,7 +8,7 @@ import pytest
 from chladni.ema import identification, pole_fitting, pole_search_by_parts
 from chladni.ema.condensed_lines import condensed
 from chladni.ema.identification import identify, kept_lines, pole_data
-from chladni.ema.outer_poles import outside, with_outer_poles
+from chladni.ema.out_of_band_poles import outside, with_outer_poles
 from chladni.ema.pole_fitting import PoleData, linear, normal_matrices, polish, solve
 from chladni.ema.pole_search_by_parts import core_bands, few_channels
 from chladni.ema.pole_selection import Rule, uncertainty

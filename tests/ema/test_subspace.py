@@ -8,7 +8,7 @@ import pytest
 from chladni.dynamics.frf import FRF
 from chladni.ema.identification import evaluate, identify, kept_lines, pole_data
 from chladni.ema.mode_indicators import cmif, mif
-from chladni.ema.outer_poles import outside
+from chladni.ema.out_of_band_poles import outside
 from chladni.ema.pole_fitting import polish
 from chladni.ema.pole_search import with_those_beside
 from chladni.ema.pole_selection import Rule

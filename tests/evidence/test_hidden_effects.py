@@ -11,7 +11,7 @@ from chladni.fem.energy import mass_properties
 from chladni.model.ground_springs import with_ground_bushes
 from chladni_evidence.article_modes import article_modes
 from chladni_evidence.bench_of_structure import panel_bench
-from chladni_evidence.footing import Spots, footing, still_there
+from chladni_evidence.mesh_transfer import Spots, footing, still_there
 from chladni_evidence.held_kinds import HELD
 from chladni_evidence.hidden import Hidden, Site, with_lumps
 from chladni_evidence.hidden_kinds import (

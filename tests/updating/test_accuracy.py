@@ -6,10 +6,10 @@ import scipy.linalg as sl
 from numpy.testing import assert_allclose
 
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_mass import sensor_mass
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import accuracy, products

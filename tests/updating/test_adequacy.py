@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, kstest
 
 from chladni.effects.effect import Effect
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.adequacy import _drawn, _Linear, adequacy, at_least, of_poles, ranked
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.likelihood import Poles

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.ema.recording_noise import EqualisedError
 from chladni.updating import discrepancy as dis
 from chladni.updating.discrepancy import columns, discrepancy, form, learned

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.sensor_fault import sensor_fault
 from chladni.updating.held_out_evidence import held_out_evidence, predictive
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted

@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.effect import WIDER, Effect
-from chladni.effects.ordinary import channel_gain, ordinary
+from chladni.effects.calibration_parameters import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.joint_fit import informed, joint_fit, of_the_object, with_priors
 from chladni.updating.map_fit import MassMeasurement, fit

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.ordinary import channel_gain, ordinary
+from chladni.effects.calibration_parameters import channel_gain, ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.sensor_fault import sensor_fault
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.modelled import solved
 from chladni.updating.hypothesis_fit import over_scales
 from chladni.updating.likelihood import Poles

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.hypothesis_fit import fitted
 from chladni.updating.reduced_model import evaluate
 from chladni.updating.reduced_problem import reduced_problem

@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose
 from chladni.effects.effect import Effect, MatrixTerm, Parameter, count
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.point_mass import PointMass
 from chladni.effects.points import AtPoints, MassEffect
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.updating.accuracy import LIMIT
 from chladni.updating.likelihood import Responses

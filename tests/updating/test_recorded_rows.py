@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
 from chladni.updating.reduced_model import evaluate
 from chladni_evidence.recorded_rows import packed, rows_kept, unpacked

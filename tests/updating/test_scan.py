@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from chladni.effects.effect import Parameter, PointTerm
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.points import AtPoints
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate

@@ -7,17 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chladni import side_by_side
+from chladni import parallel
 from chladni.effects import point_mass, sensor_mass
 from chladni.effects.effect import Effect
 from chladni.effects.extra_support import ExtraSupport
 from chladni.effects.local_resonator import LocalResonator
 from chladni.effects.mass_patch import MassPatch
-from chladni.effects.ordinary import ordinary, random_field
+from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.point_mass import PointMass
 from chladni.effects.search_context import Candidate
 from chladni.effects.sensor_mass import sensor_mass as masses_of_sensors
-from chladni.effects.surroundings import Setup
+from chladni.effects.effect_context import Setup
 from chladni.fem.energy import mass_properties
 from chladni.updating import candidates as scanned
 from chladni.updating import diagnosis as diagnosing

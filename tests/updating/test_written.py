@@ -11,19 +11,19 @@ from chladni.decision.hypothesis_table import NULL, HypothesisTable
 from chladni.effects.discretisation import mesh_errors
 from chladni.effects.effect import Effect, Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.effects.ordinary import ordinary, random_field
+from chladni.effects.calibration_parameters import ordinary, random_field
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.stiffness_patch import StiffnessPatch
 from chladni.effects.thickness_distribution import ThicknessDistribution
 from chladni.errors import ModelError
 from chladni.fem.derivative import Slope
 from chladni.fem.modelled import modelled
-from chladni.updating import deciding, outcome
+from chladni.updating import deciding, verdict_models
 from chladni.updating.deciding import decided
 from chladni.updating.decision_in_words import concluded
 from chladni.updating.diagnosis import Diagnosis, threshold
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.leaning import leaning
+from chladni.updating.implausible_values import leaning
 from chladni.updating.likelihood import Responses
 from chladni.updating.map_fit import fit
 from chladni.updating.reduced_model import evaluate

@@ -13,7 +13,7 @@ from chladni.cli.app import application
 from chladni.errors import AccuracyError, FileError
 from chladni.io.nastran import write_assembly
 from chladni.units import UNITS, units
-from chladni.updating import renewal
+from chladni.updating import basis_refinement
 from chladni.updating.accuracy import Accuracy
 from chladni.workflows.unit_check import refuse_other_units
 from chladni_specimens.plates import plate

@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ..dofs import label
 from ..errors import AccuracyError, ModelError
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from ..sparse.dissection import Fronts, analyse, pattern
 from ..sparse.factor import Backend, Factor, factorise, inertia
 from ..sparse.lanczos import Ritz, block_lanczos

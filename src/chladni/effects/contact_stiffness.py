@@ -17,7 +17,7 @@ from .family import Article, Family
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
 from .sheet_pairs import SheetPairs
-from .surroundings import ElementGrids
+from .effect_context import ElementGrids
 
 MEDIAN, SD = 2e4, 2.0  # [N/m], sd of ln
 STARTS = (-2.0, 0.0, 2.0)

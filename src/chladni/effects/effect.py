@@ -28,7 +28,7 @@ from ..model.assembly import Assembly
 from .estimate import Estimate, Location
 
 if TYPE_CHECKING:
-    from .surroundings import Surroundings
+    from .effect_context import Surroundings
 
 FIELDS = ("t", "E", "rho", "bending", "Q11", "Q22", "Q12", "Q66")
 

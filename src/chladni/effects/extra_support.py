@@ -15,7 +15,7 @@ from .family import Article, Family
 from .movable_attachment import MovableAttachment, attachments, moved, patch, there
 from .points import strength, with_springs
 from .search_context import Candidate, SearchContext
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 TILT = 0.5  # prior sd of the tangent of its tilt: folds of a sheet have normals up to 45 deg apart
 FLATTEST = 0.2  # least cosine to a new normal for which the tilt is converted exactly

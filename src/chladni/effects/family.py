@@ -13,7 +13,7 @@ from ..geometry.sampling import nearest_points
 from ..model.assembly import Assembly
 from .effect import Effect
 from .search_context import Candidate, SearchContext, best_starts
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)

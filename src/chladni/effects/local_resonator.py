@@ -24,7 +24,7 @@ from .family import Article, Family
 from .movable_attachment import MovableAttachment, around, moved, patch, there
 from .points import strength
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import ElementGrids, Surroundings
+from .effect_context import ElementGrids, Surroundings
 
 SHARE = 0.015  # of the structure's mass: prior median of the resonator's mass
 TYPICAL = 3.0  # highest spectral line over the prior median of its frequency

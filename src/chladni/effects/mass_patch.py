@@ -16,7 +16,7 @@ from .points import strength
 from .property_bands import levels, with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import RADII, RIMMED, SheetPatch, patches
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 SHARE = 0.03  # of the structure's mass: prior median
 

@@ -18,7 +18,7 @@ from ..geometry.facets import tangents
 from .effect import WIDER, Effect, Parameter, PointTerm
 from .estimate import Estimate, Location
 from .search_context import Candidate, SearchContext, best_places, distinct
-from .surroundings import ElementGrids, Surroundings
+from .effect_context import ElementGrids, Surroundings
 
 NEIGHBOURS = 14  # grids that take part in the interpolation
 FACING = 0.85  # cosine between normals that still lie in one face

@@ -12,7 +12,7 @@ from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
 from .material_class import is_metal, orthotropy
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from .family import Article, Family
 from .movable_attachment import MovableAttachment, attachments, moved, patch, there
 from .points import strength, with_masses
 from .search_context import Candidate, SearchContext
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 SHARE = 0.03  # of the structure's mass: prior median
 TRIED = np.exp(np.linspace(-3.0, 1.5, 7))  # multiples of the median

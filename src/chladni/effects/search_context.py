@@ -12,7 +12,7 @@ import numpy as np
 
 from .effect import Effect
 from .joints import Connection
-from .surroundings import ElementGrids, Surroundings
+from .effect_context import ElementGrids, Surroundings
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from ..fem.locate import Share
 from ..model.assembly import Assembly
 from .family import Article, Family
 from .points import MassEffect, strength, with_masses
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from ..model.ground_springs import with_ground_bushes
 from .effect import Effect, PointTerm
 from .family import Article, Family
 from .points import strength, with_masses
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 MOST = 3  # drive points of fixed shakers; more points mean a hammer or a roving shaker
 ACROSS, TURNING, GAUGE = 1e4, 3.0, 0.01  # medians of their priors [N/m, N m/rad, kg]

@@ -16,7 +16,7 @@ from .effect import Effect, Parameter
 from .element_groups import ElementGroups
 from .estimate import Estimate
 from .family import Article, Family
-from .ordinary import scaled
+from .calibration_parameters import scaled
 from .property_bands import with_bands
 from .search_context import Candidate, SearchContext
 from .sheet_patch import RIMMED, SheetPatch, patches

@@ -7,7 +7,7 @@ import numpy as np
 from ..model.assembly import Assembly
 from .family import Article, Family
 from .points import AtPoints, strength, with_springs
-from .surroundings import Surroundings
+from .effect_context import Surroundings
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from ..dynamics.frf import FRF
 from .identification import DERIVATIVES, Identified, evaluate
-from .one_peak import alike_shapes, twins_joined
+from .coincident_poles import alike_shapes, twins_joined
 from .pole_search import STEADY
 from .response_variance import frf_variance, left_scatter
 from .setup import Control

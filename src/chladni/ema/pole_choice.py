@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import LabelError
-from .outer_poles import outside
+from .out_of_band_poles import outside
 from .pole_fitting import PoleData, PoleFit, PoleSystem, polish, solved
 from .pole_search import (
     ROUNDING,

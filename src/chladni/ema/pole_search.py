@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .outer_poles import with_outer_poles
+from .out_of_band_poles import with_outer_poles
 from .pole_fitting import PoleData, PoleFit, PoleSystem, noise_left, polish, solve
 from .pole_selection import (
     ORDERS,

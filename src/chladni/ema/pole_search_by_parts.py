@@ -13,9 +13,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ..progress import Progress, counted, silent, within
-from ..side_by_side import side_by_side
+from ..parallel import side_by_side
 from .condensed_lines import condensed
-from .outer_poles import outside, with_outer_poles
+from .out_of_band_poles import outside, with_outer_poles
 from .pole_fitting import PoleData, PoleFit, basis, polish, solve, stacked
 from .pole_search import (
     ROUNDING,

@@ -12,7 +12,7 @@ from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import rigid_modes
 from ..dynamics.reduction import orthonormal
 from ..effects.element_groups import element_groups
-from ..effects.ordinary import PartScale, ordinary, thickness_of
+from ..effects.calibration_parameters import PartScale, ordinary, thickness_of
 from ..errors import ModelError
 from ..fem.assemble import Structure, structure
 from ..progress import Progress, silent

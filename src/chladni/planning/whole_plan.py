@@ -11,7 +11,7 @@ import numpy as np
 from ..dofs import label
 from ..dynamics.eigen import normal_modes
 from ..dynamics.modes import ModalModel, rigid_modes
-from ..effects.ordinary import thickness_of
+from ..effects.calibration_parameters import thickness_of
 from ..ema.correlation import auto_mac
 from ..errors import ModelError, ShapeError
 from ..fem.assemble import Structure, structure

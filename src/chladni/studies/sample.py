@@ -12,7 +12,7 @@ from ..errors import ChladniError
 from ..fem.energy import mass_properties
 from ..fem.modelled import Modelled
 from ..model.assembly import Assembly
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from ..workflows.correlate import scored
 from ..workflows.frf import superposed
 from ..workflows.loaded_model import Model

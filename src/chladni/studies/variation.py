@@ -10,7 +10,7 @@ import numpy as np
 from ..case.free_parameters import free_parameter
 from ..case.schema import FIELDS
 from ..case.toml_sections import TomlSection
-from ..effects.freed import SD, SD_OTHERS, UNITS, values_of, with_factor
+from ..effects.user_parameters import SD, SD_OTHERS, UNITS, values_of, with_factor
 from ..errors import FileError
 from ..io.nastran import Deck
 from ..model.assembly import Assembly

@@ -11,7 +11,7 @@ from ..effects.element_groups import element_groups
 from ..effects.family import Family
 from ..effects.movable_attachment import MovableAttachment
 from ..effects.registry import family
-from ..effects.surroundings import Setup, Surroundings, element_grids
+from ..effects.effect_context import Setup, Surroundings, element_grids
 from ..errors import FileError
 from ..fem.assemble import structure
 from ..fem.energy import mass_properties

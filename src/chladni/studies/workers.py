@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..side_by_side import cores
+from ..parallel import cores
 from .local_workers import ENDED, local_results
 from .sample import SampleResult, StudyModel, computed
 from .worker_memory import keep_freed_memory

@@ -21,7 +21,7 @@ from .effect_dofs import own_part, own_positions
 from .field_factors import mass_log, stiffness_log
 from .reduced_model import Reduced, State, evaluate, log_fields, slices
 from .reduced_problem import ReducedProblem
-from .rising import UnrisenModes, applied
+from .frequency_dependent_stiffness import UnrisenModes, applied
 
 LIMIT = 5e-4  # largest relative frequency error that is accepted of a basis
 RIGID = 0.02  # of the highest frequency of interest: below it a mode counts as rigid

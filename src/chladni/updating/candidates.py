@@ -11,9 +11,9 @@ from ..effects.effect import Effect
 from ..effects.joints import Connection
 from ..effects.registry import families
 from ..effects.search_context import APART, Candidate
-from ..effects.surroundings import ElementGrids, Surroundings
+from ..effects.effect_context import ElementGrids, Surroundings
 from ..errors import ModelError
-from ..side_by_side import side_by_side
+from ..parallel import side_by_side
 from .fastener_scan import Loosened, LoosenedRow, fastener_scores, loosened_rows, singles
 from .hypothesis_fit import HypothesisFit, UpdatingProblem
 from .likelihood import Poles, Responses

@@ -27,12 +27,12 @@ from .diagnosis import Diagnosis, fit_test
 from .held_out_evidence import held_out_evidence
 from .hypothesis_fit import HypothesisFit
 from .likelihood import Poles, Responses
-from .lossy_place import heard_of_damping
+from .local_damping_test import heard_of_damping
 from .map_fit import fit
-from .outcome import given, scores_of
+from .verdict_models import given, scores_of
 from .question import Prepared
 from .reduced_model import evaluate
-from .renewal import Renewal
+from .basis_refinement import Renewal
 from .rows_of_fits import row_of
 from .search_round import taken
 from .several import Several

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..fem.modelled import modelled
 from .diagnosis import threshold
-from .left_where import bumps
+from .residual_localisation import bumps
 from .likelihood import LN10, Responses
 from .nuisances import measured_on, mesh_hidden, nuisances
 from .preparation import (

@@ -26,9 +26,9 @@ from .adequacy import FitTest, adequacy
 from .candidates import candidates, unasked
 from .discrepancy import MEDIAN
 from .hypothesis_fit import CLOSE, ROUGH, HypothesisFit, UpdatingProblem, fitted, wide_start
-from .leaning import leaning
+from .implausible_values import leaning
 from .likelihood import Poles, Responses
-from .lossy_place import heard_of_damping
+from .local_damping_test import heard_of_damping
 from .reduced_model import evaluate
 from .rows_of_fits import row_of, row_of_null
 from .search_round import on_common_basis, search_round, taken

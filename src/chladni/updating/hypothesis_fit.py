@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ..effects.effect import Effect
-from ..effects.surroundings import Setup, Surroundings
+from ..effects.effect_context import Setup, Surroundings
 from .complex_modes import ModeCoupling
 from .damping_scatter import ModalDamping
 from .discrepancy import MEDIAN, learned

@@ -94,7 +94,7 @@ class Responses:
     def model(self, state: State) -> np.ndarray:
         """H_A(s) = s^k Σ_r φ_or φ_ir / (λ_r + s²) + what the base carries (n_f, n_out, n_in).
 
-        If effects dissipate, the modes are complex (:mod:`.rising`).
+        If effects dissipate, the modes are complex (:mod:`.frequency_dependent_stiffness`).
         """
         H = self.receptance(state, *self.modal(state))
         return self.s[:, None, None] ** self.power * H + self.direct

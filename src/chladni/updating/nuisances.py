@@ -6,7 +6,7 @@ from ..effects.discretisation import MeshError, Places, mesh_errors, modal_discr
 from ..effects.effect import Effect
 from ..effects.fold_bending import fold_bending
 from ..effects.model_families import model_families
-from ..effects.ordinary import random_field
+from ..effects.calibration_parameters import random_field
 from ..fem.assemble import Structure
 from ..fem.modelled import Modelled
 from ..sparse.freed_memory import give_back_freed_memory

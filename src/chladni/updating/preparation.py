@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects.effect import Effect
-from ..effects.freed import UNITS, defaults_of_solids, freed, freed_effect
+from ..effects.user_parameters import UNITS, defaults_of_solids, freed, freed_effect
 from ..effects.model_families import joint_nuisances
-from ..effects.ordinary import channel_gain, defaults
+from ..effects.calibration_parameters import channel_gain, defaults
 from ..effects.registry import family
-from ..effects.surroundings import Setup, Surroundings
+from ..effects.effect_context import Setup, Surroundings
 from ..ema.identification import Identified, equalised, identify
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import level_study

@@ -27,7 +27,7 @@ from .effect_dofs import own_part, own_positions, row, with_own
 from .field_factors import mass_log, stiffness_log
 from .matrix_stack import MatrixStack, Whole, add_slopes, bordered
 from .real_modes import real_modes
-from .rising import Dissipated, Rising
+from .frequency_dependent_stiffness import Dissipated, Rising
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from .diagnosis import Diagnosis
 from .hypothesis_fit import HypothesisFit
 from .joint_fit import JointFit
 from .likelihood import LN10, Poles
-from .outcome import real_poles
+from .verdict_models import real_poles
 from .question import Prepared
 from .result import (
     Agreement,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ..decision.hypothesis_table import NULL, Row
 from ..decision.tied import leading
 from .hypothesis_fit import HypothesisFit
-from .leaning import strained
+from .implausible_values import strained
 
 
 def row_of(hypothesis: HypothesisFit, key: str = "") -> Row:

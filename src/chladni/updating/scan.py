@@ -13,7 +13,7 @@ import numpy as np
 
 from ..dynamics.modal_sum import modal_sum
 from ..effects.effect import Effect, FieldChange, Parameter
-from ..effects.surroundings import ElementGrids
+from ..effects.effect_context import ElementGrids
 from .likelihood import LN10, Data, Responses
 from .map_fit import MassMeasurement, unknowns
 from .reduced_model import Reduced, State, evaluate

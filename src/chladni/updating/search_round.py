@@ -15,7 +15,7 @@ from ..effects.effect import Effect
 from ..effects.registry import families
 from ..effects.search_context import Candidate
 from ..errors import ModelError
-from ..side_by_side import side_by_side
+from ..parallel import side_by_side
 from ..sparse.freed_memory import give_back_freed_memory
 from .candidates import UpdatingContext, already_there
 from .hypothesis_fit import ROUGH, HypothesisFit, UpdatingProblem, fitted

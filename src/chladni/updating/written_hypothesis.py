@@ -9,7 +9,7 @@ from ..effects.calibrated_family import calibrated_family
 from ..effects.discretisation import MeshError
 from ..effects.effect import Effect
 from .hypothesis_fit import HypothesisFit
-from .leaning import is_strained
+from .implausible_values import is_strained
 from .likelihood import Responses
 from .map_fit import MassMeasurement, fit
 from .reduced_model import evaluate

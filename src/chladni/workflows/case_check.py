@@ -11,7 +11,7 @@ from ..fem.energy import mass_properties
 from ..fem.measured_dofs import MeasuredDofs
 from ..geometry.nearest import ShellSurface
 from ..progress import Progress, silent, within
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .case_draft import said_of
 from .correlate import correlate
 from .loaded_model import as_model

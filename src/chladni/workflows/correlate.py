@@ -18,7 +18,7 @@ from ..ema.shapes import driven_shapes, real_shapes, shape_covariance
 from ..errors import ChladniError
 from ..fem.modelled import Modelled, modelled
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from ..view.paired_shapes import PairedShapes
 from .axes_check import refuse_turned_axes
 from .case_model import DAMPING, REACH, model_frf

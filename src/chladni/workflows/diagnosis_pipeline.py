@@ -30,15 +30,15 @@ from ..updating.diagnosis import diagnose as compared
 from ..updating.frequency_table import frequency_error, frequency_rows
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import Posterior, informed
-from ..updating.leaning import in_doubt, leaning, strained
-from ..updating.left_where import LeftWhere, left_where
+from ..updating.implausible_values import in_doubt, leaning, strained
+from ..updating.residual_localisation import LeftWhere, left_where
 from ..updating.likelihood import Poles, Responses
 from ..updating.measured_modes import MeasuredModes, measured_modes
 from ..updating.other_recordings import scored_others
-from ..updating.outcome import fitted_scores, held_out, models, real_poles, with_deck
+from ..updating.verdict_models import fitted_scores, held_out, models, real_poles, with_deck
 from ..updating.preparation import NOT_WEIGHED, prepare
 from ..updating.question import Prepared, Question
-from ..updating.renewal import Renewal, renewed
+from ..updating.basis_refinement import Renewal, renewed
 from ..updating.result import Adequacy, LeftPlace, MassComparison, Scores
 from ..updating.result_parts import (
     agreement,

@@ -14,7 +14,7 @@ from ..ema.level_table import LevelTable
 from ..errors import AccuracyError
 from ..fem.modelled import Modelled
 from ..io.nastran.edit.changes import Change
-from ..updating.left_where import LeftWhere
+from ..updating.residual_localisation import LeftWhere
 from ..updating.level_effects import LinearJoint
 from ..updating.measured_modes import MeasuredModes
 from ..updating.result import (

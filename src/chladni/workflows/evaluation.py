@@ -16,7 +16,7 @@ from ..ema.setup import Recording
 from ..errors import ChladniError, FileError
 from ..fem.modelled import modelled
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .case_model import REACH
 from .identify import without_window
 from .screening_of_case import screened_by_model

@@ -20,7 +20,7 @@ from ..io.tables.sensor_table import exciter, read_layout
 from ..model.analysis import Analysis, Subcase
 from ..model.point_masses import with_masses
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .case_model import REACH, model_frf
 from .loaded_model import DeckModels, Model, as_model, beside
 

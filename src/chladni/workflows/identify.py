@@ -13,7 +13,7 @@ from ..ema.identification import identify as identified
 from ..ema.level_modes import AtLevel
 from ..ema.level_study import LevelStudy, level_study
 from ..ema.level_words import level_notes
-from ..ema.one_peak import peak_notes
+from ..ema.coincident_poles import peak_notes
 from ..ema.recording_screening import screened
 from ..ema.response_correlations import ALIKE, RELEASE, responses, ringing
 from ..ema.response_variance import noise_source
@@ -21,7 +21,7 @@ from ..ema.setup import PoleTable, Recording
 from ..ema.stabilisation import Stabilisation, ghosts, stabilisation
 from ..errors import AccuracyError, FileError
 from ..progress import Progress, silent, within
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from ..updating.measured_frequencies import LEAST_DELTA_CHI2
 
 TRUST = 5.0  # rms of the whitened residual above which poles are not to be trusted

@@ -9,7 +9,7 @@ from ..dynamics.modes import ModalModel, rigid_modes
 from ..fem.energy import mass_properties, part_energies
 from ..fem.loose_parts import loose_grids
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .loaded_model import LEAST, Model, as_model
 
 

@@ -15,7 +15,7 @@ from ..io.nastran.results.punch import PunchModes
 from ..io.uff.read_uff import read_uff
 from ..model.assembly import Assembly
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .loaded_model import Model, beside
 
 RIGID = 0.03  # of the model's first elastic frequency: modes below are rigid motions, in both

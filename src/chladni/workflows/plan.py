@@ -4,7 +4,7 @@ from ..case import Case
 from ..planning import Plan, PlanSettings
 from ..planning import plan as planned
 from ..progress import Progress, silent
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .loaded_model import Model, as_model
 
 

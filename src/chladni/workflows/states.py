@@ -11,7 +11,7 @@ from dataclasses import replace
 from ..case import Case
 from ..case.recording_groups import of_state, states
 from ..progress import Progress, within
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from ..updating.diagnosis import Diagnosis
 from ..updating.hypothesis_fit import HypothesisFit
 from ..updating.joint_fit import JointFit, joint_fit

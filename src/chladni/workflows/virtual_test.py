@@ -33,7 +33,7 @@ from ..geometry.refine import refined
 from ..geometry.sampling import nearest_points
 from ..io.file_size import OVERRIDE, most_gigabytes
 from ..progress import Progress, silent, within
-from ..side_by_side import one_blas_thread
+from ..parallel import one_blas_thread
 from .benched_article import benched, true_places
 from .loaded_model import as_model
 from .local_sites import LOCAL, local_site

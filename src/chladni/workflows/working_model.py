@@ -10,7 +10,7 @@ import numpy as np
 from ..case.free_parameters import fields_of
 from ..case.schema import FIELDS
 from ..dynamics.frf import FRF, Quantity
-from ..effects.freed import number, with_factor
+from ..effects.user_parameters import number, with_factor
 from ..errors import LabelError, ModelError
 from ..io.nastran import assembly, write_deck
 from ..io.nastran.edit.model_changes import changes

@@ -12,7 +12,7 @@ import numpy as np
 from chladni.effects.effect import PointTerm
 from chladni.effects.family import Article, Family
 from chladni.effects.points import MassEffect, strength
-from chladni.effects.surroundings import Surroundings
+from chladni.effects.effect_context import Surroundings
 from chladni.model.assembly import Assembly
 from chladni.model.point_masses import with_masses
 

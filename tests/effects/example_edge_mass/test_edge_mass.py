@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from chladni.cli.app import application
 from chladni.dynamics.eigen import normal_modes
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck
 from chladni.units import UNITS

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chladni.effects.element_groups import element_groups
-from chladni.effects.freed import freed
+from chladni.effects.user_parameters import freed
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_deck
 from chladni.io.nastran.edit.model_changes import changes

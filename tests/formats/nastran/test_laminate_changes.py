@@ -9,7 +9,7 @@ import pytest
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.element_groups import element_groups
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.errors import ModelError
 from chladni.fem.assemble import structure
 from chladni.io.nastran import assembly, read_deck, write_assembly, write_deck

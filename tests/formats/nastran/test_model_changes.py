@@ -7,7 +7,7 @@ import pytest
 
 from chladni.dynamics.eigen import normal_modes
 from chladni.effects.element_groups import element_groups
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.effects.orthotropic_material import orthotropic
 from chladni.effects.points import with_masses, with_springs
 from chladni.errors import ModelError

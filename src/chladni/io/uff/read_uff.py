@@ -17,7 +17,7 @@ from ...ema.setup import Function, Recording, Shapes
 from ...errors import ChladniError, FileError, named
 from .estimate_stamp import read_stamp, with_variance
 from .uff_frf import frf_matrix
-from .uff_pile import Channel, Pair, Pile, Shape, TimeSignal, dataset_name
+from .uff_accumulator import Channel, Pair, Pile, Shape, TimeSignal, dataset_name
 from .uff_sets import (
     SILENT,
     USED,

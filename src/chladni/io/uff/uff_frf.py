@@ -8,7 +8,7 @@ import numpy as np
 
 from ...dynamics.frf import FRF
 from ...errors import ChladniError, FileError, named
-from .uff_pile import Channel, Pair, Pile
+from .uff_accumulator import Channel, Pair, Pile
 
 _SAME_LINE = 1e-5  # single precision abscissas: relative
 

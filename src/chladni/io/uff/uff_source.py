@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...errors import FileError, named
 from ..file_size import refuse_large
-from .uff_pile import dataset_name
+from .uff_accumulator import dataset_name
 
 _MARK = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
 _LOOSE = re.compile(rb"(?m)^[ \t]*-1[ \t]*(?=\r?$)")

@@ -5,7 +5,7 @@ import numpy as np
 from ...ema.time_record import TimeRecord
 from ...errors import FileError
 from ..time.time_channels import TimeChannel, assembled, rate_of
-from .uff_pile import Pile, TimeSignal
+from .uff_accumulator import Pile, TimeSignal
 
 _SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N"}  # data types, where no unit is written
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect, FieldChange, Parameter
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.updating.hypothesis_fit import HypothesisFit, fitted
-from chladni.updating.left_where import left_where
+from chladni.updating.residual_localisation import left_where
 from chladni.updating.map_fit import MassMeasurement
 from chladni.updating.reduced_model import evaluate
 

@@ -7,8 +7,8 @@ import pytest
 
 from chladni.effects.effect import Parameter
 from chladni.effects.model_families import ADHESIVE, ModelFamily
-from chladni.effects.ordinary import PartScale
-from chladni.updating.leaning import FAR, in_doubt, strained
+from chladni.effects.calibration_parameters import PartScale
+from chladni.updating.implausible_values import FAR, in_doubt, strained
 
 
 def fitted(text, away):

@@ -22,7 +22,7 @@ from .effect import ChannelChange, Effect, FieldChange, MatrixTerm, Parameter, P
 from .element_groups import ElementGroups
 from .estimate import Estimate, Location
 from .linear_parameter import LinearScale, linear_scale
-from .ordinary import OF_FIELDS, SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
+from .calibration_parameters import OF_FIELDS, SHEET, SPREAD, TUBE, ordinary, scaled, value, with_scaled
 
 UNITS = {
     **OF_FIELDS,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from chladni.effects.effect import Effect
-from chladni.effects.ordinary import ordinary
+from chladni.effects.calibration_parameters import ordinary
 from chladni.errors import ModelError
-from chladni.updating import renewal
+from chladni.updating import basis_refinement
 from chladni.updating.accuracy import Accuracy
 from chladni.updating.hypothesis_fit import HypothesisFit
 from chladni.updating.map_fit import fit

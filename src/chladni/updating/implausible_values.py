@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..effects.effect import Effect
-from ..effects.freed import Freed
+from ..effects.user_parameters import Freed
 from ..effects.model_families import FAR, JOINTS, ModelFamily
 from .map_fit import Fit
 

@@ -8,11 +8,11 @@ from scipy.stats import kstest
 
 from chladni.effects.crack import LineFinder, crack
 from chladni.effects.extra_support import ExtraSupport
-from chladni.effects.surroundings import Setup, Surroundings
+from chladni.effects.effect_context import Setup, Surroundings
 from chladni.updating.adequacy import LEAST, FitTest
 from chladni.updating.damping_scatter import LOG_SD, SCATTER, ModalDamping
 from chladni.updating.hypothesis_fit import HypothesisFit
-from chladni.updating.lossy_place import heard_of_damping, shifted
+from chladni.updating.local_damping_test import heard_of_damping, shifted
 from chladni.updating.reduced_model import evaluate
 
 FLEXIBLE = 20.0  # Hz, below all modes of the plate that bend it

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from chladni.effects.freed import defaults_of_solids, freed
+from chladni.effects.user_parameters import defaults_of_solids, freed
 from chladni.effects.points import with_masses, with_springs
 from chladni.fem.assemble import structure
 from chladni.fem.energy import mass_properties

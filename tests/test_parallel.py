@@ -12,7 +12,7 @@ from chladni import side_by_side as module
 from chladni.dynamics import eigen
 from chladni.errors import ModelError
 from chladni.io.package_files import mesh_path
-from chladni.side_by_side import cores, one_blas_thread, side_by_side, threads
+from chladni.parallel import cores, one_blas_thread, side_by_side, threads
 from chladni.sparse.lanczos import block_lanczos
 
 
